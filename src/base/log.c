@@ -11,14 +11,6 @@
 PetscLogEvent SbEvents[SB_EVENT_COUNT];
 PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;
 
-static PetscErrorCode stage(const char *name, PetscLogStage *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogStageGetId(name, s));
-  if (*s < 0) PetscCall(PetscLogStageRegister(name, s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLogInitialize(void)
 {
   static const char *const names[SB_EVENT_COUNT] = {
@@ -26,13 +18,16 @@ PetscErrorCode SbLogInitialize(void)
     "SbTangent",  "SbEnergy",      "SbEffects",      "SbContact",     "SbSearch",
     "SbProject",  "SbSolverSetUp", "SbContactSolve", "SbOutput",      "SbCheckpoint",
   };
+  static const char *const stages[3] = {"Setup", "Solve", "Output"};
+  PetscLogStage *const numbers[3] = {&SbLogStageSetup, &SbLogStageSolve, &SbLogStageOutput};
 
   PetscFunctionBeginUser;
   for (int i = 0; i < SB_EVENT_COUNT; i++)
     PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
-  PetscCall(stage("Setup", &SbLogStageSetup));
-  PetscCall(stage("Solve", &SbLogStageSolve));
-  PetscCall(stage("Output", &SbLogStageOutput));
+  for (int i = 0; i < 3; i++) {
+    PetscCall(PetscLogStageGetId(stages[i], numbers[i]));
+    if (*numbers[i] < 0) PetscCall(PetscLogStageRegister(stages[i], numbers[i]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -86,20 +86,8 @@ PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOptio
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
 {
   PetscFunctionBeginUser;
-  if (scope->klass[0])
-    PetscCall(PetscSNPrintf(name, size, "-%s_%s_%s", scope->klass, scope->instance, key));
-  else
-    PetscCall(PetscSNPrintf(name, size, "-%s", key));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbOptionManualName(const SbOptionRow *r, size_t size, char name[])
-{
-  SbScope scope;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, r->klass, r->type, "<name>"));
-  PetscCall(SbOptionName(&scope, r->row->key, size, name));
+  SbFormat(size, name, scope->klass[0] ? "-%s_%s_%s" : "-%s%s%s", scope->klass,
+           scope->klass[0] ? scope->instance : "", key);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -58,5 +58,3 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* All names and values in the database at present. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
 PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);
-/* Full name as in the manual: "-body_<name>_young", "-ts_dt". */
-PetscErrorCode SbOptionManualName(const SbOptionRow *row, size_t size, char name[]);

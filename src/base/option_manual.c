@@ -33,7 +33,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
   char name[SB_OPTION_NAME_MAX], number[16] = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionManualName(r, sizeof(name), name));
+  SbFormat(sizeof(name), name, r->klass[0] ? "-%s_<name>_%s" : "-%s%s", r->klass, row->key);
   // description of the value: "3 numbers", "euler_implicit|newmark"
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s%s%s%s", name, number,
@@ -67,7 +67,7 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, c
 
     if (strcmp(r->klass, first->klass) || strcmp(r->type, first->type)) continue;
     // relevance of the option to the topic: 3: class or type, 2: first word, 1: a word in name or text
-    PetscCall(SbOptionManualName(r, sizeof(name), name));
+    SbFormat(sizeof(name), name, r->klass[0] ? "-%s_<name>_%s" : "-%s%s", r->klass, row->key);
     if (!strcasecmp(r->klass[0] ? r->klass : "run", topic) || !strcasecmp(r->type, topic))
       relevance = 3;
     else if (!r->klass[0] && !strncasecmp(row->key, topic, length) &&
