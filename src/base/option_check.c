@@ -14,8 +14,6 @@
 */
 #include "option.h"
 
-/* ------------------------------------------------------------------ owner of an option */
-
 /* Row of a program-wide option, by its name without dash; NULL if there is none. */
 static const SbOption *program_row(const char *name)
 {

@@ -9,8 +9,6 @@
 #include "formula.h"
 #include "option.h"
 
-/* ------------------------------------------------------------------ text */
-
 /* Copies [begin, end), trimmed; returns whether it fits. */
 static PetscBool copy_trimmed(const char *begin, const char *end, size_t size, char text[])
 {
@@ -56,8 +54,7 @@ static PetscBool parse_real(const char *text, PetscReal *value)
   return (PetscBool)(end != text && !*end);
 }
 
-/* ------------------------------------------------------------------ ranges */
-
+/* Raises the error of a number out of its range. */
 static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 {
   PetscBool in;
@@ -82,8 +79,6 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
              unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ readers */
 
 /* Record of an option of this kind, with the user's text or else the default. */
 static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind,

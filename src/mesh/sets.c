@@ -10,8 +10,7 @@
 */
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ parsing */
-
+/* The kinds of sets, with what to write for them. */
 static const struct {
   const char *name, *form;
   int least, most; /* range of the number of parameters; 0: a name; -1: none */
@@ -75,8 +74,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ members */
-
+/* Whether a point is in a shape. */
 static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
 {
   const PetscReal *p = set->p;
@@ -224,8 +222,7 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ empty sets */
-
+/* Raises the error of a group without members. */
 static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbImport import[],
                                   const SbSet *set)
 {

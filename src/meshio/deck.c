@@ -57,8 +57,6 @@ PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, PetscInt other, int64_t f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ conversion */
-
 /* Appends the indices of the nodes or elements in a range to deck->found. */
 static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRange *r)
 {

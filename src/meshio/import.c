@@ -9,8 +9,6 @@
 #include "meshio_impl.h"
 #include "sbsurface.h"
 
-/* ------------------------------------------------------------------ placement */
-
 static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 {
   PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -56,8 +54,6 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ choice of the reader */
 
 /* File readers by extension. */
 static const struct {

@@ -34,8 +34,6 @@ typedef struct {
   char (*surface)[SB_GROUP_MAX];
 } Abaqus;
 
-/* ------------------------------------------------------------------ lines and words */
-
 /* Goes to the next line that is not a comment; false at the end of the file. */
 static PetscBool next_line(Abaqus *a)
 {
@@ -117,8 +115,6 @@ static PetscBool parameter(Abaqus *a, const char *line, const char *name, char v
   return found;
 }
 
-/* ------------------------------------------------------------------ sets */
-
 /* Finds or creates the set of this kind and name; an instance name before a dot is ignored. */
 static PetscErrorCode find_set(Abaqus *a, PetscBool of_nodes, const char *name, PetscInt *set)
 {
@@ -170,8 +166,6 @@ static PetscErrorCode read_set(Abaqus *a, const char *line, PetscBool of_nodes)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ nodes and elements */
 
 static PetscErrorCode read_nodes(Abaqus *a, const char *line)
 {
@@ -252,8 +246,6 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ surfaces */
-
 static PetscErrorCode read_surface(Abaqus *a, const char *line)
 {
   char name[WORD], kind[WORD], word[WORD];
@@ -307,8 +299,6 @@ static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement 
   PetscCall(SbImportAddItem(im, 2, vert, tags, e->label));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
 {

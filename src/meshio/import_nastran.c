@@ -43,8 +43,6 @@ typedef struct {
   char pending[SB_GROUP_MAX]; /* name that a Patran comment gives to the next property */
 } Nastran;
 
-/* ------------------------------------------------------------------ names in comments */
-
 /* Copies the text from `p` to a delimiter or the end, trimmed; blanks in it become underscores. */
 static void copy_name(const char *p, const char *end, char delimiter, char name[SB_GROUP_MAX])
 {
@@ -95,8 +93,6 @@ static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end
   PetscCall(add_name(b, number, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ lines and fields */
 
 /* Field k of this line, trimmed; field 0 is the name. */
 static void get_field(const Nastran *b, int k, char word[WORD])
@@ -220,8 +216,6 @@ static PetscErrorCode next_number(Nastran *b, PetscBool needed, const char *what
   if (needed && !*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ entries */
 
 static PetscErrorCode read_grid(Nastran *b)
 {
@@ -375,8 +369,6 @@ static PetscErrorCode read_entry(Nastran *b)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 {

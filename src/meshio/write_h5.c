@@ -118,8 +118,6 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ XDMF */
-
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
 {
   char components[16] = "";

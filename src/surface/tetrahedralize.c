@@ -15,8 +15,6 @@
 #define ROUGH 0.1  /* the same if it is remeshed: a coarse mesh of a curved surface loses volume */
 #define SLIVER 5.  /* degrees */
 
-/* ------------------------------------------------------------------ surface */
-
 PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *s)
 {
   PetscFunctionBeginUser;
@@ -47,8 +45,6 @@ PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
   }
   return SbTrianglesMeanEdge(&t);
 }
-
-/* ------------------------------------------------------------------ backends */
 
 static const struct {
   const char *name;

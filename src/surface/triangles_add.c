@@ -15,8 +15,6 @@
 #define LOOPS_MAX 100    /* polygons of one facet, at most */
 #define THIN 1e-9        /* smallest area over longest edge squared of the triangles of a fan */
 
-/* ------------------------------------------------------------------ vertices, triangles, groups */
-
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
 {
   SbTriangles *t = f->t;
@@ -66,8 +64,7 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ polygons */
-
+/* The vertices of all polygons, and the normal of one. */
 typedef struct {
   const PetscReal *x;
   PetscReal normal[3];
@@ -204,8 +201,7 @@ PetscErrorCode SbTrianglesAddFace(SbScan *s, int64_t number, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ nested polygons */
-
+/* The nested polygons of a facet. */
 typedef struct {
   Polygon p;
   PetscInt n;            /* number of polygons */
