@@ -41,6 +41,12 @@ typedef struct {
   PetscInt outer;     /* its shell of negative volume */
 } Surface;
 
+/* A triangle around an edge. */
+typedef struct {
+  PetscReal angle; /* dihedral angle about the edge from the first triangle, rad */
+  PetscInt slot;   /* slot of the edge in the triangle */
+} Spoke;
+
 typedef struct {
   SbTriangleFile *f;
   SbTriangles *t;
@@ -50,6 +56,7 @@ typedef struct {
   PetscInt *surface; /* [ntri] surface of each triangle */
   PetscInt *across;  /* [3 ntri] slot on the other side of an edge; -1: more than two triangles share it */
   PetscInt *stack;   /* [ntri] */
+  Spoke *spoke;      /* [3 ntri] triangles around one edge */
   int *sense; /* [ntri] 1: oriented as the first triangle that the search for its surface reached, else -1 */
   PetscInt nshell, nsurface;
   Shell *shells;
@@ -118,12 +125,6 @@ static PetscErrorCode orient_alike(Arrangement *s)
 
 /* ------------------------------------------------------------------ shells */
 
-/* A triangle around an edge. */
-typedef struct {
-  PetscReal angle; /* dihedral angle about the edge from the first triangle, rad */
-  PetscInt slot;   /* slot of the edge in the triangle */
-} Spoke;
-
 static int compare_spokes(const void *a, const void *b)
 {
   const Spoke *p = (const Spoke *)a, *q = (const Spoke *)b;
@@ -141,13 +142,12 @@ static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBoo
 }
 
 /* Joins the sides that face each other around one edge. */
-static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey edge[], PetscInt up[])
+static void join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[])
 {
   const PetscInt p = (PetscInt)(edge[0].key >> 32), q = (PetscInt)(edge[0].key & 0xffffffff);
-  Spoke few[8], *spoke = few;
+  const SbTriangles *t = s->t;
+  Spoke *spoke = s->spoke;
 
-  PetscFunctionBeginUser;
-  if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
   for (PetscInt i = 0; i < n; i++) spoke[i] = (Spoke){0, edge[i].slot};
   // angles of triangles about the edge from p to q, relative to the first one
   if (n > 2) {
@@ -169,10 +169,8 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   }
   // join facing sides of consecutive triangles
   for (PetscInt i = 0; i < n; i++)
-    (void)SbUnionJoin(up, facing(t, spoke[i].slot, p, PETSC_TRUE),
+    (void)SbUnionJoin(s->shell, facing(t, spoke[i].slot, p, PETSC_TRUE),
                       facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
-  if (n > 8) PetscCall(PetscFree(spoke));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by edges. */
@@ -187,7 +185,7 @@ static PetscErrorCode find_shells(Arrangement *s)
   for (PetscInt f = 0; f < t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    PetscCall(join_at_edge(t, m, s->edge + i, s->shell));
+    join_at_edge(s, m, s->edge + i);
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
@@ -281,12 +279,11 @@ static void empty_cavities(Arrangement *s)
 /* ------------------------------------------------------------------ output */
 
 /* Groups that all triangles of a shell have in common: group[n], n at most 16. */
-static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])
+static void groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
   const SbImport *im = s->f->im;
   PetscInt last = -1; /* tag set of the previous triangle, already examined */
 
-  PetscFunctionBeginUser;
   *n = -1;
   for (PetscInt i = 0; i < 2 * s->t->ntri && *n; i++) {
     const PetscInt set = s->f->tags[i / 2], start = im->tags_start[set], end = im->tags_start[set + 1];
@@ -307,7 +304,6 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
     }
     *n = kept;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Groups of each region: region_1, ...; NAME_region if its boundary is in the group NAME; as in the file. */
@@ -324,7 +320,7 @@ static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
     if (p->volume < 0 || p->region < 0) continue;
     (void)snprintf(name, sizeof(name), "region_%" PetscInt_FMT, p->region + 1);
     PetscCall(SbImportGroup(im, 3, -1 - p->region, name, &group[n++]));
-    PetscCall(groups_of_shell(s, k, &nsurface, surface));
+    groups_of_shell(s, k, &nsurface, surface);
     for (PetscInt i = 0; i < nsurface; i++) {
       (void)snprintf(name, sizeof(name), "%.100s_region", im->group[surface[i]].name);
       PetscCall(SbImportGroup(im, 3, -1 - s->nshell - surface[i], name, &group[n++]));
@@ -425,11 +421,11 @@ PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSu
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscMalloc6(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, n, &s.stack, n, &s.sense));
+  PetscCall(PetscMalloc7(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, n, &s.stack, n,
+                         &s.sense, 3 * n, &s.spoke));
   ierr = find_regions(&s, out);
   PetscCall(PetscFree(s.shells));
   PetscCall(PetscFree(s.surfaces));
-  PetscCall(PetscFree6(s.edge, s.shell, s.surface, s.across, s.stack, s.sense));
+  PetscCall(PetscFree7(s.edge, s.shell, s.surface, s.across, s.stack, s.sense, s.spoke));
   PetscFunctionReturn(ierr);
 }
