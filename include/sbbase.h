@@ -55,7 +55,7 @@ extern const SbScope SbRunScope; /* of the program-wide options */
 
 /* Adds rows to the table. `rows` must live as long as the program. Not collective. */
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);
-PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
+void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
 /*
   Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()), or, of
@@ -82,7 +82,7 @@ PetscBool SbOptionExists(const SbScope *scope, const char *key);
 /* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
 
 /* Full name, e.g. "-body_liver_young", for messages. */
-PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
+void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
 /*
   SbOptionsCheck - examines the options of ours that nobody read. One that exists and is of no use in this run
@@ -119,11 +119,9 @@ PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at
 
 /* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when
    none is near. NULL among the names is passed over: PetscFunctionListGet() counts its closing one. */
-PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
-                              char text[]);
+void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
 /* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
-PetscErrorCode SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
-                             char text[]);
+void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
 /* The same for the types in a list. */
 PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[]);
 /* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
@@ -249,7 +247,7 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula);
   its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an
   accepted step that ended at t, reads new targets from the file. Collective.
 */
-PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
+void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);
 const char *SbLiveColumn(PetscInt i, const char **unit);
 PetscReal SbLiveGet(PetscInt i, PetscReal t);

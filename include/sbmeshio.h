@@ -172,7 +172,7 @@ struct _p_SbImport {
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or -1. */
-PetscErrorCode SbImportDropVertices(SbImport *import, PetscInt keep[]);
+void SbImportDropVertices(SbImport *import, PetscInt keep[]);
 /* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending; nodes that are
    no corner of a tet are no vertices any more. Output: found[nmiddle], which of those in a list are edges of
    tets, or NULL: it is an error if one is not; largest, off the middle over the length. Errors: an edge with
@@ -190,7 +190,7 @@ typedef struct {
   PetscInt N, block, first;
 } SbSlabRows;
 /* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not there. */
-PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
+void SbImportSlabs(const SbBody *body, PetscInt *ncell);
 /*
   SbImportSlab - slab k of n of such a mesh, placed. Not collective.
 

@@ -34,7 +34,7 @@ PetscErrorCode SbRemeshRegister(void); /* option rows */
 /* Options read: -remesh_..., -body_<name>_remesh_quality. remesh: NULL when none asks for it. Collective. */
 PetscErrorCode SbRemeshSetFromOptions(SbModel model, SbRemesh *remesh);
 /* Who makes the tets, instead of SbMesherDefault(). Not collective. */
-PetscErrorCode SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
+void SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
 /* NULL: nothing. Not collective. */
 PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);
 /*

@@ -135,7 +135,7 @@ static PetscErrorCode word(Parser *p)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[nknown++] = functions[i].name;
   for (int i = 0; i < 4; i++) known[nknown++] = variables[i];
   known[nknown++] = "pi";
-  if (n > 1) PetscCall(SbSuggestNames(name, nknown, known, sizeof(near), near));
+  if (n > 1) SbSuggestNames(name, nknown, known, sizeof(near), near);
   PetscCall(PetscSNPrintf(
     what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
     near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));

@@ -86,15 +86,13 @@ void SbLiveForget(SbFormula formula)
   }
 }
 
-PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace)
+void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(live.file, file, sizeof(live.file)));
+  SbFormat(sizeof(live.file), live.file, "%s", file);
   live.speed = speed;
   live.angular_speed = angular_speed;
   live.pace = pace;
   live.clock = 0.;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscInt SbLiveCount(void)

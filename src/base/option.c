@@ -56,13 +56,11 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance)
+void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(scope->klass, klass, sizeof(scope->klass)));
-  PetscCall(PetscStrncpy(scope->type, type, sizeof(scope->type)));
-  PetscCall(PetscStrncpy(scope->instance, instance, sizeof(scope->instance)));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  SbFormat(sizeof(scope->klass), scope->klass, "%s", klass);
+  SbFormat(sizeof(scope->type), scope->type, "%s", type);
+  SbFormat(sizeof(scope->instance), scope->instance, "%s", instance);
 }
 
 const SbOption *SbOptionFind(const SbScope *scope, const char *key)
@@ -83,12 +81,10 @@ PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOptio
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
+void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
 {
-  PetscFunctionBeginUser;
   SbFormat(size, name, scope->klass[0] ? "-%s_%s_%s" : "-%s%s%s", scope->klass,
            scope->klass[0] ? scope->instance : "", key);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
@@ -97,7 +93,7 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   SbOptionRecord *r;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionName(scope, row->key, sizeof(name), name));
+  SbOptionName(scope, row->key, sizeof(name), name);
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
     r = &SbTheOptions.record[i];
     if (strcasecmp(r->name, name)) continue;
@@ -131,7 +127,7 @@ PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const c
   }
   PetscCall(free_at_end());
   PetscCall(grow(SbTheOptions.ninherit, sizeof(*SbTheOptions.inherit), &SbTheOptions.inherit));
-  PetscCall(SbScopeSet(&SbTheOptions.inherit[SbTheOptions.ninherit++], klass, from, instance));
+  SbScopeSet(&SbTheOptions.inherit[SbTheOptions.ninherit++], klass, from, instance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,22 +142,22 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   PetscFunctionBeginUser;
   /* the instance's own value, or that of the instance it is a copy of */
   *where = *scope;
-  PetscCall(SbOptionName(where, key, sizeof(name), name));
+  SbOptionName(where, key, sizeof(name), name);
   PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
   for (PetscInt i = 0; i < SbTheOptions.ninherit && !*given; i++) {
     const SbScope *copy = &SbTheOptions.inherit[i];
 
     if (strcmp(copy->klass, scope->klass) || strcasecmp(copy->instance, scope->instance)) continue;
     PetscCall(PetscStrncpy(where->instance, copy->type, sizeof(where->instance)));
-    PetscCall(SbOptionName(where, key, sizeof(name), name));
+    SbOptionName(where, key, sizeof(name), name);
     PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
     break;
   }
 
   /* else the value for all bodies, which always counts as read */
   if (strcmp(scope->klass, "body")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbScopeSet(&all, "body", "", SB_OPTION_DEFAULT));
-  PetscCall(SbOptionName(&all, key, sizeof(name), name));
+  SbScopeSet(&all, "body", "", SB_OPTION_DEFAULT);
+  SbOptionName(&all, key, sizeof(name), name);
   PetscCall(PetscOptionsFindPair(NULL, NULL, name, *given ? &unused : value, *given ? &there : given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -193,7 +193,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   }
   if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is an option of supple */
     if (SbHasPrefix(name, "ksp_ pc_ snes_"))
-      PetscCall(SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near));
+      SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near);
     if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
     *verdict = WRONG;
     PetscCall(PetscSNPrintf(text, size, "%s is not an option of PETSc; did you mean %s?", dashed, near));
@@ -215,14 +215,14 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     for (PetscInt j = 0; j < instances; j++) {
       const char *instance = j < SbTheOptions.nlisted ? SbTheOptions.listed[j] : SB_OPTION_DEFAULT;
 
-      PetscCall(SbScopeSet(&scope, r->klass, "", instance));
-      PetscCall(SbOptionName(&scope, r->row->key, sizeof(*names), names[n]));
+      SbScopeSet(&scope, r->klass, "", instance);
+      SbOptionName(&scope, r->row->key, sizeof(*names), names[n]);
       if (SbOptionIsRead(names[n] + 1)) continue;
       list[n] = names[n];
       n++;
     }
   }
-  PetscCall(SbSuggestNames(dashed, n, list, sizeof(near), near));
+  SbSuggestNames(dashed, n, list, sizeof(near), near);
   PetscCall(PetscFree2(list, names));
   if (!klass && !near[0]) guess(name, sizeof(why), why);
   if (!klass && !near[0] && !why[0]) PetscFunctionReturn(PETSC_SUCCESS);
@@ -280,7 +280,7 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
                : !class_of(key) && !looks_like_petsc(key) && !program_row(key))
       list[n++] = names[i];
   }
-  PetscCall(SbSuggestNames(r->name + 1, n, list, sizeof(near), near));
+  SbSuggestNames(r->name + 1, n, list, sizeof(near), near);
   PetscCall(PetscFree(list));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
   PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple; did you mean %s?",

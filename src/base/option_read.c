@@ -247,7 +247,7 @@ PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *i
     list[i] = words[i];
     if (!strcmp(words[i], r->text)) found = i;
   }
-  PetscCall(SbSuggestNames(r->text, n, list, sizeof(near), near));
+  SbSuggestNames(r->text, n, list, sizeof(near), near);
   PetscCall(PetscFree2(words, list));
   PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name,
              r->text, r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "",

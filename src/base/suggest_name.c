@@ -31,17 +31,15 @@ static PetscInt edit_distance(const char *a, const char *b)
   return row[na % 3][nb];
 }
 
-PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
-                              char text[])
+void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
 {
   const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* largest edit distance of a similar name */
   PetscInt best = farthest + 1, nbest = 0;
 
-  PetscFunctionBeginUser;
   text[0] = 0;
   for (PetscInt i = 0; i < n; i++)
     if (names[i]) best = PetscMin(best, edit_distance(word, names[i]));
-  if (best > farthest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (best > farthest) return;
   for (PetscInt i = 0; i < n && nbest < 3; i++) {
     PetscBool again = PETSC_FALSE;
 
@@ -50,20 +48,16 @@ PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const na
     if (again) continue;
     SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
-                             char text[])
+void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
 {
   char near[256];
 
-  PetscFunctionBeginUser;
   text[0] = 0;
   for (PetscInt i = 0; i < n; i++) SbAppend(size, text, "%s%s", i ? ", " : "", names[i]);
-  PetscCall(SbSuggestNames(word, n, names, sizeof(near), near));
+  SbSuggestNames(word, n, names, sizeof(near), near);
   if (near[0]) SbAppend(size, text, "; did you mean %s?", near);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static int compare_texts(const void *a, const void *b)
@@ -81,7 +75,7 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
   while (n && !names[n - 1])
     n--; /* PETSc 3.18 counts the terminating NULL; newer releases use another function */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
-  PetscCall(SbSuggestName(word, n, names, size, text));
+  SbSuggestName(word, n, names, size, text);
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -95,7 +95,7 @@ static PetscErrorCode examine(const char *name, Needs *needs)
   char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "effect", "contact", name));
+  SbScopeSet(&scope, "effect", "contact", name);
   PetscCall(SbOptionChoice(&scope, "response", &choice));
   needs->response = (SbResponse)choice;
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
@@ -141,7 +141,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   for (PetscInt i = 0; i < n; i++) {
     char type[SB_NAME_MAX];
 
-    PetscCall(SbScopeSet(&scope, "effect", "", names[i]));
+    SbScopeSet(&scope, "effect", "", names[i]);
     PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
     if (strcmp(type[0] ? type : names[i], "contact")) continue;
     PetscCall(examine(names[i], &needs));
@@ -184,7 +184,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   /* the obstacle and its path; without one: options of contact between bodies */
   PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
   if (text[0]) {
-    PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+    SbOptionName(scope, "obstacle", sizeof(option), option);
     PetscCall(SbObstacleCreate(option, text, &c->obstacle));
     c->facets = (PetscBool)!strncmp(text, "mesh:", 5);
     if (c->facets) {

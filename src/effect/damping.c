@@ -47,7 +47,7 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
 
       PetscCall(PetscMalloc1(mesh->nbody, &names));
       for (b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
-      PetscCall(SbSuggestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near));
+      SbSuggestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near);
       PetscCall(PetscFree(names));
       PetscCall(PetscFree(damped));
       SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,

@@ -48,7 +48,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
 
   PetscFunctionBeginUser;
   *effect = NULL;
-  PetscCall(SbScopeSet(&scope, "effect", "", name));
+  SbScopeSet(&scope, "effect", "", name);
   PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
   if (!type[0]) PetscCall(PetscStrncpy(type, name, sizeof(type)));
   for (PetscInt i = 0; i < ntype; i++)
@@ -57,7 +57,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
     const char *names[SB_EFFECT_TYPES];
     char all[512];
 
-    PetscCall(SbSuggestName(type, SbEffectTypes(names), names, sizeof(all), all));
+    SbSuggestName(type, SbEffectTypes(names), names, sizeof(all), all);
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
             "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name, type,
             name, all);
@@ -74,12 +74,12 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   e->column = is->column;
   e->ncolumn = is->ncolumn;
   if (is->size) PetscCall(PetscCalloc(is->size, &e->data));
-  PetscCall(SbScopeSet(&scope, "effect", type, name));
+  SbScopeSet(&scope, "effect", type, name);
 
   /* the sets that it acts on, and the factor on a load */
   for (PetscInt i = 0; i < is->nrow; i++) {
     if (!strcmp(is->row[i].key, "on")) {
-      PetscCall(SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option));
+      SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option);
       PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
     } else if (!strcmp(is->row[i].key, "time"))
       PetscCall(SbEffectFormulas(&scope, "time", 1, PETSC_FALSE, &e->time, &e->steady));
@@ -150,7 +150,7 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
     if (SbFormulaUsesPosition(formulas[i]) && !position) {
       char option[3 * SB_NAME_MAX];
 
-      PetscCall(SbOptionName(scope, key, sizeof(option), option));
+      SbOptionName(scope, key, sizeof(option), option);
       SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
               "%s: this formula may use the time t only, not x, y or z", option);
     }

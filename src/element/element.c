@@ -144,7 +144,7 @@ PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement 
   PetscCall((*create)(e));
   *element = e;
   if (!body) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbScopeSet(&scope, "body", e->name, body->instance));
+  SbScopeSet(&scope, "body", e->name, body->instance);
   if (e->gamma0 > 0.) PetscCall(SbOptionReal(&scope, "gamma0", &e->gamma0));
   if (e->gamma1 > 0.) PetscCall(SbOptionReal(&scope, "gamma1", &e->gamma1));
   if (e->mean_volume) {

@@ -316,7 +316,7 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
     if (same) PetscFunctionReturn(PETSC_SUCCESS);
     names[*k] = s->mesh->set[*k].name;
   }
-  PetscCall(SbSuggestNames(name, s->mesh->nset, names, sizeof(near), near));
+  SbSuggestNames(name, s->mesh->nset, names, sizeof(near), near);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name,
           near[0] ? "; nearest: " : "", near);
 }

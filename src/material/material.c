@@ -75,7 +75,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(where, sizeof(where), "-%s_%s_material", body->klass, body->instance));
-  PetscCall(SbScopeSet(&scope, body->klass, law, body->instance));
+  SbScopeSet(&scope, body->klass, law, body->instance);
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));

@@ -20,7 +20,7 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(im->nvert, &keep));
   for (PetscInt i = 0; i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
-  PetscCall(SbImportDropVertices(im, keep));
+  SbImportDropVertices(im, keep);
   im->nunused = before - im->nvert;
   PetscCall(PetscFree(keep));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -181,7 +181,7 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt b = 0; b < nbody; b++) {
     if (size == 1 || rank || reading == SB_READING_RANK0) continue;
-    PetscCall(SbImportSlabs(&body[b], &ncell));
+    SbImportSlabs(&body[b], &ncell);
     slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));
   }
   PetscCallMPI(MPI_Bcast(slabs, (PetscMPIInt)nbody, SB_MPI_BOOL, 0, comm));

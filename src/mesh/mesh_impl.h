@@ -37,7 +37,7 @@ PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched)
 /* Copies the statistics to the "found" fields of the body. */
 void SbShapeKeep(const SbShape *shape, SbBody *body);
 /* Writes repairs and warnings to the note of the body, whose number of parts is known. */
-PetscErrorCode SbImportNote(const SbImport *import, SbBody *body);
+void SbImportNote(const SbImport *import, SbBody *body);
 /* Connected parts: parent[nvert] is the lowest vertex of the part that each vertex belongs to. */
 void SbImportJoin(const SbImport *import, PetscInt parent[], PetscInt *npart);
 /* Volume, shape quality, bounding box and number of parts: sets the "found" fields of the body. */
@@ -58,8 +58,8 @@ typedef struct {
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, const SbSet set[], SbMasks *masks);
 /* Bits of the sets that are groups, for each tag set: bits[ntags]. */
-PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b,
-                          PetscInt nset, const SbSet set[], uint64_t bits[]);
+void SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
+                const SbSet set[], uint64_t bits[]);
 /* Adds the numbers of vertices, boundary facets and cells of each set, summed over all ranks. Collective. */
 PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
                            SbSet set[]);

@@ -57,7 +57,7 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];
 }
 
-PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
+void SbImportNote(const SbImport *im, SbBody *body)
 {
   const struct {
     PetscInt n;
@@ -70,13 +70,11 @@ PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
     {im->nlost, "triangles of groups that are no face of a tet"},
   };
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(body->note, im->note, sizeof(body->note)));
+  SbFormat(sizeof(body->note), body->note, "%s", im->note);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++)
     if (notes[i].n)
       SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
                notes[i].text, notes[i].n);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbImportShape(const SbImport *im, PetscReal degrees, SbShape *s)
@@ -130,6 +128,6 @@ PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody 
   PetscCall(PetscMalloc1(im->nvert, &parent));
   SbImportJoin(im, parent, &body->npart);
   PetscCall(PetscFree(parent));
-  PetscCall(SbImportNote(im, body));
+  SbImportNote(im, body);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

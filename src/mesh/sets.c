@@ -42,7 +42,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 
     for (int k = 0; k < NSHAPE; k++) names[k] = shapes[k].name;
     (void)snprintf(word, sizeof(word), "%.*s", (int)n, text);
-    PetscCall(SbSuggestName(word, NSHAPE, names, sizeof(all), all));
+    SbSuggestName(word, NSHAPE, names, sizeof(all), all);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
   }
   set->shape = (SbSetShape)i;
@@ -116,11 +116,10 @@ static PetscBool is_named(const SbGroup *group, const char *name)
   return (PetscBool)(!*p && !*name);
 }
 
-PetscErrorCode SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
-                          const SbSet set[], uint64_t bits[])
+void SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
+                const SbSet set[], uint64_t bits[])
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(bits, im->ntags));
+  for (PetscInt t = 0; t < im->ntags; t++) bits[t] = 0;
   for (PetscInt k = 0; k < nset; k++) {
     const char *name = set[k].shape == SB_SET_GROUP ? group_in_body(&set[k], nbody, body, b) : NULL;
 
@@ -128,7 +127,6 @@ PetscErrorCode SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[
       for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++)
         if (is_named(&im->group[im->tags_group[i]], name)) bits[t] |= SB_SET_BIT(k);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
@@ -175,7 +173,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
     for (int i = 0; i < 3; i++) m->vert[im->item[3].vert[4 * (s / 4) + SbFaceVertex[s % 4][i]]] |= hull;
   }
   PetscCall(PetscMalloc1(im->ntags, &bits));
-  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
+  SbSetsBits(im, nbody, body, b, nset, set, bits);
   // members of groups: vertices, faces of tets, tets with their boundary faces
   for (int d = 0; d < 4; d++) {
     const SbItems *item = &im->item[d];
@@ -242,7 +240,7 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
       exists += name && is_named(&import[b].group[g], name);
     }
   }
-  PetscCall(SbSuggestNames(wanted, n, names, sizeof(near), near));
+  SbSuggestNames(wanted, n, names, sizeof(near), near);
   PetscCall(PetscFree(names));
   // "liver: wall, ligament; stone: none"
   for (PetscInt b = 0; b < nbody; b++) {
@@ -282,7 +280,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
       PetscCall(PetscMalloc1(nbody, &names));
       for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
-      PetscCall(SbSuggestNames(set[k].group, nbody, names, sizeof(near), near));
+      SbSuggestNames(set[k].group, nbody, names, sizeof(near), near);
       PetscCall(PetscFree(names));
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");

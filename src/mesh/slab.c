@@ -523,7 +523,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   // members of sets: groups of points, lines and triangles, then shapes and groups of tets
   PetscCall(PetscMalloc1(im->ntags, &bits));
   PetscCall(PetscCalloc1(s->nkept, &s->mask));
-  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
+  SbSetsBits(im, nbody, body, b, nset, set, bits);
   PetscCall(mark_items(s, bits));
   PetscCall(PetscFree(bits));
   PetscCall(find_triangles(s));
@@ -537,7 +537,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(SbSetsCount(s->comm, s->nkept, tets->n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));
-  PetscCall(SbImportNote(im, &body[b]));
+  SbImportNote(im, &body[b]);
   PetscCall(SbImportCurve(s->comm, im, &body[b], m->cell, &s->part->edge_off));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

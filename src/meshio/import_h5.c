@@ -562,19 +562,17 @@ PetscErrorCode SbImportRead_H5(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
+void SbImportSlabs(const SbBody *body, PetscInt *ncell)
 {
   const char *dot = strrchr(body->mesh, '.');
   hid_t file, set, space;
   hsize_t size[2] = {0, 0};
 
-  PetscFunctionBeginUser;
   *ncell = 0;
-  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5")) return;
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (file < 0) return;
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;
   space = set >= 0 ? H5Dget_space(set) : -1;
   if (space >= 0 && H5Sget_simple_extent_ndims(space) == 2)
@@ -583,7 +581,6 @@ PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
   if (space >= 0) (void)H5Sclose(space);
   if (set >= 0) (void)H5Dclose(set);
   (void)H5Fclose(file);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ .xmf */

@@ -143,16 +143,15 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
+void SbImportDropVertices(SbImport *im, PetscInt keep[])
 {
   PetscInt n = 0, nmiddle = 0;
 
-  PetscFunctionBeginUser;
   for (PetscInt v = 0; v < im->nvert; v++) keep[v] = keep[v] ? n++ : -1;
-  if (n == im->nvert) PetscFunctionReturn(PETSC_SUCCESS);
+  if (n == im->nvert) return;
   for (PetscInt v = 0; v < im->nvert; v++) {
     if (keep[v] < 0) continue;
-    PetscCall(PetscArraymove(im->x + 3 * keep[v], im->x + 3 * v, 3));
+    for (int k = 0; k < 3; k++) im->x[3 * keep[v] + k] = im->x[3 * v + k];
     im->vert_number[keep[v]] = im->vert_number[v];
   }
   im->nvert = n;
@@ -180,7 +179,6 @@ PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
     if (d == 2) im->nlost += im->item[d].n - kept;
     im->item[d].n = kept;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ edge nodes */
@@ -298,7 +296,7 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *large
   *largest = PetscSqrtReal(most);
   // drop vertices that are only edge nodes
   for (PetscInt i = 0; keep && i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
-  if (keep) PetscCall(SbImportDropVertices(im, keep));
+  if (keep) SbImportDropVertices(im, keep);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

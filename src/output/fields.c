@@ -203,7 +203,7 @@ PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField *
     *field = &table[i];
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbSuggestName(name, n, names, sizeof(all), all));
+  SbSuggestName(name, n, names, sizeof(all), all);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no field '%s'; fields are none, %s", option, name,
           all);
 }

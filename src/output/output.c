@@ -147,7 +147,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
     PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &angular_speed));
     PetscCall(SbOptionReal(&SbRunScope, "live_pace", &pace));
     PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
-    PetscCall(SbLiveSetUp(path, speed, angular_speed, pace));
+    SbLiveSetUp(path, speed, angular_speed, pace);
   }
 
   /* console output */

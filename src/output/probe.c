@@ -59,7 +59,7 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 
     /* its position or set */
     PetscCall(PetscStrncpy(probe->name, names[p], SB_NAME_MAX));
-    PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
+    SbScopeSet(&scope, "probe", "", probe->name);
     for (int k = 0; k < 3; k++) {
       PetscCall(SbOptionGiven(&scope, keys[k], &given));
       if (given) probe->kind = (SbProbeKind)k;
@@ -76,7 +76,7 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
       PetscCall(SbOptionString(&scope, keys[probe->kind], sizeof(probe->set), probe->set));
 
     /* the fields */
-    PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
+    SbOptionName(&scope, "fields", sizeof(option), option);
     PetscCall(SbOptionNames(&scope, "fields", &n, &fields));
     PetscCheck(n > 0 && n <= SB_FIELD_MAX, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
                "%s: %" PetscInt_FMT " fields; 1 to %d are possible", option, n, SB_FIELD_MAX);

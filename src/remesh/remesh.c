@@ -88,7 +88,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     named = (PetscBool)(named || given);
   }
   for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    SbScopeSet(&own, "body", "", m->body[b].name);
     PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
     named = (PetscBool)(named || given);
   }
@@ -130,7 +130,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   for (PetscInt b = 0; b < m->nbody; b++) {
     if (!r->named[b]) continue;
     r->asked[b] = all;
-    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    SbScopeSet(&own, "body", "", m->body[b].name);
     PetscCall(SbOptionReal(&own, "remesh_quality", &r->asked[b]));
     r->bound[b] = r->asked[b];
     any = (PetscBool)(any || r->asked[b] > 0.);
@@ -159,12 +159,10 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRemeshSetMesher(SbRemesh r, SbMesher mesher, void *ctx)
+void SbRemeshSetMesher(SbRemesh r, SbMesher mesher, void *ctx)
 {
-  PetscFunctionBeginUser;
   r->how.mesher = mesher;
   r->how.ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)

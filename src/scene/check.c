@@ -32,7 +32,7 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   while (n < NAMES_MAX && (entry = readdir(dir)))
     PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
   (void)closedir(dir);
-  PetscCall(SbSuggestNames(name, n, list, sizeof(found), found));
+  SbSuggestNames(name, n, list, sizeof(found), found);
   if (found[0]) SbFormat(size, text, "%s%s", folder, found);
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
   PetscCall(PetscFree(list));
@@ -107,7 +107,7 @@ PetscErrorCode SbSceneCheckSizes(SbModel model)
     /* a box has the size given by the user; densities below the limit are in t/mm^3 or g/cm^3 */
     if (length < LARGE || body->density < LIGHT || !strncmp(body->mesh, "box:", 4)) continue;
     if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of)) continue;
-    PetscCall(SbScopeSet(&scope, "body", "", body->copy_of[0] ? body->copy_of : body->name));
+    SbScopeSet(&scope, "body", "", body->copy_of[0] ? body->copy_of : body->name);
     PetscCall(SbOptionGiven(&scope, "scale", &given));
     if (!given)
       PetscCall(SbWarning(model->comm,

@@ -72,7 +72,7 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
   PetscFunctionBeginUser;
   *n = 0;
   *place = NULL;
-  PetscCall(SbScopeSet(&scope, "body", "", name));
+  SbScopeSet(&scope, "body", "", name);
   PetscCall(SbOptionString(&scope, "copies", sizeof(text), text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
   if (!strncmp(text, "grid:", 5)) {
@@ -100,7 +100,7 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
   }
 
   /* a file, read on rank 0 and broadcast */
-  PetscCall(SbOptionName(&scope, "copies", sizeof(option), option));
+  SbOptionName(&scope, "copies", sizeof(option), option);
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) SB_CATCH(&caught, read_file(option, text, n, place));
   if (caught.code) PetscCall(PetscFree(*place));

@@ -73,7 +73,7 @@ static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunc
   void (*constructor)(void) = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionName(scope, key, sizeof(option), option));
+  SbOptionName(scope, key, sizeof(option), option);
   PetscCall(SbOptionString(scope, key, SB_NAME_MAX, word));
   PetscCall(PetscFunctionListFind(list, word, &constructor));
   if (constructor) PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,7 +89,7 @@ static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormul
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formula));
-  PetscCall(SbOptionName(scope, key, sizeof(option), option));
+  SbOptionName(scope, key, sizeof(option), option);
   for (int k = 0; k < 3; k++)
     PetscCheck(!SbFormulaUsesTime(formula[k]), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s: what a body begins with may use the place x, y, z only, not t", option);
@@ -105,7 +105,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscReal axis;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "body", "", body->name));
+  SbScopeSet(&scope, "body", "", body->name);
   PetscCall(SbOptionString(&scope, "mesh", sizeof(body->mesh), body->mesh));
   PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file", body->name);
   PetscCall(SbTetOptionsRead(&scope, body->mesh, &body->tet));
@@ -147,7 +147,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(PetscRealloc((size_t)(model->nmaterial + n - model->nbody + 1) * SB_NAME_MAX, &model->inclusion));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], inclusions[k], SB_NAME_MAX));
-    PetscCall(SbScopeSet(&scope, "inclusion", "", inclusions[k]));
+    SbScopeSet(&scope, "inclusion", "", inclusions[k]);
     PetscCall(read_type(&scope, "material", SbMaterialList, law));
     PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
     body->inclusion[body->ninclusion++].material = model->nmaterial++;

@@ -46,8 +46,8 @@ static PetscErrorCode read_set(SbModel model, const char *name)
   PetscFunctionBeginUser;
   PetscCheck(find_body(model, name) < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-sets: '%s' is the name of a body and means the whole of it; give the set another name", name);
-  PetscCall(SbScopeSet(&scope, "set", "", name));
-  PetscCall(SbOptionName(&scope, "at", sizeof(option), option));
+  SbScopeSet(&scope, "set", "", name);
+  SbOptionName(&scope, "at", sizeof(option), option);
   PetscCall(SbOptionString(&scope, "at", sizeof(text), text));
   PetscCall(SbSetParse(option, text, set));
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
@@ -96,7 +96,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   PetscCall(ierr);
   for (PetscInt e = 0; e < model->neffect; e++) {
     // sets of an effect; none if its type has no such option
-    PetscCall(SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name));
+    SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
     if (!SbOptionExists(&scope, "on")) continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
@@ -107,7 +107,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
     char name[SB_NAME_MAX];
 
-    PetscCall(SbScopeSet(&scope, "probe", "", names[i / 2]));
+    SbScopeSet(&scope, "probe", "", names[i / 2]);
     PetscCall(SbOptionString(&scope, i % 2 ? "in" : "on", sizeof(name), name));
     if (name[0]) PetscCall(use_name(model, name));
   }

@@ -136,7 +136,7 @@ static PetscErrorCode check_option(const char *name, const char *command)
     if (SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
                           "start_in_debugger skip_petscrc citations"))
       PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near));
+    SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
             near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
   }
@@ -166,7 +166,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
              "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
   for (command = SbToolCommands; command->name && strcmp(command->name, line->word[0]); command++)
     list[n++] = command->name;
-  if (!command->name) PetscCall(SbSuggestName(line->word[0], n, list, sizeof(all), all));
+  if (!command->name) SbSuggestName(line->word[0], n, list, sizeof(all), all);
   PetscCheck(command->name, PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s",
              line->word[0], all);
   PetscCheck(line->nword - 1 == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,

@@ -85,7 +85,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
                             "-body_%s_young 1e5 -body_%s_poisson 0.3 -body_%s_density %g", names[b], names[b],
                             names[b], DENSITY));
     PetscCall(PetscOptionsInsertString(NULL, options));
-    PetscCall(SbScopeSet(&scope, "body", "linear", names[b]));
+    SbScopeSet(&scope, "body", "linear", names[b]);
     PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
     PetscCall(SbElementCreate(body->element, NULL, &x->element[b]));
     body->other_nodes = (PetscBool)(!x->element[b]->nodes_per[0] || x->element[b]->nodes_per[1]);

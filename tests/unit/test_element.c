@@ -143,7 +143,7 @@ static PetscErrorCode test_options(void)
   SbElement e;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&body, "body", "", "a"));
+  SbScopeSet(&body, "body", "", "a");
   PetscCall(PetscOptionsInsertString(NULL, "-body_a_gamma0 7 -body_a_gamma1 0.25"));
   PetscCall(SbElementCreate("dg", &body, &e));
   SB_CHECK(e->gamma0 == 7 && e->gamma1 == 0.25, "gamma0 %g and gamma1 %g were read", e->gamma0, e->gamma1);

@@ -22,7 +22,7 @@ static PetscErrorCode create(const char *law, const char *young, const char *poi
       PetscCall(PetscOptionsClearValue(NULL, name));
   }
   *m = NULL;
-  PetscCall(SbScopeSet(&scope, "body", "", "b"));
+  SbScopeSet(&scope, "body", "", "b");
   PetscCall(PetscStrlcat(scope.instance, law, sizeof(scope.instance)));
   PetscCall(SbMaterialCreate(law, &scope, m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -48,8 +48,8 @@ static PetscErrorCode begin(const char *options)
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
   PetscCall(SbOptionsRegister("body", "corotated", PETSC_STATIC_ARRAY_LENGTH(law_rows), law_rows));
   PetscCall(SbOptionsRegister("body", "fibrous", PETSC_STATIC_ARRAY_LENGTH(other_law_rows), other_law_rows));
-  PetscCall(SbScopeSet(&run_scope, "", "", ""));
-  PetscCall(SbScopeSet(&body_scope, "body", "corotated", "liver"));
+  SbScopeSet(&run_scope, "", "", "");
+  SbScopeSet(&body_scope, "body", "corotated", "liver");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -381,7 +381,7 @@ static PetscErrorCode test_ahead(void)
   PetscCall(SbOptionsCheck());
   SB_CHECK(SbOptionExists(&body_scope, "young"), "young exists");
   SB_CHECK(!SbOptionExists(&run_scope, "young"), "a run has no young");
-  PetscCall(SbScopeSet(&linear, "body", "linear", "liver"));
+  SbScopeSet(&linear, "body", "linear", "liver");
   SB_CHECK(!SbOptionExists(&linear, "young"), "young belongs to another type");
   PetscCall(end());
   PetscCall(begin("-body_liver_scale -1"));
@@ -401,7 +401,7 @@ static PetscErrorCode test_underscores(void)
   PetscFunctionBeginUser;
   PetscCall(begin("-body_liver_mesh_scale 3"));
   PetscCall(SbOptionsRegister("body", "", 1, long_rows));
-  PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
+  SbScopeSet(&other, "body", "corotated", "liver_mesh");
   PetscCall(SbOptionReal(&other, "scale", &x));
   SB_CHECK(x == 3, "scale of liver_mesh is %g", x);
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "mesh_scale", &x), PETSC_ERR_USER,
@@ -416,15 +416,15 @@ static PetscErrorCode test_nearest(void)
   char text[64];
 
   PetscFunctionBeginUser;
-  PetscCall(SbSuggestNames("gravty", 5, names, sizeof(text), text));
+  SbSuggestNames("gravty", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbSuggestNames("GRAVITY", 5, names, sizeof(text), text));
+  SbSuggestNames("GRAVITY", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbSuggestNames("c1", 5, names, sizeof(text), text));
+  SbSuggestNames("c1", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "p1 or cr"), "'%s'", text);
-  PetscCall(SbSuggestNames("rc", 5, names, sizeof(text), text));
+  SbSuggestNames("rc", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "cr"), "'%s'", text);
-  PetscCall(SbSuggestNames("contact", 5, names, sizeof(text), text));
+  SbSuggestNames("contact", 5, names, sizeof(text), text);
   SB_CHECK(!text[0], "'%s'", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
