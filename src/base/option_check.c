@@ -124,28 +124,25 @@ typedef enum {
 } Verdict;
 
 /* Classifies an option with the prefix of a class: valid if some type of the class has its key. */
-static PetscErrorCode verdict_of_class(const char *klass, const char *name, size_t size, char text[],
-                                       Verdict *verdict)
+static Verdict verdict_of_class(const char *klass, const char *name, size_t size, char text[])
 {
   const size_t prefix = strlen(klass) + 1;
   const char *instance = name + prefix, *key;
   PetscBool read;
   const size_t n = instance_of(klass, name, &read);
+  Verdict verdict = WRONG;
 
-  PetscFunctionBeginUser;
-  *verdict = WRONG;
   // option for all bodies: "default_young"
   if (!strcmp(klass, "body") &&
       !strncasecmp(instance, SB_OPTION_DEFAULT "_", strlen(SB_OPTION_DEFAULT "_"))) {
     key = instance + strlen(SB_OPTION_DEFAULT "_");
     for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
       if (!strcmp(SbTheOptions.row[i].klass, klass) && !strcasecmp(SbTheOptions.row[i].row->key, key))
-        *verdict = UNUSED;
-    PetscCall(
-      PetscSNPrintf(text, size, "no body takes it, as each has one of its own or is of another type"));
-    PetscFunctionReturn(PETSC_SUCCESS);
+        verdict = UNUSED;
+    SbFormat(size, text, "no body takes it, as each has one of its own or is of another type");
+    return verdict;
   }
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!n) return WRONG;
   key = instance + n + 1;
   for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
     PetscBool own;
@@ -159,7 +156,7 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
       own = (PetscBool)(!strcmp(s->klass, klass) && !strcmp(s->type, r->type) && strlen(s->instance) == n &&
                         !strncasecmp(s->instance, instance, n));
     }
-    *verdict = read ? UNUSED : LEFT_OUT;
+    verdict = read ? UNUSED : LEFT_OUT;
     if (!read)
       SbFormat(size, text, "%s %.*s", klass, (int)n, instance);
     else if (own)
@@ -169,7 +166,7 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
                instance);
     if (own || !read) break;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return verdict;
 }
 
 static PetscErrorCode find_verdict(const char *name, size_t size, char text[], Verdict *verdict)
@@ -200,7 +197,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (klass) {
-    PetscCall(verdict_of_class(klass, name, size, text, verdict));
+    *verdict = verdict_of_class(klass, name, size, text);
     if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* similar full names: all options read so far, all program-wide options, and those of all instances named
