@@ -126,8 +126,7 @@ typedef enum {
 /* Classifies an option with the prefix of a class: valid if some type of the class has its key. */
 static Verdict verdict_of_class(const char *klass, const char *name, size_t size, char text[])
 {
-  const size_t prefix = strlen(klass) + 1;
-  const char *instance = name + prefix, *key;
+  const char *instance = name + strlen(klass) + 1, *key;
   PetscBool read;
   const size_t n = instance_of(klass, name, &read);
   Verdict verdict = WRONG;

@@ -197,8 +197,7 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   }
   PetscCall(PetscFree3(im, part, slabs));
   if (ierr) PetscCall(SbMergedMeshDestroy(w));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }
 
 PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *w)

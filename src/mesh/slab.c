@@ -157,14 +157,13 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
 static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const Face face[], const Across across[])
 {
   SbFaces *faces = &s->part->faces;
-  const PetscInt ncell = s->im->item[3].n;
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nsend, &s->part->remote));
   for (PetscInt i = 0; i < nsend; i++) {
     if (across[i].rank < 0 || across[i].rank == s->rank) continue;
-    faces->neighbour[face[i].at] = ncell + n;
+    faces->neighbour[face[i].at] = s->im->item[3].n + n;
     s->part->remote[n++] = (PetscSFNode){across[i].rank, across[i].cell};
     faces->nboundary--;
   }
@@ -561,6 +560,5 @@ PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbB
   PetscCall(PetscFree(s.start));
   PetscCall(PetscFree(s.user));
   PetscCall(PetscFree(s.shared));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }

@@ -168,10 +168,8 @@ static PetscErrorCode write_elements_41(Out *out)
       put(out, 4, gmsh_type[out->edges.nedge > 0][d], ' ');
       put(out, 8, n, '\n');
       for (PetscInt k = i; k < i + n; k++) {
-        const PetscInt *v = item->vert + (size_t)(d + 1) * (size_t)k;
-
         put(out, 8, number++, ' ');
-        put_nodes(out, d, v, 8);
+        put_nodes(out, d, item->vert + (size_t)(d + 1) * (size_t)k, 8);
         PetscCall(report_progress(out));
       }
     }

@@ -69,11 +69,10 @@ static uint64_t face_set(const Work *w, PetscInt slot)
 /* The face of the old surface that equals a face of the next mesh, -1: it is inside. */
 static PetscInt old_slot(const Work *w, PetscInt slot)
 {
-  const PetscInt *v = w->mesh.cell + 4 * (slot / 4);
   PetscInt vert[3], slots[2];
 
   for (int k = 0; k < 3; k++) {
-    vert[k] = v[SbFaceVertex[slot % 4][k]];
+    vert[k] = w->mesh.cell[4 * (slot / 4) + SbFaceVertex[slot % 4][k]];
     if (vert[k] >= w->mesh.nkept) return -1;
     vert[k] = w->mesh.kept[vert[k]];
   }
@@ -135,8 +134,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   old.region = region;
   ierr = SbRemeshBody(where, &old, how, &w->mesh);
   PetscCall(PetscFree(region));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }
 
 /* Counts triangles in groups, or writes them; for an old mesh also inner ones. */

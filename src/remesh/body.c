@@ -460,8 +460,7 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
   PetscCall(SbLocatorDestroy(&at.flat));
   PetscCall(PetscFree(at.curved));
   if (ierr) PetscCall(SbNewMeshDestroy(m));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }
 
 PetscErrorCode SbNewMeshDestroy(SbNewMesh *m)

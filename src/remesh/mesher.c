@@ -34,8 +34,7 @@ static PetscErrorCode fill(const char *where, const SbSurface *hull, PetscReal s
   ierr = SbTetrahedralize(where, &rounded, &options, im);
   PetscCall(PetscFree(rounded.x));
   if (ierr) PetscCall(SbImportDestroy(im));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }
 
 PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscReal size, void *ctx,

@@ -136,9 +136,7 @@ static int compare_spokes(const void *a, const void *b)
 /* Side of a triangle that faces increasing (ahead) or decreasing angles around the edge from vertex p. */
 static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBool ahead)
 {
-  const PetscBool along = (PetscBool)(t->tri[slot] == p);
-
-  return 2 * (slot / 3) + (along == ahead ? 0 : 1);
+  return 2 * (slot / 3) + ((t->tri[slot] == p) == ahead ? 0 : 1);
 }
 
 /* Joins the sides that face each other around one edge. */

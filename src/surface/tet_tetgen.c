@@ -185,6 +185,5 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
   }
   if (d) (void)closedir(d);
   (void)rmdir(folder);
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }
