@@ -72,8 +72,7 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &names, &n));
-  while (n && !names[n - 1])
-    n--; /* PETSc 3.18 counts the terminating NULL; newer releases use another function */
+  while (n && !names[n - 1]) n--; /* PETSc 3.18 counts the terminating NULL */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
   SbSuggestName(word, n, names, size, text);
   PetscCall(PetscFree(names));

@@ -63,8 +63,7 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
   SbImport *im = d->im;
   const SbNumbers *numbers = set->of_nodes ? &im->nodes : &im->elements;
   const int64_t length = (r->last - r->first) / r->step + 1;
-  const PetscBool all =
-    (PetscBool)(length > numbers->n); /* then test each node or element instead of each label */
+  const PetscBool all = (PetscBool)(length > numbers->n); /* then test nodes or elements, not labels */
   const int64_t n = all ? numbers->n : length;
 
   PetscFunctionBeginUser;
@@ -159,8 +158,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
       const PetscInt v = SbNumbersFind(&im->nodes, element->node[k]);
 
       vert[SbGmshNode(k)] = v;
-      if (v < 0 &&
-          (k < 4 || element->node[k] || d->strict)) // Nastran may omit the edge nodes of straight edges
+      if (v < 0 && (k < 4 || element->node[k] || d->strict)) // Nastran may omit nodes of straight edges
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
                       (long long)element->node[k]);
     }

@@ -7,8 +7,7 @@
 #include "meshio_impl.h"
 #include "sbquadratic.h"
 
-static const int edge_count[4] = {0, 1, 3,
-                                  6}; /* edges of an item, by dimension; triangles use the pairs 0, 1 and 3 */
+static const int edge_count[4] = {0, 1, 3, 6}; /* edges by dimension; triangles use the pairs 0, 1 and 3 */
 static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
 
 PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)

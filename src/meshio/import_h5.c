@@ -536,8 +536,7 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
   (void)fclose(file);
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* HDF5's error stack is replaced by one line of ours */
   is_hdf5 = H5Fis_hdf5(path);
-  (void)H5Pset_fclose_degree(
-    access, H5F_CLOSE_STRONG); /* closing the file closes all its objects, also after an error */
+  (void)H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* with all objects, also after an error */
   f.file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
   (void)H5Pclose(access);
   if (is_hdf5 <= 0)

@@ -36,8 +36,7 @@ typedef struct {
   int dim, nnode;
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
-extern const char
-  *const SbGroupKinds[4]; /* by dimension: "point", "curve", ...; a group without a name is "curve_12" */
+extern const char *const SbGroupKinds[4]; /* "point", "curve", ...; a group without name is "curve_12" */
 /* Whether the element is a simplex of first or second order. */
 static inline PetscBool SbGmshIsSimplex(int type)
 {

@@ -46,10 +46,9 @@ typedef struct {
   SbKey *edge;    /* [nedge] edges of the old P2 tets, ascending */
   PetscInt nedge;
   SbLocator rest;
-  PetscBool done; /* the body has a new mesh */
-  SbNewMesh mesh; /* the new mesh, or the old one: then its arrays are borrowed */
-  PetscInt
-    *own; /* [max(nvert, ncell)] 0, 1, ...: vertices and tets of the old mesh, as its `kept` and `within` */
+  PetscBool done;      /* the body has a new mesh */
+  SbNewMesh mesh;      /* the new mesh, or the old one: then its arrays are borrowed */
+  PetscInt *own;       /* [max(nvert, ncell)] 0, 1, ...: `kept` and `within` of the old mesh */
   uint64_t groups;     /* bits of the sets that are groups */
   uint64_t inclusions; /* bits of those groups that are inclusions of the body */
 } Work;

@@ -67,8 +67,7 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
     tri->tags[i] = f;
     for (PetscInt k = 0; k < n; k++) {
       PetscInt *known = &region[im->item[3].tags[slots[k] / 4]];
-      const PetscReal *x =
-        im->x + 3 * im->item[3].vert[slots[k]]; /* in front of the triangle, or behind it */
+      const PetscReal *x = im->x + 3 * im->item[3].vert[slots[k]]; /* in front of the triangle, or behind */
       const PetscInt side = s->side[2 * f + (SbTetVolumeTo(&t, f, x) > 0)];
 
       PetscCheck(*known == UNKNOWN || *known == side, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

@@ -122,8 +122,7 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
-  char name[9][SB_NAME_MAX],
-    more[SB_NAME_MAX]; /* the object (o), then the groups (g) of the faces that follow */
+  char name[9][SB_NAME_MAX], more[SB_NAME_MAX]; /* the object (o), then the groups (g) of what follows */
   PetscInt nname[2] = {0, 0};
   char word[16];
 
