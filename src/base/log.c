@@ -5,7 +5,6 @@
   The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID), because they
   time phases, not objects.
 */
-#include "sbbase.h"
 #include "sblog.h"
 
 PetscLogEvent SbEvents[SB_EVENT_COUNT];
