@@ -70,6 +70,15 @@ SB_INLINE PetscReal SbDistance2(const PetscReal a[3], const PetscReal b[3])
   return PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]);
 }
 
+/* Makes a a unit vector, unless it is zero; returns its length. */
+SB_INLINE PetscReal SbNormalise(PetscReal a[3])
+{
+  const PetscReal length = PetscSqrtReal(SbDot3(a, a));
+
+  for (int k = 0; k < 3 && length > 0; k++) a[k] /= length;
+  return length;
+}
+
 /* c = a x b */
 SB_INLINE void SbCross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
 {

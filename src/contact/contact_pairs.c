@@ -41,8 +41,7 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
     r[i] = at[i] - at[3 + i];
     g->n[i] = m->side == SB_SIDE_PLANE ? at[6 + i] - at[3 + i] : -r[i];
   }
-  length = PetscSqrtReal(SbDot3(g->n, g->n));
-  for (int i = 0; i < 3; i++) g->n[i] = length > 0. ? g->n[i] / length : 0.;
+  length = SbNormalise(g->n);
   g->d = m->side == SB_SIDE_PLANE ? SbDot3(g->n, r) : m->radius - length;
   return g->d;
 }

@@ -118,15 +118,15 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
   }
   if (exit < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (nearest == PETSC_MAX_REAL) { /* directly towards it */
-    PetscReal way[3], length;
+    PetscReal way[3];
 
     for (int i = 0; i < 3; i++) {
       way[i] = -p[i];
       for (int k = 0; k < 3; k++) way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
     }
-    length = PetscSqrtReal(SbDot3(way, way));
-    if (length <= TINY * m->size || SbDot3(way, point->normal) <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
-    for (int i = 0; i < 3; i++) point->normal[i] = way[i] / length;
+    if (SbNormalise(way) <= TINY * m->size || SbDot3(way, point->normal) <= 0.)
+      PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(PetscArraycpy(point->normal, way, 3));
   }
   point->depth = 0.;
   if (point->v[0] >= m->nbody_vertex) point->area = 0.; /* of the obstacle: the body's area counts */
@@ -223,9 +223,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
   SbContactMeshNormals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) {
-    const PetscReal length = PetscSqrtReal(SbDot3(w.normal + 3 * v, w.normal + 3 * v));
-
-    for (int i = 0; i < 3 && length > 0.; i++) w.normal[3 * v + i] /= length;
+    (void)SbNormalise(w.normal + 3 * v);
     w.in[v] = -1;
   }
   PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w.start, &w.edge));
@@ -249,7 +247,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     /* it leaves the same body again: the midpoint between both intersections is inside */
     while (j < n && hit[2 * j] == e && (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part)) j++;
     if (j < n && hit[2 * j] == e) {
-      PetscReal unused, length, chord = 0.;
+      PetscReal unused, chord = 0.;
       const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused), at = 0.5 * (s + s2);
       SbPenetration point = {
         .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
@@ -260,9 +258,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
         p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
         chord += PetscSqr((s2 - s) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
       }
-      length = PetscSqrtReal(SbDot3(point.normal, point.normal));
-      if (length <= CANCEL) continue;
-      for (int k = 0; k < 3; k++) point.normal[k] /= length;
+      if (SbNormalise(point.normal) <= CANCEL) continue;
       PetscCall(add_inside(m, x, &tree, part, PetscSqrtReal(chord), p, &point, o));
       continue;
     }

@@ -202,7 +202,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->w, pair);
-      PetscReal gap, sum = 0., direction[3], length;
+      PetscReal gap, sum = 0., direction[3];
       SbDistance d;
 
       if (!counts(b, pair)) continue;
@@ -215,9 +215,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
           direction[k] = 0.;
           for (int v = SbContactPairSplit(pair); v < 4; v++) direction[k] += normal[3 * pair->v[v] + k];
         }
-        length = PetscSqrtReal(SbDot3(direction, direction));
-        if (length <= 0.) continue;
-        for (int k = 0; k < 3; k++) direction[k] /= length;
+        if (SbNormalise(direction) <= 0.) continue;
       }
       for (int k = 0; k < 4; k++) {
         if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);

@@ -34,7 +34,7 @@ PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal 
 {
   const PetscReal level = level_of(X, x, gap, n, touch), before = touch->level;
   const PetscBool flips = (PetscBool)(SbDot3(n, touch->surface) < 1 - JUMP);
-  PetscReal last[3], length;
+  PetscReal last[3];
 
   for (int i = 0; i < 3; i++) last[i] = touch->surface[i];
   set_plane(n, level, touch->surface, &touch->level);
@@ -49,8 +49,7 @@ PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal 
   if (touch->flips <= AVERAGED) return PETSC_FALSE;
   if (!flips && PetscAbsReal(gap - touch->rest) > TOLERANCE * c->size) touch->flips++; /* looks are bounded */
   for (int i = 0; i < 3; i++) n[i] = touch->n[i] + (n[i] - touch->n[i]) / (touch->flips - AVERAGED + 1);
-  length = PetscSqrtReal(SbDot3(n, n));
-  for (int i = 0; i < 3; i++) n[i] /= length;
+  (void)SbNormalise(n);
   return PETSC_FALSE;
 }
 
@@ -59,7 +58,7 @@ void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], Pets
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
   const PetscReal force = touch->lambda, other = touch->other_lambda, level = level_of(X, x, gap, n, touch);
-  PetscReal sum[3], length;
+  PetscReal sum[3];
 
   touch->undecided = PETSC_TRUE;
   set_plane(n, level, touch->surface, &touch->level);
@@ -80,12 +79,8 @@ void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], Pets
     touch->undecided = PETSC_FALSE; /* a loose solve gives no accurate forces */
   else {
     for (int i = 0; i < 3; i++) sum[i] = force * touch->n[i] + other * touch->other[i];
-    length = PetscSqrtReal(SbDot3(sum, sum));
-    if (length > 0) {
-      for (int i = 0; i < 3; i++) touch->n[i] = sum[i] / length;
-      touch->value = SbDot3(touch->n, x) - SbDot3(touch->n, X);
-    }
-    touch->lambda = length;
+    touch->lambda = SbNormalise(sum);
+    if (touch->lambda > 0) set_plane(sum, SbDot3(sum, x) - SbDot3(sum, X), touch->n, &touch->value);
     touch->valley = PETSC_FALSE;
     touch->flips = KEPT + 1;
   }

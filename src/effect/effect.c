@@ -160,17 +160,13 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
 
 PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path, PetscBool *steady)
 {
-  PetscReal length;
-
   PetscFunctionBeginUser;
   PetscCall(SbEffectFormulas(scope, "displacement", 3, position, path->displacement, steady));
   PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &path->angle, steady));
   PetscCall(SbOptionReals(scope, "axis", path->axis));
   PetscCall(SbOptionReals(scope, "axis_point", path->point));
-  length = PetscSqrtReal(SbDot3(path->axis, path->axis));
-  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
-             scope->instance);
-  for (int i = 0; i < 3; i++) path->axis[i] /= length;
+  PetscCheck(SbNormalise(path->axis) > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_axis: 0,0,0 is no direction", scope->instance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

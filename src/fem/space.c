@@ -333,7 +333,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
   *n = 0;
   for (PetscInt f = 0; f < 4 * mesh->ncell; f++) {
     const PetscInt cell = f / 4, face = f % 4;
-    PetscReal x[3][3], up[3], normal[3], length, integral[SB_CELL_NODES];
+    PetscReal x[3][3], up[3], length, integral[SB_CELL_NODES];
     SbFacet *facet;
 
     if ((mesh->face_set[f] & want) != want) continue;
@@ -345,10 +345,9 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
       SbSubtract(mesh->x + 3 * facet->vertex[a], mesh->x + 3 * facet->vertex[0], x[a]);
     }
     SbSubtract(mesh->x + 3 * facet->vertex[0], mesh->x + 3 * mesh->cell[f], up);
-    SbCross(x[1], x[2], normal);
-    length = PetscSqrtReal(SbDot3(normal, normal));
+    SbCross(x[1], x[2], facet->normal);
+    length = SbNormalise(facet->normal);
     facet->area = is_curved(s, cell) ? SbSpaceCurvedIntegrals(s, cell, facet, integral) : 0.5 * length;
-    for (PetscInt i = 0; i < 3; i++) facet->normal[i] = normal[i] / length;
     facet->height = SbDot3(facet->normal, up);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

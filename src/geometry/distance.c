@@ -270,13 +270,12 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   const int least = PetscAbsReal(n[0]) < PetscAbsReal(n[1])
                       ? (PetscAbsReal(n[0]) < PetscAbsReal(n[2]) ? 0 : 2)
                       : (PetscAbsReal(n[1]) < PetscAbsReal(n[2]) ? 1 : 2);
-  PetscReal c[4][3], m[2][3], along[4][2], alpha[3], C[3][2], K[25], bend[2], length;
+  PetscReal c[4][3], m[2][3], along[4][2], alpha[3], C[3][2], K[25], bend[2];
 
   // two directions m orthogonal to n; components of c_a along them
   point_derivatives(x, s, c);
   for (int k = 0; k < 3; k++) m[0][k] = (k == least) - n[least] * n[k];
-  length = PetscSqrtReal(SbDot3(m[0], m[0]));
-  for (int k = 0; k < 3; k++) m[0][k] /= length;
+  (void)SbNormalise(m[0]);
   SbCross(n, m[0], m[1]);
   for (int i = 0; i < 4; i++) {
     for (int l = 0; l < 2; l++) along[i][l] = SbDot3(c[i], m[l]);

@@ -38,12 +38,11 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
   PetscCall(PetscMalloc1(3 * (size_t)ntri, &s->normal));
   PetscCall(PetscCalloc1(3 * (size_t)nvert, &s->corner));
   for (PetscInt f = 0; f < ntri; f++) {
-    PetscReal e[3][3], c[3], length, *n = s->normal + 3 * f;
+    PetscReal e[3][3], c[3], *n = s->normal + 3 * f;
 
     for (int k = 0; k < 3; k++) SbSubtract(x + 3 * tri[3 * f + (k + 1) % 3], x + 3 * tri[3 * f + k], e[k]);
     SbCross(e[0], e[1], n);
-    length = PetscSqrtReal(SbDot3(n, n));
-    for (int i = 0; i < 3; i++) n[i] /= length;
+    (void)SbNormalise(n);
     for (int k = 0; k < 3; k++) {
       PetscReal angle;
 
