@@ -83,12 +83,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
   if (pair->kind == SB_PAIR_EDGE_EDGE) {
     PetscReal rest = 1.;
 
-    for (int k = 0; k < 2; k++) {
-      const PetscReal *p = m->X + 3 * pair->v[2 * k], *q = m->X + 3 * pair->v[2 * k + 1],
-                      r[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-
-      rest *= SbDot3(r, r);
-    }
+    for (int k = 0; k < 4; k += 2) rest *= SbDistance2(m->X + 3 * pair->v[k], m->X + 3 * pair->v[k + 1]);
     mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, g->d - gap, f);
   }
   *energy = f[0] * b[0];

@@ -318,11 +318,10 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   m->shortest = PETSC_MAX_REAL;
   for (; nbody_edge < m->nedge && m->edge[2 * nbody_edge] < m->nbody_vertex; nbody_edge++) {
     const PetscInt *e = m->edge + 2 * nbody_edge;
-    PetscReal r[3];
+    const PetscReal length = PetscSqrtReal(SbDistance2(m->X + 3 * e[0], m->X + 3 * e[1]));
 
-    SbSubtract(m->X + 3 * e[0], m->X + 3 * e[1], r);
-    m->shortest = PetscMin(m->shortest, PetscSqrtReal(SbDot3(r, r)));
-    m->mean_edge += PetscSqrtReal(SbDot3(r, r));
+    m->shortest = PetscMin(m->shortest, length);
+    m->mean_edge += length;
   }
   m->mean_edge /= (PetscReal)PetscMax(1, nbody_edge);
   m->size = SbBodySmallest(s->mesh->nbody, s->mesh->body);

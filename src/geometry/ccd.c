@@ -43,8 +43,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
   *time = 1;
   for (int i = 0; i < nfirst; i++) {
     for (int j = nfirst; j < n; j++) {
-      const PetscReal r[3] = {q[3 * i] - q[3 * j], q[3 * i + 1] - q[3 * j + 1], q[3 * i + 2] - q[3 * j + 2]};
-      const PetscReal square = SbDot3(r, r);
+      const PetscReal square = SbDistance2(q + 3 * i, q + 3 * j);
 
       if (!(square <= PETSC_MAX_REAL)) {
         *time = 0;

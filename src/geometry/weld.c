@@ -23,9 +23,7 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
     map[v] = v;
     for (int k = 0; k < 6; k++) around[k] = box[v][k] + (k < 3 ? -grown : grown);
     for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &w);) {
-      const PetscReal r[3] = {box[v][0] - box[w][0], box[v][1] - box[w][1], box[v][2] - box[w][2]};
-
-      if (w >= v || SbDot3(r, r) > tolerance * tolerance) continue;
+      if (w >= v || SbDistance2(box[v], box[w]) > tolerance * tolerance) continue;
       if (chains)
         (void)SbUnionJoin(map, v, w);
       else if (map[w] == w)
