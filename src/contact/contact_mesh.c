@@ -138,7 +138,7 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     arrival[k] = k;
   }
   PetscCall(PetscSortIntWithArray(nv, id, arrival));
-  PetscCall(PetscMalloc1(nv, &m->order));
+  PetscCall(PetscMalloc3(nv, &m->order, m->nlocal, &m->local, 6 * nv, &m->buffer));
   for (PetscInt v = 0; v < nv; v++) m->order[arrival[v]] = v;
   PetscCall(PetscFree2(id, arrival));
 
@@ -176,7 +176,6 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     }
   }
   PetscCall(PetscFree(all));
-  PetscCall(PetscMalloc2(m->nlocal, &m->local, 6 * nv, &m->buffer));
   for (PetscInt k = 0; k < m->nlocal; k++) {
     m->local[k] = m->order[m->first[rank] / 3 + k];
     m->own[m->local[k]] = m->mine[m->local[k]] = 1;
@@ -380,8 +379,7 @@ PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh)
   PetscCall(PetscFree(m->triangle));
   PetscCall(PetscFree2(m->edge, m->edge_area));
   PetscCall(PetscFree2(m->count, m->first));
-  PetscCall(PetscFree(m->order));
-  PetscCall(PetscFree2(m->local, m->buffer));
+  PetscCall(PetscFree3(m->order, m->local, m->buffer));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -110,8 +110,7 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
   PetscFunctionBeginUser;
   *found = PETSC_FALSE;
   PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
-  PetscCall(PetscMalloc1(nbody, &speaks));
-  PetscCall(PetscCalloc2(3 * nbody, &point, nbody * nbody, &winding));
+  PetscCall(PetscCalloc3(nbody, &speaks, 3 * nbody, &point, nbody * nbody, &winding));
 
   /* the middle of a tet of each body, of the lowest rank that has one */
   for (PetscInt b = 0; b < nbody; b++) speaks[b] = PETSC_MPI_INT_MAX;
@@ -143,7 +142,6 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
     body[0] = k / nbody;
     body[1] = k % nbody;
   }
-  PetscCall(PetscFree2(point, winding));
-  PetscCall(PetscFree(speaks));
+  PetscCall(PetscFree3(speaks, point, winding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -217,9 +217,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(m->nvertex, &w.in, m->nvertex, &list));
-  PetscCall(PetscCalloc5(3 * m->nvertex, &w.way, m->nvertex, &w.depth, m->nvertex, &w.sum, m->nvertex,
-                         &w.layer, m->nedge, &w.through));
+  PetscCall(PetscCalloc7(m->nvertex, &w.in, m->nvertex, &list, 3 * m->nvertex, &w.way, m->nvertex, &w.depth,
+                         m->nvertex, &w.sum, m->nvertex, &w.layer, m->nedge, &w.through));
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
   SbContactMeshNormals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) {
@@ -302,8 +301,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   if (nleading) o->n = nleading;
 
   PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree2(w.in, list));
-  PetscCall(PetscFree5(w.way, w.depth, w.sum, w.layer, w.through));
+  PetscCall(PetscFree7(w.in, list, w.way, w.depth, w.sum, w.layer, w.through));
   PetscCall(PetscFree2(paired, w.normal));
   PetscCall(PetscFree(w.start));
   PetscCall(PetscFree(w.edge));

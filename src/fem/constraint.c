@@ -37,9 +37,8 @@ PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool n
   PetscFunctionBeginUser;
   if (!c) {
     PetscCall(PetscNew(&c));
-    PetscCall(PetscMalloc1(s->nnode_owned, &c->first));
+    PetscCall(PetscCalloc2(s->nnode_owned, &c->first, 9 * s->nnode, &c->Q));
     for (PetscInt i = 0; i < s->nnode_owned; i++) c->first[i] = -1;
-    PetscCall(PetscCalloc1(9 * s->nnode, &c->Q));
     s->constraints = c;
   }
   c->beside = (PetscBool)(c->beside || beside || nonsymmetric);
@@ -55,8 +54,7 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCDestroy(&c->factored));
   PetscCall(PetscFree(c->constraint));
-  PetscCall(PetscFree(c->first));
-  PetscCall(PetscFree(c->Q));
+  PetscCall(PetscFree2(c->first, c->Q));
   PetscCall(PetscFree(c->added));
   PetscCall(PetscFree(*constraints));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -208,7 +208,7 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 
     if (shape != SB_SET_GROUP && shape != SB_SET_BODY && shape != SB_SET_BOUNDARY) by_items &= ~SB_SET_BIT(k);
   }
-  PetscCall(PetscCalloc1(edges->n, &set));
+  PetscCall(PetscCalloc2(edges->n, &set, 6 * (size_t)mesh->ncell, &cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
     const PetscInt c = i / 6, a = SbTetEdge[i % 6][0], b = SbTetEdge[i % 6][1];
     uint64_t items = mesh->cell_set[c];
@@ -217,7 +217,6 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
     set[edges->edge[i]] |= (items & by_items) | (mesh->vert_set[mesh->cell[4 * c + a]] &
                                                  mesh->vert_set[mesh->cell[4 * c + b]] & ~by_items);
   }
-  PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) cell_set[i] = set[edges->edge[i]] & ~SB_ON_BOUNDARY;
   PetscCall(SbMeshBroadcastCells(mesh, 6, MPI_UINT64_T, cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
@@ -233,8 +232,7 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
         0.5 * (mesh->x[3 * v[SbTetEdge[i % 6][0]] + k] + mesh->x[3 * v[SbTetEdge[i % 6][1]] + k]) +
         (mesh->edge_off ? mesh->edge_off[3 * i + k] : 0.);
   }
-  PetscCall(PetscFree(set));
-  PetscCall(PetscFree(cell_set));
+  PetscCall(PetscFree2(set, cell_set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

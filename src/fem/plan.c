@@ -188,8 +188,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
-  PetscCall(PetscMalloc1(3 * widest, &column));
-  PetscCall(PetscCalloc1(9 * widest, &zeros));
+  PetscCall(PetscCalloc2(3 * widest, &column, 9 * widest, &zeros));
   if (kind == SB_MATRIX_AIJ && s->ghosted) PetscCall(MatMPIAIJGetSeqAIJ(A, &part, NULL, NULL));
   if (kind == SB_MATRIX_AIJ) PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_TRUE));
   for (PetscInt i = 0; kind == SB_MATRIX_AIJ && i < s->nnode_owned; i++) {
@@ -207,8 +206,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
     for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) column[n++] = s->gnode[p->oj[k]];
     if (n) PetscCall(MatSetValuesBlocked(A, 1, &grow, n, column, zeros, INSERT_VALUES));
   }
-  PetscCall(PetscFree(column));
-  PetscCall(PetscFree(zeros));
+  PetscCall(PetscFree2(column, zeros));
   PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,8 +35,7 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
     s->touch = PetscMax(s->touch, TOUCH * (s->tree.hull[3 + k] - s->tree.hull[k]));
 
   // face normals, and vertex normals weighted by the angles of the faces
-  PetscCall(PetscMalloc1(3 * (size_t)ntri, &s->normal));
-  PetscCall(PetscCalloc1(3 * (size_t)nvert, &s->corner));
+  PetscCall(PetscCalloc2(3 * (size_t)ntri, &s->normal, 3 * (size_t)nvert, &s->corner));
   for (PetscInt f = 0; f < ntri; f++) {
     PetscReal e[3][3], c[3], *n = s->normal + 3 * f;
 
@@ -61,8 +60,7 @@ PetscErrorCode SbSignedDistanceDestroy(SbSignedDistance *distance)
   PetscFunctionBeginUser;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBoxTreeDestroy(&s->tree));
-  PetscCall(PetscFree(s->normal));
-  PetscCall(PetscFree(s->corner));
+  PetscCall(PetscFree2(s->normal, s->corner));
   PetscCall(PetscFree(*distance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
