@@ -95,6 +95,7 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
 
   /* none: the point of the surface closest to the end of the ray */
   if (exit < 0) {
+    PetscReal way[3];
     SbBoxNearest near;
 
     for (int i = 0; i < 3; i++) goal[i] = p[i] + depth * point->normal[i];
@@ -115,12 +116,8 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
       exit = t;
       PetscCall(PetscArraycpy(best, weight, 3));
     }
-  }
-  if (exit < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (nearest == PETSC_MAX_REAL) { /* directly towards it */
-    PetscReal way[3];
-
-    for (int i = 0; i < 3; i++) {
+    if (exit < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    for (int i = 0; i < 3; i++) { /* directly towards it */
       way[i] = -p[i];
       for (int k = 0; k < 3; k++) way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
     }
@@ -259,11 +256,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
       }
       if (SbNormalise(point.normal) <= CANCEL) continue;
       PetscCall(add_inside(m, x, &tree, part, PetscSqrtReal(chord), p, &point, o));
-      continue;
-    }
-
-    /* or one of its ends is inside */
-    {
+    } else { /* or one of its ends is inside */
       const PetscInt v = ends[first < 0. ? 0 : 1];
 
       for (int k = 0; k < 3; k++)
@@ -402,18 +395,17 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
     if (n) PetscCall(find_inside(m, nmoved ? moved : x, n, hit, o));
     PetscCall(PetscFree(moved));
   }
-  o->ncrossing = n;
   PetscCall(find_behind(m, x, o));
-  if (!n) o->ncrossing = o->n;
-  if (!o->ncrossing) {
-    PetscCall(PetscFree(hit));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  o->ncrossing = n ? n : o->n;
 
   /* the first intersection, and the largest depth */
-  o->part[0] = m->part[n ? m->edge[2 * hit[0]] : o->point[0].v[0]];
-  o->part[1] = n ? m->part[m->triangle[3 * hit[1]]] : m->space->mesh->nbody;
-  PetscCall(PetscArraycpy(o->place, x + 3 * (n ? m->edge[2 * hit[0]] : o->point[0].v[0]), 3));
+  if (o->ncrossing) {
+    const PetscInt v = n ? m->edge[2 * hit[0]] : o->point[0].v[0];
+
+    o->part[0] = m->part[v];
+    o->part[1] = n ? m->part[m->triangle[3 * hit[1]]] : m->space->mesh->nbody;
+    PetscCall(PetscArraycpy(o->place, x + 3 * v, 3));
+  }
   PetscCall(PetscFree(hit));
   o->deepest = 0.;
   for (PetscInt i = 0; i < o->n; i++) o->deepest = PetscMax(o->deepest, o->point[i].depth);
