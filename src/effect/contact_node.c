@@ -730,14 +730,14 @@ static PetscErrorCode load_contact(SbEffect e, SbSpace space, PetscReal t, const
     Touch *touch = &c->touch[i];
 
     /* nodes without a record are inactive */
-    touch->on = touch->was = touch->idle = PETSC_FALSE;
-    touch->along = -1;
-    touch->rest = touch->kept = touch->lambda = touch->gap = touch->approach = 0;
-    touch->friction = (SbFrictionState){.slide = {-1, -1}};
-    for (int k = 0; k < 3; k++) {
-      touch->start[k] = touch->now[k] = u[3 * touch->node + k];
-      touch->stretch[k] = 0;
-    }
+    *touch = (Touch){.node = touch->node,
+                     .cell = touch->cell,
+                     .a = touch->a,
+                     .k = touch->k,
+                     .stiff = touch->k,
+                     .along = -1,
+                     .friction = {.slide = {-1, -1}}};
+    for (int k = 0; k < 3; k++) touch->start[k] = touch->now[k] = u[3 * touch->node + k];
     number[i] = space->node_orig[touch->node];
     at[i] = i;
   }
