@@ -13,15 +13,15 @@
 
 static const struct {
   const char *name, *form;
-  int numbers;
+  int numbers, nvert, ntri; /* in the option; vertices and triangles of the surface */
 } shapes[] = {
-  {"plane", "plane:nx,ny,nz,d", 4},
-  {"sphere", "sphere:x,y,z,r", 4},
-  {"box", "box:x0,y0,z0,x1,y1,z1", 6},
-  {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7},
-  {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7},
-  {"bowl", "bowl:x,y,z,r", 4},
-  {"mesh", "mesh:FILE", 0},
+  {"plane", "plane:nx,ny,nz,d", 4, 2, 0},
+  {"sphere", "sphere:x,y,z,r", 4, 1, 0},
+  {"box", "box:x0,y0,z0,x1,y1,z1", 6, 8, 12},
+  {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7, 2, 0},
+  {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7, 2 * SIDES + 2, 4 * SIDES},
+  {"bowl", "bowl:x,y,z,r", 4, 1, 0},
+  {"mesh", "mesh:FILE", 0, 0, 0},
 };
 
 /* Unit vector from v; `other` where v vanishes. Returns its length. */
@@ -82,11 +82,8 @@ static PetscErrorCode make_surface(SbObstacle o)
   PetscReal a[3], e[3], f[3];
 
   PetscFunctionBeginUser;
-  s->nvert = o->shape == CYLINDER                       ? 2 * SIDES + 2
-             : o->shape == BOX                          ? 8
-             : o->shape == PLANE || o->shape == CAPSULE ? 2
-                                                        : 1;
-  s->ntri = o->shape == CYLINDER ? 4 * SIDES : o->shape == BOX ? 12 : 0;
+  s->nvert = shapes[o->shape].nvert;
+  s->ntri = shapes[o->shape].ntri;
   PetscCall(PetscMalloc1(3 * s->nvert, &s->x));
   PetscCall(PetscMalloc1(3 * s->ntri, &s->tri));
   for (PetscInt k = 0; k < 3 * s->nvert && o->shape != CYLINDER; k++) {

@@ -130,9 +130,8 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     const PetscInt one = m->part[p->v[0]], two = m->part[p->v[p->n - 1]];
     const PetscReal w = PetscMin(b->w[one], b->w[two]), k = PetscMin(b->k[one], b->k[two]),
                     all = p->depth + 0.5 * w;
-    Spring spring = {.at = *p, .stiffness = b->stiffer * k * p->area / w};
+    Spring spring = {.at = *p, .stiffness = b->stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
 
-    if (!e->dynamic) spring.stiffness *= STIFF;
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
@@ -226,12 +225,10 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
     if (SbContactPairSweptApart(m, pair, b->x, b->other, w)) continue;
     at = meets(b, pair, b->x, b->other, w);
     if (at > 1.) continue;
-    for (int k = 0; k < (pair->side ? 3 : 4); k++) {
-      for (int j = 0; j < 3; j++) {
-        const PetscInt c = 3 * pair->v[k] + j;
+    for (int k = 0; k < (pair->side ? 9 : 12); k++) {
+      const PetscInt c = 3 * pair->v[k / 3] + k % 3;
 
-        x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
-      }
+      x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
     }
     if (!find_spring(b, pair, x, &spring)) continue;
     for (int k = 0; k < 2; k++) {
