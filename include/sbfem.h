@@ -41,7 +41,8 @@ typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
   MPI_Comm comm;
-  SbMesh mesh; /* borrowed */
+  PetscMPIInt rank, size; /* in comm */
+  SbMesh mesh;            /* borrowed */
   PetscInt Nnode, nnode_owned, nnode;
   PetscInt gnode_start;
   PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */

@@ -112,21 +112,19 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   const SbSpace s = m->space;
   PetscInt nown = 0, nall, nv = 0, *id, *arrival;
   PetscReal *own, *all;
-  PetscMPIInt ranks, rank, nlocal;
+  PetscMPIInt nlocal;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCall(list_own(m, n, facet, &nown, &own));
   PetscCall(SbAllgatherv(s->comm, MPIU_REAL, nown, own, &nall, &all, NULL));
   PetscCall(PetscFree(own));
 
   /* how many vertices each rank moves */
   PetscCall(PetscMPIIntCast(3 * m->nlocal, &nlocal));
-  PetscCall(PetscMalloc2(ranks, &m->count, ranks, &m->first));
+  PetscCall(PetscMalloc2(s->size, &m->count, s->size, &m->first));
   PetscCallMPI(MPI_Allgather(&nlocal, 1, MPI_INT, m->count, 1, MPI_INT, s->comm));
   m->first[0] = 0;
-  for (PetscMPIInt r = 1; r < ranks; r++) m->first[r] = m->first[r - 1] + m->count[r - 1];
+  for (PetscMPIInt r = 1; r < s->size; r++) m->first[r] = m->first[r - 1] + m->count[r - 1];
 
   /* the order of numbers: vertex order[k] arrives as number k */
   for (PetscInt i = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2]) nv++;
@@ -138,12 +136,11 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     arrival[k] = k;
   }
   PetscCall(PetscSortIntWithArray(nv, id, arrival));
-  PetscCall(PetscMalloc3(nv, &m->order, m->nlocal, &m->local, 6 * nv, &m->buffer));
+  PetscCall(PetscCalloc4(nv, &m->order, m->nlocal, &m->local, 6 * nv, &m->buffer, nv + 1, &m->start));
   for (PetscInt v = 0; v < nv; v++) m->order[arrival[v]] = v;
   PetscCall(PetscFree2(id, arrival));
 
   /* their records in that order */
-  PetscCall(PetscCalloc1(nv + 1, &m->start));
   for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++)
     m->start[m->order[k] + 1] = (PetscInt)all[i + 2];
   for (PetscInt v = 0; v < nv; v++) m->start[v + 1] += m->start[v];
@@ -177,7 +174,7 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   }
   PetscCall(PetscFree(all));
   for (PetscInt k = 0; k < m->nlocal; k++) {
-    m->local[k] = m->order[m->first[rank] / 3 + k];
+    m->local[k] = m->order[m->first[s->rank] / 3 + k];
     m->own[m->local[k]] = m->mine[m->local[k]] = 1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -283,13 +280,11 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   SbTriangles o = {0};
   SbContactMesh m;
   PetscInt nbody_edge = 0;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&m));
   *mesh = m;
   m->space = s;
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
   /* vertices and triangles of the bodies, then of the obstacle, which belong to rank 0 */
   if (obstacle) {
@@ -308,7 +303,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     m->part[v] = s->mesh->nbody;
     m->area[v] = 0.;
-    m->own[v] = (uint8_t)!rank;
+    m->own[v] = (uint8_t)!s->rank;
     m->driven[v] = 1;
   }
   PetscCall(make_edges(m, (PetscBool)(m->radius > 0. && o.nvert == 2)));
@@ -372,14 +367,13 @@ PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh)
 
   PetscFunctionBeginUser;
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(m->start));
   PetscCall(PetscFree4(m->gnode, m->node, m->weight, m->fixed));
   PetscCall(PetscFree4(m->part, m->id, m->X, m->area));
   PetscCall(PetscFree3(m->mine, m->own, m->driven));
   PetscCall(PetscFree(m->triangle));
   PetscCall(PetscFree2(m->edge, m->edge_area));
   PetscCall(PetscFree2(m->count, m->first));
-  PetscCall(PetscFree3(m->order, m->local, m->buffer));
+  PetscCall(PetscFree4(m->order, m->local, m->buffer, m->start));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

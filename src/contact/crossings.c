@@ -55,15 +55,12 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
                                       PetscInt **hits)
 {
   PetscInt nmine = 0, size = 0, *mine = NULL, hit;
-  PetscMPIInt rank, ranks;
   SbBoxQuery query;
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
-  PetscCallMPI(MPI_Comm_size(m->space->comm, &ranks));
   PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
-  for (PetscInt e = rank; e < m->nedge; e += ranks) {
+  for (PetscInt e = m->space->rank; e < m->nedge; e += m->space->size) {
     PetscReal around[6];
 
     SbBoxClear(around);
@@ -105,21 +102,20 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
   const SbMesh mesh = m->space->mesh;
   const PetscInt nbody = mesh->nbody;
   PetscReal *point, *winding;
-  PetscMPIInt rank, *speaks;
+  PetscMPIInt *speaks;
 
   PetscFunctionBeginUser;
   *found = PETSC_FALSE;
-  PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
   PetscCall(PetscCalloc3(nbody, &speaks, 3 * nbody, &point, nbody * nbody, &winding));
 
   /* the middle of a tet of each body, of the lowest rank that has one */
   for (PetscInt b = 0; b < nbody; b++) speaks[b] = PETSC_MPI_INT_MAX;
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) speaks[mesh->cell_body[c]] = rank;
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) speaks[mesh->cell_body[c]] = m->space->rank;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, speaks, (PetscMPIInt)nbody, MPI_INT, MPI_MIN, m->space->comm));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt b = mesh->cell_body[c];
 
-    if (speaks[b] != rank) continue;
+    if (speaks[b] != m->space->rank) continue;
     speaks[b] = PETSC_MPI_INT_MAX;
     for (int k = 0; k < 12; k++)
       point[3 * b + k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * c + k / 3] + k % 3];

@@ -497,16 +497,14 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   *n = 1;
   PetscCall(PetscMalloc1(4, records));
   (*records)[0] = b->work;
   (*records)[1] = b->friction_loss;
-  (*records)[2] = rank ? 0. : b->stiffer;
-  (*records)[3] = rank ? 0. : b->scale;
+  (*records)[2] = s->rank ? 0. : b->stiffer;
+  (*records)[3] = s->rank ? 0. : b->scale;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -515,15 +513,13 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
 {
   Barrier *b = (Barrier *)e->data;
   PetscReal sum[4] = {0.};
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   for (PetscInt k = 0; k < 4 * n; k++) sum[k % 4] += records[k];
-  b->work = rank ? 0. : sum[0];
-  b->friction_loss = rank ? 0. : sum[1];
+  b->work = s->rank ? 0. : sum[0];
+  b->friction_loss = s->rank ? 0. : sum[1];
   b->stiffer = sum[2];
   if (sum[3] > 0. && b->width == 0.) set_scale(e, sum[3]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -63,7 +63,6 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   const SbPairs *p = &b->columns;
   const int *at = places[b->contact->obstacle != NULL];
   PetscReal least = PETSC_MAX_REAL;
-  PetscMPIInt rank;
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -73,7 +72,6 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   if (b->contact->obstacle) SbContactPose(b->contact, stage->t, &pose);
   for (PetscInt i = 0; i < nterm(b); i++) {
     PetscReal force[3] = {0.}, *columns;
@@ -113,7 +111,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   }
   if (!b->contact->obstacle) values[5] = b->work;
   values[at[LOSS]] = b->friction_loss;
-  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->rank) PetscFunctionReturn(PETSC_SUCCESS);
   values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
   values[at[LAG]] = b->lag;
   values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
@@ -263,19 +261,17 @@ PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, si
     double gap;
     int rank;
   } mine, first;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   for (PetscInt i = 0; i < b->nactive; i++) {
     if (!least || b->active[i].gap < least->gap) least = &b->active[i];
   }
   mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
-  mine.rank = rank;
+  mine.rank = s->rank;
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
   if (first.gap >= *gap) PetscFunctionReturn(PETSC_SUCCESS);
   *gap = first.gap;
-  if (rank == first.rank) {
+  if (s->rank == first.rank) {
     const SbContactPair *pair = &b->pairs->pair[least->pair];
     const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
     const char *name[2];

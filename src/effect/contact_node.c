@@ -648,7 +648,6 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
 {
   Contact *c = (Contact *)e->data;
   PetscReal deepest = 0;
-  PetscMPIInt rank;
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -671,9 +670,8 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
     values[6]++;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
-  PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
   /* smaller values are within the tolerance */
-  if (!rank && deepest > TOLERANCE * c->size) values[7] = deepest;
+  if (!space->rank && deepest > TOLERANCE * c->size) values[7] = deepest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

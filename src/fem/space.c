@@ -154,12 +154,13 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
 {
   SbSpace s;
   PetscInt mass;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
   PetscCall(PetscNew(&s));
   s->comm = mesh->comm;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &s->rank));
+  PetscCallMPI(MPI_Comm_size(s->comm, &s->size));
   s->mesh = mesh;
   s->block_scale = 1.;
   PetscCall(SbOptionChoice(&SbRunScope, "mass", &mass));
@@ -202,9 +203,8 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
       }
     }
   }
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  s->ghosted = (PetscBool)(size > 1);
-  if (size == 1) {
+  s->ghosted = (PetscBool)(s->size > 1);
+  if (!s->ghosted) {
     PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
     PetscCall(VecSetBlockSize(s->template_vec, 3));
   } else {
