@@ -185,25 +185,6 @@ static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
   }
 }
 
-/* Vertices joined to an inside one by an edge that intersects nothing are inside, too. list[]: work. */
-static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t near[])
-{
-  PetscInt n = 0;
-
-  for (PetscInt v = 0; v < m->nvertex; v++) {
-    if (near[v] == SB_OVERLAP_INSIDE) list[n++] = v;
-  }
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = w->start[list[k]]; j < w->start[list[k] + 1]; j++) {
-      const PetscInt *e = m->edge + 2 * w->edge[j], to = e[0] == list[k] ? e[1] : e[0];
-
-      if (w->through[w->edge[j]] || near[to] == SB_OVERLAP_INSIDE) continue;
-      near[to] = SB_OVERLAP_INSIDE;
-      list[n++] = to;
-    }
-  }
-}
-
 /* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
 static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
                                   SbContactOverlap *o)
@@ -279,7 +260,21 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
     PetscCall(add_inside(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, o));
   }
-  mark_inside(m, &w, list, o->near);
+
+  /* vertices joined to an inside one by an edge that intersects nothing are inside, too */
+  nlist = 0;
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    if (o->near[v] == SB_OVERLAP_INSIDE) list[nlist++] = v;
+  }
+  for (PetscInt k = 0; k < nlist; k++) {
+    for (PetscInt j = w.start[list[k]]; j < w.start[list[k] + 1]; j++) {
+      const PetscInt *e = m->edge + 2 * w.edge[j], to = e[0] == list[k] ? e[1] : e[0];
+
+      if (w.through[w.edge[j]] || o->near[to] == SB_OVERLAP_INSIDE) continue;
+      o->near[to] = SB_OVERLAP_INSIDE;
+      list[nlist++] = to;
+    }
+  }
 
   /* keep those whose own outward normal opposes the direction, if there are any */
   for (PetscInt i = 0; i < o->n; i++) {

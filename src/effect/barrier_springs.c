@@ -28,29 +28,6 @@
 #define REST 0.999    /* of the width: a smaller gap is contact */
 #define KEEP 0.01     /* tolerance of the impact's position, over the gap above the width */
 
-/* Warns once, naming what overlaps. */
-static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverlap *o)
-{
-  const char *name[2];
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 2; k++)
-    name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
-  PetscCheck(o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
-             "The effect %s: %s and %s overlap at (%g, %g, %g) m, and no separation direction was found: "
-             "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
-             e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-             o->ncrossing);
-  PetscCall(SbWarning(
-    s->comm,
-    "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
-    " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); until then "
-    "they may pass through each other there",
-    e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->n,
-    (double)o->deepest, e->name));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether two bodies coincide: then no separation direction exists. */
 static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 {
@@ -121,7 +98,26 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, s->comm));
   b->pairs->known = PETSC_FALSE;
-  if (!b->announced) PetscCall(announce(e, s, o));
+
+  /* warns once, naming what overlaps */
+  if (!b->announced) {
+    const char *name[2];
+
+    for (int k = 0; k < 2; k++)
+      name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
+    PetscCheck(o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
+               "The effect %s: %s and %s overlap at (%g, %g, %g) m, and no separation direction was found: "
+               "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
+               e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
+               o->ncrossing);
+    PetscCall(SbWarning(
+      s->comm,
+      "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
+      " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); until then "
+      "they may pass through each other there",
+      e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->n,
+      (double)o->deepest, e->name));
+  }
   b->announced = PETSC_TRUE;
 
   if (e->dynamic) SbOverlapBegin(&b->contact->overlap, dt);
