@@ -170,7 +170,7 @@ typedef struct {
   SbContactBlock *block; /* [n] */
   PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
-PetscErrorCode SbContactBlocksClear(SbContactBlocks *blocks);
+void SbContactBlocksClear(SbContactBlocks *blocks);
 PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
 /* Adds the 3x3 block of bodies' vertices v and w, rows `ld` numbers apart, and its transpose for w and v. */
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],

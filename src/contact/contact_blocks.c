@@ -29,12 +29,10 @@ static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt 
   return at;
 }
 
-PetscErrorCode SbContactBlocksClear(SbContactBlocks *b)
+void SbContactBlocksClear(SbContactBlocks *b)
 {
-  PetscFunctionBeginUser;
   b->n = 0;
   for (PetscInt k = 0; k < b->nslot; k++) b->slot[k] = -1;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, const PetscReal H[],

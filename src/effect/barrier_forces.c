@@ -185,7 +185,8 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
   }
 }
 
-PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's sum, J. */
+static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0.;
 
@@ -207,7 +208,7 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
   (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
-  (void)SbBarrierGradient(b, -1., f);
+  (void)add_gradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -220,7 +221,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, u));
-  *energy += SbBarrierGradient(b, 1., f);
+  *energy += add_gradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
   for (PetscInt i = 0; i < b->friction.n; i++) {
@@ -262,7 +263,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
-  PetscCall(SbContactBlocksClear(&b->blocks));
+  SbContactBlocksClear(&b->blocks);
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
@@ -381,9 +382,9 @@ PetscErrorCode SbBarrierLag(Barrier *b)
 
   /* the normal forces cancel */
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  (void)SbBarrierGradient(b, 1., f);
+  (void)add_gradient(b, 1., f);
   SbBarrierSwapFriction(b);
-  (void)SbBarrierGradient(b, -1., f);
+  (void)add_gradient(b, -1., f);
   SbBarrierSwapFriction(b);
   for (PetscInt i = 0; i < s->nnode_owned; i++) sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   for (PetscInt i = 0; i < b->next.n; i++)

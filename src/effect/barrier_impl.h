@@ -153,8 +153,6 @@ static inline PetscInt nterm(const Barrier *b)
   return b->nactive + b->friction.n + b->nspring;
 }
 void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
-/* f += sign times the gradient of all energies at the current positions, N; returns this rank's sum, J. */
-PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
 
 /* x[nvertex][3] = positions, m, at u and after the fraction `progress` of the obstacle's path. Collective. */
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress, PetscReal x[]);

@@ -68,8 +68,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
   PetscCall(PetscStrncpy(e->type, type, sizeof(e->type)));
   PetscCall(SbLogNamed("Eff", type, &e->event));
-  e->linear = PETSC_TRUE;
-  e->steady = PETSC_TRUE;
+  e->linear = e->steady = PETSC_TRUE;
   e->ops = is->ops;
   e->column = is->column;
   e->ncolumn = is->ncolumn;

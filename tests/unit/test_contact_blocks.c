@@ -40,7 +40,7 @@ int main(int argc, char **argv)
 
   /* two rounds, so that data kept from one round to the next are tested */
   for (int round = 0; round < 2; round++) {
-    PetscCall(SbContactBlocksClear(&blocks));
+    SbContactBlocksClear(&blocks);
     PetscCall(PetscArrayzero(&H[0][0], 9 * NV * NV));
     for (int k = 0; k < NPAIR; k++) {
       const PetscInt v = (5 * k + round) % NV, w = (k * k + 3) % NV;
