@@ -149,19 +149,14 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   }
   PetscCall(PetscFree(names));
 
-  if (needs.bodies) {
-    *response = BARRIER;
-    *why = "bodies meet each other";
-  } else if (other != AUTO) {
-    *response = other == BARRIER ? BARRIER : PROJECTED;
-    *why = "the same as another effect";
-  } else if (!possible || needs.others || needs.vertices) {
-    *response = PROJECTED;
-    *why = !possible ? "-time" : needs.others ? "an option that barrier lacks" : "half-spaces and bowls only";
-  } else {
-    *response = BARRIER;
-    *why = "edges and corners may touch";
-  }
+  *why = needs.bodies     ? "bodies meet each other"
+         : other != AUTO  ? "the same as another effect"
+         : !possible      ? "-time"
+         : needs.others   ? "an option that barrier lacks"
+         : needs.vertices ? "half-spaces and bowls only"
+                          : "edges and corners may touch";
+  if (other == AUTO) other = !possible || needs.others || needs.vertices ? PROJECTED : BARRIER;
+  *response = needs.bodies || other == BARRIER ? BARRIER : PROJECTED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
