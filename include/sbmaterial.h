@@ -80,9 +80,10 @@ PetscErrorCode SbMaterialRegisterAll(void);
    for an unknown law and for what the option readers and the next two refuse. Not collective, same on all
    ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
-/* The same from numbers: E in Pa, nu without unit, density in kg/m^3, first tangent. Reads no options. */
+/* The same from numbers: E in Pa, nu without unit, density in kg/m^3, first tangent. Reads no options; messages
+   begin with `where`. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       SbMaterial *m);
+                                       const char *where, SbMaterial *m);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
 /* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its tangent follows

@@ -26,9 +26,8 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates a law; `where`: name of its user, for messages. */
-static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                 const char *where, SbMaterial *material)
+PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
+                                       const char *where, SbMaterial *material)
 {
   PetscErrorCode (*create)(SbMaterial) = NULL;
   SbMaterial m;
@@ -59,14 +58,6 @@ static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       SbMaterial *material)
-{
-  PetscFunctionBeginUser;
-  PetscCall(create_law(law, E, nu, density, "material", material));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
 {
   SbScope scope;
@@ -79,7 +70,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));
-  PetscCall(create_law(law, E, nu, density, where, material));
+  PetscCall(SbMaterialCreateElastic(law, E, nu, density, where, material));
   if ((*material)->ops.setfromoptions) PetscCall(((*material)->ops.setfromoptions)(*material, &scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -97,7 +88,7 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
   if (!m->shear) {
-    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, &m->shear));
+    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, "material", &m->shear));
     PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
   }
   *shear = m->shear;

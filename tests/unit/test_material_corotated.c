@@ -93,7 +93,7 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbMaterialCreateElastic("corotated", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, &m));
+    PetscCall(SbMaterialCreateElastic("corotated", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, "test", &m));
     SB_CHECK(m->tangent == SB_TANGENT_WARPED && m->ops.frame, "the warped tangent is not the default");
     test_states(m);
     PetscCall(test_warped(m));

@@ -23,6 +23,7 @@ static void test_states(SbMaterial m)
 
 int main(int argc, char **argv)
 {
+  static const PetscReal nu[3] = {0.3, 0.4999, -0.4};
   SbMaterial m;
   PetscReal F[9], H[9], R[9], dP[9], P[9], C[81], CH[9];
   SbPack f[9], r[9];
@@ -31,7 +32,7 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbMaterialCreateElastic("linear", 5e3, k == 0 ? 0.3 : k == 1 ? 0.4999 : -0.4, 1000, &m));
+    PetscCall(SbMaterialCreateElastic("linear", 5e3, nu[k], 1000, "test", &m));
     SB_CHECK(m->linear, "flags");
     check_rest(m);
     check_lanes(m);
