@@ -691,18 +691,17 @@ static PetscErrorCode save_contact(SbEffect e, SbSpace space, PetscInt *n, Petsc
   PetscCall(PetscMalloc1(SB_CONTACT_STATE * c->n, records));
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    const PetscReal head[8] = {(PetscReal)space->node_orig[touch->node],
-                               touch->on,
-                               touch->was,
-                               touch->rest,
-                               touch->kept,
-                               touch->lambda,
-                               touch->value,
-                               touch->gap};
     PetscReal *r = *records + SB_CONTACT_STATE * *n;
 
     if (!touch->on && !touch->was && touch->lambda == 0) continue;
-    PetscCall(PetscArraycpy(r, head, 8));
+    r[0] = (PetscReal)space->node_orig[touch->node];
+    r[1] = touch->on;
+    r[2] = touch->was;
+    r[3] = touch->rest;
+    r[4] = touch->kept;
+    r[5] = touch->lambda;
+    r[6] = touch->value;
+    r[7] = touch->gap;
     PetscCall(PetscArraycpy(r + 8, touch->n, 3));
     PetscCall(PetscArraycpy(r + 11, touch->surface, 3));
     r[14] = touch->friction.slid;

@@ -14,11 +14,10 @@
 
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt v[4])
 {
-  PetscReal e[3][3], n[3];
+  PetscReal e[3][3];
 
   for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], e[k]);
-  SbCross(e[1], e[2], n);
-  return SbDot3(e[0], n);
+  return SbMatDet(&e[0][0]);
 }
 
 struct _p_SbLocator {
