@@ -29,3 +29,5 @@ typedef struct {
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *triangles);
 PetscErrorCode SbTrianglesDestroy(SbTriangles *triangles);
+/* Solid angle of the triangle of the vertices v seen from o, positive if o is behind it. */
+PetscReal SbTriangleSolidAngle(const PetscReal x[], const PetscInt v[3], const PetscReal o[3]);

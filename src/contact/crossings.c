@@ -82,21 +82,6 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solid angle of a triangle seen from p, as a part of the whole sphere (van Oosterom and Strackee 1983). */
-static PetscReal solid_angle(const PetscReal p[3], const PetscReal *a, const PetscReal *b, const PetscReal *c)
-{
-  PetscReal r[3][3], l[3], n[3];
-
-  SbSubtract(a, p, r[0]);
-  SbSubtract(b, p, r[1]);
-  SbSubtract(c, p, r[2]);
-  for (int k = 0; k < 3; k++) l[k] = PetscSqrtReal(SbDot3(r[k], r[k]));
-  SbCross(r[1], r[2], n);
-  return atan2(SbDot3(r[0], n), l[0] * l[1] * l[2] + SbDot3(r[0], r[1]) * l[2] + SbDot3(r[1], r[2]) * l[0] +
-                                  SbDot3(r[2], r[0]) * l[1]) /
-         (2. * PETSC_PI);
-}
-
 PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2], PetscBool *found)
 {
   const SbMesh mesh = m->space->mesh;
@@ -128,8 +113,7 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
     const PetscInt *v = m->triangle + 3 * t, to = m->part[v[0]];
 
     for (PetscInt b = 0; b < nbody; b++) {
-      if (b != to)
-        winding[nbody * b + to] += solid_angle(point + 3 * b, x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]);
+      if (b != to) winding[nbody * b + to] += SbTriangleSolidAngle(x, v, point + 3 * b) / (4. * PETSC_PI);
     }
   }
   for (PetscInt k = 0; k < nbody * nbody && !*found; k++) {

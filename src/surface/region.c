@@ -238,7 +238,8 @@ static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscIn
     for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
     if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
     for (PetscInt i = 0; i < 2 * s->t->ntri; i++)
-      if (s->shell[i] == k) around += (i % 2 ? 1 : -1) * SbTriangleSolidAngle(s->t, i / 2, o);
+      if (s->shell[i] == k)
+        around += (i % 2 ? 1 : -1) * SbTriangleSolidAngle(s->t->x, s->t->tri + 3 * (i / 2), o);
     if (around > 2 * PETSC_PI) best = k;
   }
   return best;

@@ -83,5 +83,3 @@ PetscReal SbTriangleArea(const SbTriangles *triangles, PetscInt f, PetscBool *fl
 PetscReal SbTrianglesMeanEdge(const SbTriangles *triangles);
 /* Signed volume of the tet between a triangle and the point o, m^3, positive if o is behind it. */
 PetscReal SbTetVolumeTo(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);
-/* Solid angle of a triangle seen from o, positive if o is behind it. */
-PetscReal SbTriangleSolidAngle(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);

@@ -52,12 +52,12 @@ PetscReal SbTetVolumeTo(const SbTriangles *t, PetscInt f, const PetscReal o[3])
   return SbDot3(n, a[2]) / 6;
 }
 
-PetscReal SbTriangleSolidAngle(const SbTriangles *t, PetscInt f, const PetscReal o[3])
+PetscReal SbTriangleSolidAngle(const PetscReal x[], const PetscInt v[3], const PetscReal o[3])
 {
   PetscReal a[3][3], l[3], n[3], down;
 
   for (int k = 0; k < 3; k++) {
-    SbSubtract(corner(t, f, k), o, a[k]);
+    SbSubtract(x + 3 * v[k], o, a[k]);
     l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
   }
   SbCross(a[0], a[1], n);
