@@ -68,7 +68,6 @@ PetscErrorCode SbSpacePrescribe(SbSpace s, PetscInt node, int components)
 PetscErrorCode SbSpacePrescribeDone(SbSpace s)
 {
   PetscFunctionBeginUser;
-  s->nfixed = 0;
   for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
   PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
   s->nfixed = 0;
