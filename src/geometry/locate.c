@@ -14,10 +14,10 @@
 
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt v[4])
 {
-  PetscReal e[3][3];
+  PetscReal e[9];
 
-  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], e[k]);
-  return SbMatDet(&e[0][0]);
+  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], e + 3 * k);
+  return SbMatDet(e);
 }
 
 struct _p_SbLocator {
