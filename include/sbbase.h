@@ -13,8 +13,7 @@
 
 #define SB_OPTION_DEFAULT "default" /* -body_default_<key> applies to bodies without their own <key> */
 
-/* ------------------------------------------------------------------ options */
-
+/* options */
 typedef enum {
   SB_OPTION_BOOL,
   SB_OPTION_INT,
@@ -127,7 +126,7 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
 /* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
 PetscBool SbHasPrefix(const char *word, const char *beginnings);
 
-/* ------------------------------------------------------------------ errors and warnings */
+/* errors and warnings */
 
 /*
   SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a
@@ -176,7 +175,7 @@ PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
-/* ------------------------------------------------------------------ texts */
+/* texts */
 
 /* Prints into text, or appends to it; truncated to size. */
 void SbFormat(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
@@ -184,7 +183,7 @@ void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE
 /* Comma-separated numbers, into p[most]; returns their count, -1 for other text or more numbers. */
 int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
-/* ------------------------------------------------------------------ arrays */
+/* arrays */
 
 /* Enlarges *array, of *size elements of `unit` bytes, to at least `need`, and twice: appending is cheap. */
 PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
@@ -207,12 +206,12 @@ PetscErrorCode SbSortByKeys(PetscInt n, size_t size, int nkey, void *item);
 PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
                             void *all, PetscInt *before);
 
-/* ------------------------------------------------------------------ memory */
+/* memory */
 
 /* Freed arrays of 32 MiB and more go back to the system from here on. After PetscInitialize(). */
 void SbMemoryReturnLarge(void);
 
-/* ------------------------------------------------------------------ threads */
+/* threads */
 
 /*
   SbThreadsSetOne - from here on loaded libraries (OpenMP's, BLAS) compute on the calling thread alone.
@@ -222,7 +221,7 @@ void SbMemoryReturnLarge(void);
 */
 int SbThreadsSetOne(void);
 
-/* ------------------------------------------------------------------ formulas */
+/* formulas */
 
 /*
   SbFormula - a number as a function of time t (s) and rest position x, y, z (m).

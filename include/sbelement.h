@@ -79,8 +79,7 @@ void SbCellBlocksCorotated(const SbPack g[9], const SbPack V, PetscReal lambda, 
 /* The same for a full tangent C, symmetric in the pairs: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
 void SbCellBlocksGeneral(const SbPack g[9], const SbPack V, const SbPack C[81], SbPack K[10][9]);
 
-/* ------------------------------------------------------------------ P2, src/element/p2.c */
-
+/* P2, src/element/p2.c */
 extern const SbPointRule SbRuleQuadratic; /* degree 2: where stresses are taken */
 extern const SbPointRule SbRuleCubic;     /* degree 3 */
 /* u[12] at the vertices of a P1 cell with the gradient of U[30] at L. Transpose: F[30] += its forces f. */

@@ -231,7 +231,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFac
 /* Index of a set by name; -1 and an error if there is none (where = option, for the message). */
 PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);
 
-/* --------------------------------- real time: many similar systems, solved fast */
+/* real time: many similar systems, solved fast */
 
 /* The tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell by cell
    from the cells' rotated gradients, for laws whose tangent is Hooke's tensor turned by a rotation (linear;

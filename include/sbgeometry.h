@@ -83,7 +83,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
 PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3],
                         PetscReal *t, PetscReal weight[3], PetscBool *out);
 
-/* ------------------------------------------------------------------ intersection.c */
+/* intersection.c */
 
 /*
   Whether a segment from p to q and a triangle with the corners t share a point; whether two triangles with
@@ -93,7 +93,7 @@ PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const Pets
 PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3]);
 PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const PetscInt b[3]);
 
-/* ------------------------------------------------------------------ distance.c, ccd.c: pairs */
+/* distance.c, ccd.c: pairs */
 
 /* Kind of a pair, or of its closest features; vertices of the first side before the bar. */
 typedef enum {
@@ -165,7 +165,7 @@ typedef struct {
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
                          const SbCCDLimits *limits, PetscReal *time);
 
-/* --------------------------------------------------------- box_tree.c: boxes that meet or are near */
+/* box_tree.c: boxes that meet or are near */
 
 /*
   A tree over boxes with four children to a node: four boxes form a group, four groups one of the next level.
@@ -248,7 +248,7 @@ void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6])
 PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const PetscReal x[],
                                         SbBoxTree *tree);
 
-/* ------------------------------------------------------------------ signed_distance.c */
+/* signed_distance.c */
 
 /*
   SbSignedDistance - distance from a closed surface of triangles, m, negative inside.
@@ -264,7 +264,7 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
 PetscErrorCode SbSignedDistanceDestroy(SbSignedDistance *distance);
 PetscReal SbSignedDistanceEvaluate(SbSignedDistance distance, const PetscReal x[3], PetscReal n[3]);
 
-/* ------------------------------------------------------------------ weld.c */
+/* weld.c */
 
 /* The root of a vertex in a forest of parents up[], whose paths are halved on the way. */
 static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
@@ -294,8 +294,7 @@ PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
 /* Removes points that are not in used[nused], and renumbers these. Keeps the order. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 
-/* --------------------------------------------------------- keys.c: which edges or faces are the same */
-
+/* keys.c: which edges or faces are the same */
 typedef struct {
   uint64_t key;
   PetscInt slot; /* index of the item */
@@ -314,7 +313,7 @@ PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key);
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 
-/* ------------------------------------------------------------------ locate.c */
+/* locate.c */
 
 /*
   SbLocator - which tet holds a point. The arrays are borrowed. Flat and inverted tets contain no point. Tets

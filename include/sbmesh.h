@@ -214,8 +214,7 @@ PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
 */
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);
 
-/* ------------------------------------------------------------------ route.c: records to other ranks */
-
+/* route.c: records to other ranks */
 typedef struct {
   MPI_Comm comm;
   PetscInt nsend, nrecv;

@@ -31,8 +31,7 @@ PetscBool SbMeshFileIsSurface(const char *path);
 /* What the reader repaired; "" when nothing. Borrowed. */
 const char *SbMeshFileNote(const SbImport *import);
 
-/* ------------------------------------------------------------------ groups */
-
+/* groups */
 typedef struct {
   char name[2 * SB_NAME_MAX];
   PetscInt dim;   /* 0 points, 1 curves, 2 surfaces, 3 volumes */
@@ -43,8 +42,7 @@ typedef struct {
 /* Group i; *group is left alone when there is none, and *found says so. */
 PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, SbMeshGroup *group, PetscBool *found);
 
-/* ------------------------------------------------------------------ size and shape */
-
+/* size and shape */
 #define SB_ANGLE_BINS 18 /* of ten degrees */
 #define SB_RATIO_BINS 8
 extern const PetscReal SbRatioBinEdges[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
@@ -65,8 +63,7 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshStatistics *facts);
 
-/* ------------------------------------------------------------------ repair */
-
+/* repair */
 typedef struct {
   PetscReal merge_tolerance; /* vertices at most so far apart became one, m */
   PetscInt nwelded;          /* vertices that went into another one */
@@ -89,13 +86,12 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 
-/* ------------------------------------------------------------------ refine.c */
+/* refine.c */
 
 /* Cuts every tet into eight, every triangle into four, every line into two; groups are carried over. */
 PetscErrorCode SbMeshFileRefine(SbImport *import);
 
-/* ------------------------------------------------------------------ writing */
-
+/* writing */
 typedef enum {
   SB_MESH_AUTO, /* by the name: .msh is text of version 4.1 */
   SB_MESH_MSH41,

@@ -8,8 +8,7 @@
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
-/* ------------------------------------------------- numbers.c: from numbers of a file to indices in memory */
-
+/* numbers.c: from numbers of a file to indices in memory */
 typedef struct {
   int64_t number;
   PetscInt vert;
@@ -29,8 +28,7 @@ PetscErrorCode SbNumbersDestroy(SbNumbers *index);
 /* Index of a number, -1 when there is none. */
 PetscInt SbNumbersFind(const SbNumbers *index, int64_t number);
 
-/* ------------------------------------------------------------------ scan.c: a file in memory */
-
+/* scan.c: a file in memory */
 typedef struct {
   const char *where; /* begins every message */
   char *data;        /* whole file and a terminating zero */
@@ -82,7 +80,7 @@ PetscBool SbScanMore(SbScan *scan, char comment);
   SB_SCAN_ERROR(scan, "the file ends where " what " is expected; it is truncated, write or copy it again", \
                 __VA_ARGS__)
 
-/* ------------------------------------------------------------------ import.c: one body in memory */
+/* import.c: one body in memory */
 
 /* A physical group of a file, or a side of a box: a name for entities of one dimension. */
 typedef struct {
@@ -240,8 +238,7 @@ PetscErrorCode SbImportJoinGroups(SbImport *import);
    that have groups and share none. Adds how many went. */
 PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, PetscInt *ndropped);
 
-/* ---------------------------------------------------------- edges.c: pairs of vertices that an item joins */
-
+/* edges.c: pairs of vertices that an item joins */
 typedef struct {
   PetscInt nvert, nedge;
   PetscInt *start; /* [nvert + 1] into `high`: edges by lower vertex */
@@ -256,13 +253,13 @@ PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
 /* x[nedge][3]: the middle of each edge, or where its node is off it. */
 void SbImportEdgeNodes(const SbImport *import, const SbImportEdges *edges, PetscReal x[]);
 
-/* --------------------------------------------------------- write_h5.c: indices of HDF5 files for ParaView */
+/* write_h5.c: indices of HDF5 files for ParaView */
 
 /* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file, path: a printf format. */
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
   PETSC_ATTRIBUTE_FORMAT(6, 7);
 
-/* --------------------------------------------------------- import_h5.c: what is in the fields.h5 of a run */
+/* import_h5.c: what is in the fields.h5 of a run */
 
 /* Its frames. Start with {.wanted = step}, negative: the last one. */
 typedef struct {

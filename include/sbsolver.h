@@ -160,7 +160,7 @@ PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interio
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, PetscBool singular,
                                            SbSaddle saddle, Mat *A);
 
-/* ------------------------------------------------------------------ tangent and contact blocks */
+/* tangent and contact blocks */
 
 /* 3x3 blocks, rows of owned nodes, columns of any nodes, best in row order; start with {0}, released with
    SbBlocksFree(). Duplicates are summed. */

@@ -5,8 +5,7 @@
 #include "sbmeshio.h"
 #include "sbgeometry.h"
 
-/* ------------------------------------------------------------------ faces.c: which cells share a face */
-
+/* faces.c: which cells share a face */
 typedef struct {
   PetscInt ncell;
   PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
@@ -25,7 +24,7 @@ PetscErrorCode SbFacesDestroy(SbFaces *faces);
 /* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
 PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
 
-/* ------------------------------------------------------------------ check.c, quality.c */
+/* check.c, quality.c */
 
 /* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and nlost. */
 PetscErrorCode SbImportDropUnused(SbImport *import);

@@ -14,8 +14,6 @@
 #include <ctype.h>
 #include "formula.h"
 
-/* ------------------------------------------------------------------ functions */
-
 static PetscReal step_of(PetscReal a)
 {
   return a < 0 ? 0 : 1;
@@ -47,8 +45,7 @@ static const struct {
 };
 static const char *const variables[] = {"t", "x", "y", "z"};
 
-/* ------------------------------------------------------------------ compiler */
-
+/* The compiler: a text, and the position in it. */
 typedef struct {
   const char *text;  /* the complete formula */
   const char *next;  /* first unread character */
@@ -209,8 +206,6 @@ static PetscErrorCode expression(Parser *p)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ operations */
 
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {

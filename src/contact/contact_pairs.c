@@ -46,8 +46,6 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
   return g->d;
 }
 
-/* ------------------------------------------------------------------ search */
-
 #define MARGIN 0.1 /* of the mean edge: least growth of the boxes */
 #define CROWD 200  /* a motion with more pairs than CROWD (number of vertices + CROWD_LEAST) is halved */
 #define CROWD_LEAST 1000
@@ -305,8 +303,6 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
   PetscCall(find_pairs(p, x0, x1, PETSC_MAX_INT, &full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ safe part of a motion */
 
 /* The first time in (0, 1] at which a t^2 + b t + c, positive at 0, is zero; 1 + : none. */
 static PetscReal first_root(PetscReal a, PetscReal b, PetscReal c)

@@ -41,8 +41,6 @@
 #define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST 1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
-/* ------------------------------------------------------------------ set-up */
-
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 {
   Barrier *b = (Barrier *)e->data;
@@ -98,8 +96,6 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   b->shortest = b->stiffer = b->scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ a step */
 
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
 static void find_path(Barrier *b, PetscReal t, PetscReal dt)

@@ -10,8 +10,6 @@
 */
 #include "barrier_impl.h"
 
-/* ------------------------------------------------------------------ where things are */
-
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress, PetscReal x[])
 {
   const PetscInt first = 3 * b->mesh->nbody_vertex;
@@ -65,8 +63,6 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   if (b->nactive > 1) PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ forces */
 
 PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3])
 {
@@ -317,8 +313,6 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ lagged friction */
 
 /* Displacement in the step of the obstacle's contact point by rotation, beyond that of its vertices. */
 static void find_rotation(const Barrier *b, PetscBool end, const Active *a, FrictionPair *friction)

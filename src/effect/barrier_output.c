@@ -5,8 +5,7 @@
 
 #define PAIRS 200 /* most pairs of bodies with columns */
 
-/* ------------------------------------------------------------------ columns for each pair of bodies */
-
+/* Columns for each pair of bodies. */
 static const char *const apart_names[] = {"force_x", "force_y", "force_z", "contacts"};
 static const char *const self_names[] = {"normal_force", "contacts"};
 #define APART 4 /* columns of two bodies */
@@ -49,8 +48,6 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, PetscBool self, SbPairs *p)
   e->ncolumn = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ output */
 
 /* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss so far. */
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],

@@ -137,8 +137,6 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ restitution */
-
 /* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
 static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)

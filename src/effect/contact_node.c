@@ -37,8 +37,6 @@
 #define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
 #define SETTLED 1e-4 /* tolerance of spring forces, over the largest contact force */
 
-/* ------------------------------------------------------------------ the obstacle */
-
 PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c)
 {
   char option[3 * SB_NAME_MAX], note[192] = "";
@@ -79,8 +77,6 @@ static PetscReal gap_at(const Contact *c, const SbPose *pose, const PetscReal x[
   for (int i = 0; i < 3; i++) n[i] = SbDot3(pose->R + 3 * i, N);
   return gap;
 }
-
-/* ------------------------------------------------------------------ set-up */
 
 /* Adds a facet's share of area and stiffness to one of its nodes; slot[]: its index, -1: none yet. */
 static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
@@ -144,8 +140,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ who touches */
-
+/* Position of a node. */
 static void place(SbSpace space, PetscInt node, const PetscReal u[], PetscReal x[3])
 {
   for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
@@ -444,8 +439,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ velocities at the obstacle */
-
+/* Velocities at the obstacle after a step: rebound. */
 static PetscErrorCode restitution_contact(SbEffect e, PetscReal *work)
 {
   const Contact *c = (const Contact *)e->data;
@@ -496,8 +490,6 @@ static PetscErrorCode target_contact(SbEffect e, SbSpace space, const SbStage *s
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ forces */
 
 /*
   Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps
@@ -550,8 +542,6 @@ static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ after a step */
 
 /* Rotates the deflection of a node's springs with the obstacle. */
 static void rotate_stretch(const SbPose *pose, Touch *touch)
@@ -674,8 +664,6 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
   if (!space->rank && deepest > TOLERANCE * c->size) values[7] = deepest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ checkpoints */
 
 /*
   A record has the node's original number, whether it is and was active, right-hand side and normal of its

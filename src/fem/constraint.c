@@ -60,8 +60,6 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ constraints */
-
 void SbSpaceClearConstraints(SbSpace s)
 {
   SbConstraints c = s->constraints;
@@ -196,8 +194,6 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ displacements, residuals, velocities */
-
 void SbConstraintsProject(SbSpace s, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
@@ -269,8 +265,6 @@ void SbConstraintsResidual(SbSpace s, const PetscReal u[], PetscBool constrain, 
   if (constrain) SbConstraintsProject(s, f);
 }
 
-/* ------------------------------------------------------------------ forces */
-
 void SbConstraintsComputeForces(SbSpace s, const PetscReal u[], const PetscReal r[])
 {
   const SbConstraints c = s->constraints;
@@ -322,8 +316,6 @@ void SbConstraintsReactions(SbSpace s, PetscReal r[])
     }
   }
 }
-
-/* ------------------------------------------------------------------ matrices */
 
 /* Size of a diagonal block. */
 static inline PetscReal block_size(const PetscScalar v[], size_t rs, size_t cs)

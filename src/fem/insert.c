@@ -72,8 +72,6 @@ SB_INLINE void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npa
   }
 }
 
-/* ------------------------------------------------------------------ four lanes at a time */
-
 /* Index in the block of entry e of the transposed block. */
 static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
 

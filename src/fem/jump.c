@@ -509,8 +509,6 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
   return energy;
 }
 
-/* ------------------------------------------------------------------ the matrix of the face terms */
-
 PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
 {
   *node = s->jump->node;

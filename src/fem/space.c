@@ -301,8 +301,6 @@ PetscReal SbSpaceCurvedIntegrals(SbSpace s, PetscInt cell, const SbFacet *facet,
   return sum;
 }
 
-/* ------------------------------------------------------------------ sets */
-
 PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, PetscInt *k)
 {
   const char *names[SB_SET_MAX];

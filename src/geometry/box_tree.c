@@ -14,8 +14,6 @@
 
 #define WORSE 1.5 /* largest growth of hulls relative to boxes since the last build, before a rebuild */
 
-/* ------------------------------------------------------------------ construction */
-
 typedef struct {
   PetscReal middle[3];
   PetscInt box;
@@ -189,8 +187,6 @@ PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree)
   PetscCall(PetscMemzero(tree, sizeof(*tree)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ traversals */
 
 /* Bit l is set if child l of the group overlaps the box. */
 static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[6])

@@ -162,8 +162,6 @@ void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *s)
   }
 }
 
-/* ------------------------------------------------------------------ derivatives */
-
 /* c_a of the file header. */
 static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscReal c[4][3])
 {

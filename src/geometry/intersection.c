@@ -51,8 +51,6 @@ static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[
   return orient_long(a, b, c, d);
 }
 
-/* ------------------------------------------------------------------ coplanar */
-
 /* The two coordinates in which the projected area of the triangle is largest. */
 static void axes_of(PetscReal const *const t[3], int axis[2])
 {
@@ -115,8 +113,6 @@ static PetscBool meet_in_plane(const PetscReal p[3], const PetscReal q[3], Petsc
   for (int k = 0; k < 3; k++) side[k] = orient_plane(axis, t[k], t[(k + 1) % 3], p);
   return (PetscBool)(side[0] && side[0] == side[1] && side[1] == side[2]);
 }
-
-/* ------------------------------------------------------------------ three dimensions */
 
 PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3])
 {

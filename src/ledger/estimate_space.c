@@ -82,8 +82,6 @@ typedef struct SbPointStress {
   PetscReal P[4][9], pressure;
 } SbPointStress;
 
-/* ------------------------------------------------------------------ recovery */
-
 typedef struct _p_SbRecovery *SbRecovery;
 struct _p_SbRecovery {
   SbMesh mesh;              /* borrowed */
@@ -330,8 +328,6 @@ static PetscReal recovered(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
   memcpy(P, value, 9 * sizeof(*P));
   return value[9];
 }
-
-/* ------------------------------------------------------------------ energies */
 
 /* Sums over a body. Energies in J. */
 typedef enum {

@@ -73,8 +73,6 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ after the solve of a step */
-
 static void begin(SbLedger l)
 {
   (void)PetscLogEventBegin(l->event, 0, 0, 0, 0);
@@ -127,8 +125,7 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ after an accepted step */
-
+/* After an accepted step. */
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbLedger l = (SbLedger)ctx;
@@ -206,8 +203,6 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
   end(l);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ beginning and end */
 
 /* Lists the accumulated errors for checkpoints. */
 static PetscErrorCode carry(SbLedger l)

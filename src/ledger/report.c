@@ -54,8 +54,6 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ advice */
-
 /* Root of the sum of squares: errors of different sources are independent. */
 static PetscReal together(SbLedger l)
 {
@@ -252,8 +250,6 @@ static void report_accuracy(SbLedger l, char w[ROOM])
                (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)), (double)h);
   }
 }
-
-/* ------------------------------------------------------------------ table */
 
 /* A line of the printed table: error < 0, quantity NULL, seconds < 0: none. */
 static PetscErrorCode print_line(SbLedger l, const Seconds *s, const char *name, PetscReal error,

@@ -20,7 +20,7 @@ static inline uint64_t SbMix(PetscInt i)
 /* memory_mesh.c: imports the body's mesh in memory. */
 PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
-/* ------------------------------------------------------------------ check.c, quality.c, sets.c */
+/* check.c, quality.c, sets.c */
 
 /* Largest absolute coordinate, m. */
 PetscReal SbImportLargest(const SbImport *import);
@@ -83,7 +83,7 @@ void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);
 
-/* ------------------------------------------------------------------ route.c: see sbmesh.h */
+/* route.c: see sbmesh.h */
 
 /* A growing list of items that go to other ranks, zeroed at first; free both arrays. */
 typedef struct {
@@ -97,7 +97,7 @@ PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answe
 /* Rank that sent the received record i. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
-/* --------------------------------------- merge.c, partition.c, distribute.c, order.c, number.c */
+/* merge.c, partition.c, distribute.c, order.c, number.c */
 
 /* Data sent with a vertex and with a cell. */
 typedef struct {

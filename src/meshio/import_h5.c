@@ -37,8 +37,6 @@ typedef struct {
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: %s", (f)->im->where, sb_text); \
   } while (0)
 
-/* ------------------------------------------------------------------ the file */
-
 /* Full path of an object in the mesh of the wanted step. */
 static void path_of(const File *f, const char *name, char path[256])
 {
@@ -55,8 +53,6 @@ static PetscBool is_there(const File *f, const char *name)
   path_of(f, name, path);
   return (PetscBool)(H5Lexists(f->file, path, H5P_DEFAULT) > 0);
 }
-
-/* ------------------------------------------------------------------ arrays */
 
 /* Expected type and shape of an array, then the actual ones. */
 typedef struct {
@@ -232,8 +228,7 @@ static PetscErrorCode read_curved(const File *f, int layout)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ groups of a mesh file */
-
+/* Groups of a mesh file. */
 static PetscErrorCode read_own(const File *f)
 {
   PetscInt nset, *map = NULL, *set, ngroup = -1, nmember = -1, nstart = -1, *group = NULL, *member, *start,
@@ -281,8 +276,7 @@ static PetscErrorCode read_own(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ output of a run */
-
+/* Counts the frames of a run. */
 static herr_t visit_frame(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   SbH5Frames *s = (SbH5Frames *)ctx;
@@ -462,8 +456,6 @@ static PetscErrorCode read_output(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the mesh */
-
 /* Lists the contents of the file, for an error message. */
 static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
@@ -581,8 +573,6 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   if (set >= 0) (void)H5Dclose(set);
   (void)H5Fclose(file);
 }
-
-/* ------------------------------------------------------------------ .xmf */
 
 /* Reads the .h5 file to which the first array of an .xmf refers, relative to the folder of the .xmf. */
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *im)

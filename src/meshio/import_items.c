@@ -9,8 +9,6 @@
 
 #define STRAIGHT 1e-6 /* offset of the node of a straight edge over its length, at most */
 
-/* ------------------------------------------------------------------ arrays of readers */
-
 /* Header before each scratch array. */
 struct _p_SbScratch {
   struct _p_SbScratch *next, *before;
@@ -60,8 +58,6 @@ PetscErrorCode SbImportForget(SbImport *im)
   im->nmember = (SbCount){0, 0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ vertices and simplices */
 
 PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
 {
@@ -180,8 +176,6 @@ void SbImportDropVertices(SbImport *im, PetscInt keep[])
     im->item[d].n = kept;
   }
 }
-
-/* ------------------------------------------------------------------ edge nodes */
 
 PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
 {
@@ -307,8 +301,6 @@ void SbImportNoteMiddles(SbImport *im, PetscInt n, PetscReal largest)
                    "edges with their node off the middle: %lld, by %.2g of their length at most",
                    (long long)n, (double)largest);
 }
-
-/* ------------------------------------------------------------------ groups */
 
 /* Hash slot of a group, or the free slot for it. */
 static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)

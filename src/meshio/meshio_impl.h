@@ -29,8 +29,7 @@ PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
 /* Reads block k of n of all arrays of an .h5 mesh. */
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
 
-/* ------------------------------------------------------------------ gmsh's element types */
-
+/* gmsh's element types */
 typedef struct {
   const char *name; /* "4-node tetrahedra" */
   int dim, nnode;
@@ -64,8 +63,7 @@ static inline int SbGmshNode(int k)
 /* Adds the edge nodes of a 10-node tet, vert[10] in gmsh's order; -1: the edge has none. */
 PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[]);
 
-/* ------------------------------------------------------------------ deck.c: nodes and elements by labels */
-
+/* deck.c: nodes and elements by labels */
 typedef struct {
   int64_t label;
   PetscReal x[3];
@@ -120,8 +118,7 @@ PetscErrorCode SbDeckBuild(SbDeck *deck);
 /* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
-/* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: one file */
-
+/* write_gmsh.c, write_h5.c: one file */
 extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);

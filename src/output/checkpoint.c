@@ -15,8 +15,6 @@
 
 #define FORMAT 1
 
-/* ------------------------------------------------------------------ what of a run is in the file */
-
 /* An array of the state. Those with a checksum of their own may be missing in a file. */
 typedef struct {
   const char *name, *unit, *sum; /* sum: name of its own checksum; NULL: part of the file's */
@@ -94,8 +92,7 @@ static PetscErrorCode checksum_of(const Part *p, const PetscReal slice[], uint64
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ writing */
-
+/* Writes the parts of a checkpoint. */
 static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *checksum)
 {
   Part part[NPART];
@@ -213,8 +210,6 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   if (asked || run->stop.listens) PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ reading */
 
 /* Refuses a checkpoint of other bodies, meshes or effects. */
 static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash)

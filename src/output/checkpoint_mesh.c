@@ -92,8 +92,6 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ reading; one rank */
-
 /* The mesh of a body in an open file; NULL when it has none. */
 static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
 {

@@ -37,8 +37,6 @@ static const struct {
 };
 #define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
 
-/* ------------------------------------------------------------------ to the ranks that write them */
-
 static int by_keys(const void *a, const void *b)
 {
   const SbContactPoint *p = (const SbContactPoint *)a, *q = (const SbContactPoint *)b;
@@ -87,8 +85,6 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ files */
 
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 {
@@ -161,8 +157,6 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
   PetscCall(SbIndexAdd(out->contact_index, time, group, n, NTABLE - 1, values + 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ life */
 
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
 {

@@ -14,8 +14,6 @@
 #include <stddef.h>
 #include "output_impl.h"
 
-/* ------------------------------------------------------------------ per vertex */
-
 /* A vector of the step. */
 static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
@@ -66,8 +64,6 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
   PetscCall(VecDestroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ per cell */
 
 /* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else one. */
 static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step, const PetscReal **array)
@@ -143,8 +139,6 @@ static PetscErrorCode number(const SbField *f, SbRun run, const SbStep *step, Pe
     values[c] = (PetscReal)(body ? run->model->mesh->cell_body[c] : ((SbOutput)run->output)->rank);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the table */
 
 #define VERTEX PETSC_FALSE
 #define CELL PETSC_TRUE

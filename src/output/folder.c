@@ -123,8 +123,7 @@ void SbFolderUnlock(SbOutput out)
   out->lock = -1;
 }
 
-/* ------------------------------------------------------------------ checkpoints in it */
-
+/* Checkpoints in the folder. */
 static int is_checkpoint(const struct dirent *entry)
 {
   int end = 0;
@@ -194,8 +193,6 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ all of it */
 
 /* Moves an earlier run's results into a subfolder named by its end time. */
 static PetscErrorCode keep_earlier(SbOutput out)

@@ -35,8 +35,6 @@ struct _p_SbFrames {
   PetscReal *owned, *slice; /* work: three numbers per point, or those of a field per cell or tet */
 };
 
-/* ------------------------------------------------------------------ the mesh */
-
 /* Writes values of points or cells, from fr->owned: each of a cell's tets gets the cell's values. */
 static PetscErrorCode put(SbOutput out, hid_t where, const char *name, const char *unit, PetscBool cell,
                           PetscInt ncomp, hid_t type)
@@ -239,8 +237,6 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ a frame */
-
 static SbIndexValues values_of(const SbField *f, PetscInt bytes)
 {
   return (SbIndexValues){f->name, (int)f->ncomp, (int)bytes, PETSC_FALSE, f->cell};
@@ -348,8 +344,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ restart */
-
+/* After a restart. */
 typedef struct {
   PetscInt n, size, nhundred;
   SbFrame *frame; /* [n] */
@@ -494,8 +489,6 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
     out->quadratic ? "true" : "false", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ life */
 
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {

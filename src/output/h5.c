@@ -167,8 +167,6 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ groups */
-
 hid_t SbH5OpenGroup(hid_t where, const char *name)
 {
   return H5Lexists(where, name, H5P_DEFAULT) > 0 ? H5Gopen2(where, name, H5P_DEFAULT) : -1;
@@ -196,8 +194,6 @@ PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *nam
   H5_CALL(h, H5Olink(group, parent, name, H5P_DEFAULT, H5P_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ datasets */
 
 /* Selects this rank's rows in the file; the memory holds just them. */
 static void select_slice(const SbOrder *order, PetscInt ncomp, hid_t *filespace, hid_t *memspace)
@@ -321,8 +317,7 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ attributes */
-
+/* Attributes. */
 static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype, hid_t memtype,
                           const void *value)
 {
@@ -387,8 +382,6 @@ void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
 {
   if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value)) *ok = PETSC_FALSE;
 }
-
-/* ------------------------------------------------------------------ texts */
 
 PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text)
 {

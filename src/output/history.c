@@ -73,8 +73,6 @@ static const struct {
                                 {"momentum_y", "kg m/s"}, {"momentum_z", "kg m/s"}, {"centre_x", "m"},
                                 {"centre_y", "m"},        {"centre_z", "m"}};
 
-/* ------------------------------------------------------------------ text */
-
 /* The unit of a column of an effect, by its name. */
 static const char *unit_of(const char *column)
 {
@@ -144,8 +142,7 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ values */
-
+/* Values of the columns of effects. */
 static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *values)
 {
   SbModel model = run->model;
@@ -250,8 +247,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ beginning, and after a restart */
-
+/* Opens the file, at the beginning and after a restart. */
 static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE_MAX])
 {
   SbHistory h = out->hist;

@@ -65,8 +65,6 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ options */
-
 static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
   PetscInt precision, nname;
@@ -156,8 +154,6 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ scenario.opts */
-
 /* The lines of the complete scenario that determine the mechanics, on which a checkpoint must agree. */
 static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 {
@@ -183,8 +179,6 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ life of the output */
 
 static PetscErrorCode destroy(SbRun run)
 {

@@ -39,8 +39,7 @@ PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscRe
 PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscReal slice[],
                               PetscReal owned[]);
 
-/* ------------------------------------------------------------------ HDF5 and files */
-
+/* HDF5 and files */
 typedef struct {
   MPI_Comm comm;
   hid_t file;       /* negative when closed */
@@ -96,7 +95,7 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
 /* The whole file; NULL when it cannot be read. One rank. PetscFree. */
 PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
-/* ------------------------------------------------------------------ state */
+/* state */
 
 /* A weighted sum over nodes or tets of this rank. */
 typedef struct {

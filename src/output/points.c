@@ -13,8 +13,6 @@
 */
 #include "output_impl.h"
 
-/* ------------------------------------------------------------------ set-up */
-
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
 {
   const SbSpace s = run->model->space;
@@ -54,8 +52,6 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ places */
-
 SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)
 {
   const SbMesh mesh = run->model->mesh;
@@ -75,8 +71,6 @@ const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt i)
 
   return p.node < 0 ? run->model->mesh->x + 3 * p.vertex : run->model->space->node_x + 3 * p.node;
 }
-
-/* ------------------------------------------------------------------ values */
 
 /* The cell's value of x at its corner; corner = 4 cell + a. */
 static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscReal value[3])
@@ -142,8 +136,6 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   PetscCall(SbSpaceRestoreLocalRead(s, x, &array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ forces */
 
 /* Forces at nodes: r itself, or its prescribed components only. */
 typedef struct {

@@ -98,8 +98,6 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ columns */
-
 PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[])
 {
   static const char *const tensor[] = {"xx", "xy", "xz", "yy", "yz", "zz"}, *const axis[] = {"x", "y", "z"};
@@ -114,8 +112,6 @@ PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c
       PetscSNPrintf(name, size, "%s_%s_%s", probe->name, f->name, f->ncomp == 3 ? axis[c] : tensor[c]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ where they are */
 
 /* Numbers of nodes at edges, SbSpace.node_orig, begin here. */
 static PetscInt first_edge(const SbSpace s)
@@ -348,8 +344,6 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ values */
-
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[])
 {
   const SbSpace s = run->model->space;
@@ -394,8 +388,6 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
     if (vector[i]) PetscCall(SbSpaceRestoreLocalRead(s, vector[i], &x[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ in checkpoints */
 
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
 {

@@ -36,8 +36,6 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ before the run */
-
 /*
   "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the
   largest of them, kg. Copies are alike in all that the tables say but the mass, as they may differ in scale.
@@ -206,8 +204,6 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
                         (double)(event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ after the run */
 
 static void size_text(PetscReal bytes, size_t size, char text[])
 {

@@ -78,8 +78,7 @@ static PetscInt old_slot(const Work *w, PetscInt slot)
   return SbFacesFind(&w->faces, vert, slots) == 1 ? slots[0] : -1;
 }
 
-/* ------------------------------------------------------------------ the mesh */
-
+/* Makes the new mesh. */
 static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
 {
   const SbGathered *g = w->g;
@@ -155,8 +154,7 @@ static PetscInt list_triangles(const Work *w, SbMemoryMesh *in_memory)
   return n;
 }
 
-/* ------------------------------------------------------------------ the values */
-
+/* A value of an old cell. */
 static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
 {
   return w->g->value + ((size_t)(w->cell0 + cell) * (size_t)w->g->width + (size_t)k) * (size_t)w->each;
@@ -235,8 +233,6 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
   }
 }
 
-/* ------------------------------------------------------------------ renumbering of nodes */
-
 /* Adds a renumbered node; the arrays hold two nodes per corner of the surfaces of all bodies. */
 static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
 {
@@ -273,8 +269,6 @@ static PetscErrorCode rename_surface(const Work *w, const SbGathered *next, SbRe
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ all bodies */
 
 /* Mesh, values and renumbered nodes of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)

@@ -36,8 +36,6 @@ typedef struct {
   SbKey *curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
 } Material;
 
-/* ------------------------------------------------------------------ the hull */
-
 /* Whether face f of tet c belongs to the hull; each triangle once. */
 static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], PetscInt c, int f)
 {
@@ -46,8 +44,7 @@ static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], Petsc
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
 }
 
-/* ------------------------------------------------------------------ material points of new vertices */
-
+/* Material points of new vertices. */
 static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const PetscReal w[4],
                 PetscReal value[3])
 {
@@ -133,8 +130,6 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
   PetscCall(SbLocatorDestroy(&now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ repair of inverted and flat tets */
 
 /* Quality of a tet at rest; for a curved one the worse of this and its least relative Jacobian. */
 static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
@@ -357,8 +352,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ re-meshing of a body */
-
+/* Re-meshing of a body. */
 static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
                              Material *at, SbNewMesh *m)
 {

@@ -69,8 +69,6 @@ PetscErrorCode SbRemeshRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ options */
-
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
   PetscBool named = PETSC_FALSE, any = PETSC_FALSE, given;
@@ -179,8 +177,7 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ when, and which bodies */
-
+/* Decides when a re-meshing is due, and of which bodies. */
 static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
                                     PetscBool *pause)
 {
@@ -259,8 +256,6 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the new scene */
 
 /* A scene: model, run and ledger. */
 typedef struct {

@@ -31,8 +31,7 @@ typedef struct {
   PetscInt n, *from, *to;
 } SbRenamed;
 
-/* ---------------------------------------------- body.c: new mesh of one body, on rank 0; not collective */
-
+/* body.c: new mesh of one body, on rank 0; not collective */
 typedef struct {
   SbMesher mesher;
   void *ctx;

@@ -63,8 +63,6 @@ PetscErrorCode SbSceneRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ bodies */
-
 /* Reads a word that must be a name in a list of types. */
 static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunctionList list,
                                 char word[SB_NAME_MAX])
@@ -211,8 +209,6 @@ static PetscErrorCode read_bodies(SbModel model)
   PetscCall(PetscFree(names));
   PetscFunctionReturn(ierr);
 }
-
-/* ------------------------------------------------------------------ scene */
 
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 {

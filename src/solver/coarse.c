@@ -66,8 +66,6 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ units */
-
 /* c += Z_i^T f for one node: force and torque. */
 SB_INLINE void add_moments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])
 {
@@ -253,8 +251,6 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the pattern of E */
-
 PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
 {
   const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
@@ -369,8 +365,6 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   PetscCall(VecDuplicate(c->s, &c->w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ application */
 
 PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 {

@@ -86,7 +86,7 @@ PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 /* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not collective. */
 PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
 
-/* ------------------------------------------------------------------ bodies in contact (pc_coarse.c) */
+/* bodies in contact (pc_coarse.c) */
 
 /* Own rows of a symmetric matrix of 3x3 blocks on the nodes of a space. */
 typedef struct {

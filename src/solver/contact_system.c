@@ -128,8 +128,6 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the matrix */
-
 /* Creates a pattern that contains the blocks, and marks nodes in contact. */
 static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
@@ -258,8 +256,6 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
   PetscCall(MatAssemblyEnd(c->A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ solutions */
 
 /* Creates PETSc's matrix, and CG or the user's method. */
 static PetscErrorCode set_up_iteration(SbContactSystem c)

@@ -155,8 +155,6 @@ PetscReal SbFactorFlops(SbFactor f)
   return sum;
 }
 
-/* ------------------------------------------------------------------ numeric factorisation */
-
 /* Work space of a factorisation. */
 typedef struct {
   PetscInt *position, *kept; /* [n] index of a position in the current front, among the kept nodes */
@@ -300,8 +298,6 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   PetscCall(PetscFree(work.update));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ solves */
 
 SB_KERNEL void SbFactorForward(SbFactor f, const float b[], float kept[])
 {

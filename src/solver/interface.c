@@ -144,8 +144,6 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ factorisation */
-
 /* First column of block k of n columns; returns its width. */
 static inline PetscInt block_of(PetscInt n, PetscInt k, PetscInt *first)
 {
@@ -267,8 +265,6 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
   PetscCall(PetscFree2(load, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ solves */
 
 /* x += W_r^T W_r sum */
 SB_KERNEL static void multiply_rows(SbInterface f, float *x)

@@ -100,8 +100,6 @@ typedef struct {
   Vec p;              /* last step of Chebyshev's iteration */
 } TwoLevel;
 
-/* ------------------------------------------------------------------ set-up */
-
 /* The incomplete Cholesky factorisation of this rank's diagonal block, or its replacement. */
 static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
 {
@@ -250,8 +248,6 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ application */
-
 /* One Chebyshev step: p = factor p + other D^-1 (r - t), z = z + p; t NULL: first step, z = 0. */
 static PetscErrorCode advance(TwoLevel *p, PetscReal factor, PetscReal other, Vec R, Vec T, Vec Z)
 {
@@ -388,8 +384,6 @@ static PetscErrorCode PCPostSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
   if (p->rows && reason > 0) PetscCall(SbCoarseCorrect(p->coarse, A, b, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
 {

@@ -28,8 +28,6 @@
 */
 #define WEAK 0.
 
-/* ------------------------------------------------------------------ spaces */
-
 /* Prescribes in `to` the components prescribed in `from`: at the same node, or all vertices of the face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
@@ -78,8 +76,6 @@ static PetscErrorCode add_level(SbLevels v, PetscBool p1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ transfer between levels */
-
 /* DG: the CR node of each DG node, its node on the other side of the face, and the weights of both. */
 static PetscErrorCode find_means(SbLevels v)
 {
@@ -111,8 +107,7 @@ static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscRea
   return s->fixed[i] & (1 << c) ? 0. : x;
 }
 
-/* ------------------------------------------------------------------ the cycle for CR */
-
+/* The cycle for CR. */
 static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
@@ -152,8 +147,6 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   PetscCall(SbGaussSeidelUp(A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ DG */
 
 PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 {
@@ -205,8 +198,6 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ springs */
-
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
   const SbSpace top = v->space;
@@ -252,8 +243,6 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ assembly, create and destroy */
 
 PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {

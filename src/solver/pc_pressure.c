@@ -51,8 +51,7 @@ typedef struct {
   PetscInt its, limit, slow; /* iterations of GMRES, their limit; corrections without effect */
 } Pressure;
 
-/* ------------------------------------------------------------------ the mixed system */
-
+/* Product with the mixed system. */
 static PetscErrorCode MatMult_Mixed(Mat M, Vec X, Vec Y)
 {
   const PetscScalar *x;
@@ -100,8 +99,6 @@ static PetscErrorCode PCApply_Mixed(PC pc, Vec R, Vec Z)
   PetscCall(VecRestoreArray(Z, &z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ set-up and application */
 
 static PetscErrorCode PCSetUp_Pressure(PC pc)
 {
@@ -193,8 +190,6 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the outer solver */
-
 /* PETSc's test; then whether the residual is one of rounding or stagnates. */
 static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConvergedReason *reason, void *ctx)
 {
@@ -263,8 +258,6 @@ static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   ksp->its = s->its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Pressure(PC pc, PetscViewer viewer)
 {

@@ -16,8 +16,6 @@
 #define PRESSURE_OPERATOR "SbPressureOperator"
 #define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
 
-/* ------------------------------------------------------------------ B and its transpose */
-
 static void clear_fixed(SbSpace s, PetscReal x[])
 {
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
@@ -155,8 +153,6 @@ PetscErrorCode SbPressureOperatorRounding(SbPressureOperator op, Vec X, PetscRea
   PetscCall(VecDestroy(&Y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the matrix */
 
 static PetscErrorCode MatMult_Pressure(Mat K, Vec X, Vec Y)
 {

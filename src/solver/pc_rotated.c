@@ -47,8 +47,6 @@ typedef struct {
   PetscBool renew; /* the next set-up has to factor */
 } Rotated;
 
-/* ------------------------------------------------------------------ set-up, once */
-
 /* Numbers the nodes of the factor and finds the graph of its rows. */
 static PetscErrorCode number_nodes(Rotated *p)
 {
@@ -87,8 +85,7 @@ static PetscErrorCode number_nodes(Rotated *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ set-up for a new operator */
-
+/* Set-up for a new operator. */
 static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 {
   SbSpace s = p->space;
@@ -211,8 +208,6 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ application */
-
 /* y = Q^T x or Q x of one node. */
 SB_INLINE void turn_back(const float Q[9], const float x[3], float y[3])
 {
@@ -324,8 +319,6 @@ static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
     p->renew = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 {

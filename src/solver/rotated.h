@@ -7,7 +7,7 @@
 #include "sbsolver.h"
 #include "factor.h"
 
-/* ------------------------------------------------------------------ interface between ranks */
+/* interface between ranks */
 
 /* The interface nodes, and W of their inverse Schur complement W^T W, distributed by rows (interface.c). */
 typedef struct _p_SbInterface *SbInterface;
@@ -39,7 +39,7 @@ PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
 PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
 
-/* ------------------------------------------------------------------ nodes solved exactly */
+/* nodes solved exactly */
 
 /*
   Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the node

@@ -63,8 +63,6 @@ typedef struct {
   Surface *surfaces;
 } Arrangement;
 
-/* ------------------------------------------------------------------ orientation */
-
 /* Orients the triangles of each set connected by manifold edges consistently: the minority is reversed. */
 static PetscErrorCode orient_alike(Arrangement *s)
 {
@@ -123,8 +121,7 @@ static PetscErrorCode orient_alike(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ shells */
-
+/* Orders spokes by their angle. */
 static int compare_spokes(const void *a, const void *b)
 {
   const Spoke *p = (const Spoke *)a, *q = (const Spoke *)b;
@@ -222,8 +219,6 @@ static PetscErrorCode find_shells(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ nesting */
-
 /* Smallest positive shell around a point, but for those of the surface `except`; OUTSIDE if there is none. */
 static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
@@ -274,8 +269,6 @@ static void empty_cavities(Arrangement *s)
     }
   }
 }
-
-/* ------------------------------------------------------------------ output */
 
 /* Groups that all triangles of a shell have in common: group[n], n at most 16. */
 static void groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])

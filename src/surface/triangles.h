@@ -68,7 +68,7 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path);
 /* Reads a file of a known format. */
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
-/* ------------------------------------------------------------------ triangles_measure.c */
+/* triangles_measure.c */
 
 /* Corner k of triangle f has the slot 3 f + k, as its edge to the next corner, whose slot this is. */
 static inline PetscInt SbSlotNext(PetscInt slot)

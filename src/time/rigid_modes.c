@@ -20,8 +20,6 @@
 #define FREE 1e-13    /* largest l of a free motion: sums over the nodes have rounding of 1e-15 */
 #define FAR 1e6       /* displacement over the body's size beyond which a static system was singular */
 
-/* ------------------------------------------------------------------ connected parts */
-
 /* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees it. */
 static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 {
@@ -76,8 +74,6 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   PetscCall(PetscFree2(parent, lowest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ rigid motions */
 
 /* A part of a body and its free motions. */
 typedef struct {
@@ -245,8 +241,6 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   PetscCall(VecDestroyVecs(6, &z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ message */
 
 /* e: the direction of v with its largest component positive, small ones zero. */
 static void direction(const PetscReal v[3], PetscReal e[3])

@@ -46,8 +46,6 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt)
                      dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
 }
 
-/* ------------------------------------------------------------------ requests to stop */
-
 static double seconds(void)
 {
   struct timespec now;
@@ -111,8 +109,6 @@ PetscErrorCode SbRunReadStop(SbRun run)
              text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ decisions */
 
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
 {

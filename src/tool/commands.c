@@ -3,8 +3,6 @@
 */
 #include "tool.h"
 
-/* ------------------------------------------------------------------ the commands */
-
 static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 {
   char phase[PETSC_MAX_PATH_LEN + 16];
@@ -66,8 +64,6 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the table */
 
 const SbToolCommand SbToolCommands[] = {
   {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1, SbToolInfo},

@@ -21,8 +21,6 @@
 #define FACTOR 4096.   /* memory of a factorisation per unknown, bytes */
 #define FACTORED 60000 /* largest number of unknowns that -solver auto factorises in a dynamic run */
 
-/* ------------------------------------------------------------------ parts of the report */
-
 static PetscErrorCode groups(const SbImport *mesh)
 {
   static const char *const title[4] = {"points", "curves", "surfaces", "regions"};

@@ -71,8 +71,6 @@ PetscErrorCode SbToolHelp(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ words */
-
 static const SbOption *find_row(const char *key)
 {
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
@@ -122,8 +120,6 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ checks */
-
 static PetscErrorCode check_option(const char *name, const char *command)
 {
   const SbOption *row = find_row(name);
@@ -144,8 +140,6 @@ static PetscErrorCode check_option(const char *name, const char *command)
              "-%s does nothing in supple-mesh %s; it is for %s", name, command, reader);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ values */
 
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
 {
