@@ -184,10 +184,8 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  PETSc separates names and values only for options that have not been read. Those read are returned as one
-  string: names are recognised because they have been read, and a value extends to the next name.
-*/
+/* PETSc separates names and values only for options that have not been read. Those read are returned as one
+   string: names are recognised because they have been read, and a value extends to the next name. */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
   PetscInt nleft, at = -1;

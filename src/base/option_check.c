@@ -54,11 +54,9 @@ static const char *const common[] = {
   "-snes_ksp_ew",      "-snes_lag_jacobian", "-snes_linesearch_type",
 };
 
-/*
-  Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a program-wide key,
-  as -history_every; its first word as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" if it
-  is not of supple.
-*/
+/* Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a program-wide
+   key, as -history_every; its first word as -solver_type or -time_budget (-contact_ksp_type is PETSc's). ""
+   if it is not of supple. */
 static void guess(const char *name, size_t size, char text[])
 {
   const size_t n = strcspn(name, "_"); /* length of its first word, perhaps the whole name */

@@ -33,10 +33,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   b[2] = k * area / w * (-2. * PetscLogReal(s) - 2. * (s - 1.) / s - (s * s - 1.) / (s * s));
 }
 
-/*
-  The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f =
-  (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1.
-*/
+/* The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f =
+   (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1. */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
   const PetscReal square = d * (d + 2. * r), near = NEAR * PetscSqrtReal(rest) * square,

@@ -180,10 +180,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  The triangles of all ranks, in the order of numbers that no partition changes: a facet is one, with P2 four.
-  Corners go by the number of the vertex, or, in the middle of a side, by that of its node.
-*/
+/* The triangles of all ranks, in the order of numbers that no partition changes: a facet is one, with P2
+   four. Corners go by the number of the vertex, or, in the middle of a side, by that of its node. */
 static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
 {
   static const int part[5][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}, {0, 1, 2}};

@@ -111,10 +111,8 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
   }
 }
 
-/*
-  The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where
-  surfaces face each other. n: from the second side to the first; false: none.
-*/
+/* The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where
+   surfaces face each other. n: from the second side to the first; false: none. */
 static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[], PetscReal n[3])
 {
   const PetscReal *x[4];
@@ -172,10 +170,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local
-  displacements, changed. Every rank treats its own pairs; displacements of vertices are summed over all.
-*/
+/* Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local
+   displacements, changed. Every rank treats its own pairs; displacements of vertices are summed over all. */
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
@@ -246,11 +242,9 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces
-  at the start or the end, and of friction. Forces rotate with the obstacle, so the barrier's are integrated
-  along the arc: moment times angle.
-*/
+/* Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces
+   at the start or the end, and of friction. Forces rotate with the obstacle, so the barrier's are integrated
+   along the arc: moment times angle. */
 static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *slip_work)
 {
   const SbContactMesh m = b->mesh;

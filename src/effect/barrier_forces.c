@@ -121,10 +121,8 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
   }
 }
 
-/*
-  An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order: (K
-  + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not matter here.
-*/
+/* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order:
+   (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not matter here. */
 PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
                                          PetscReal *bound)
 {
@@ -269,11 +267,10 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
   }
 
-  /*
-    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has
-    f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking: a
-    spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
-  */
+  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has
+     f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking:
+     a spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it
+     slides. */
   for (PetscInt i = 0; i < b->friction.n; i++) {
     FrictionPair *friction = &b->friction.pair[i];
     PetscReal T[9];

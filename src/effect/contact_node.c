@@ -491,10 +491,8 @@ static PetscErrorCode target_contact(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps
-  that of its constraint: at edges between facets a current one would jump within Newton's method.
-*/
+/* Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps
+   that of its constraint: at edges between facets a current one would jump within Newton's method. */
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
 {
@@ -665,11 +663,9 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  A record has the node's original number, whether it is and was active, right-hand side and normal of its
-  constraint, multiplier, gap, and friction state: enough to rebuild the constraints of the last solve, and to
-  continue as the uninterrupted run.
-*/
+/* A record has the node's original number, whether it is and was active, right-hand side and normal of its
+   constraint, multiplier, gap, and friction state: enough to rebuild the constraints of the last solve, and
+   to continue as the uninterrupted run. */
 static PetscErrorCode save_contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
   const Contact *c = (const Contact *)e->data;

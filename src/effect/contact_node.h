@@ -54,22 +54,18 @@ struct _p_Touch {
   PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
 };
 
-/*
-  contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance `gap`
-  (m) from the facet with normal n. Flip: it was constrained to one facet; returns whether to another one now.
-  Valley: it was constrained to two. Not collective.
-*/
+/* contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance
+   `gap` (m) from the facet with normal n. Flip: it was constrained to one facet; returns whether to another
+   one now. Valley: it was constrained to two. Not collective. */
 PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,
                         PetscReal n[3], Touch *touch);
 void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], PetscReal gap,
                      const PetscReal n[3], Touch *touch);
 
-/*
-  Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last
-  one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`
-  (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read: their forces after a
-  solve, N being the normal force.
-*/
+/* Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last
+   one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`
+   (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read: their forces after
+   a solve, N being the normal force. */
 void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
 void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth);
 void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3]);

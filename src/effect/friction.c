@@ -164,11 +164,9 @@ static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-/*
-  Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s
-  and a stiffness k, the trial force is T + k s, or k s with springs. It slides where that is longer than mu
-  N, with T = mu N along it; the derivative of that direction is the stiffness across it.
-*/
+/* Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s
+   and a stiffness k, the trial force is T + k s, or k s with springs. It slides where that is longer than mu
+   N, with T = mu N along it; the derivative of that direction is the stiffness across it. */
 static PetscReal update(const SbFriction *f, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;

@@ -203,10 +203,8 @@ SB_KERNEL void SbCellBlocksCorotated(const SbPack g[restrict 9], const PetscReal
   }
 }
 
-/*
-  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of
-  G: its entry (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice.
-*/
+/* For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of
+   G: its entry (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice. */
 SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
                                    const SbPack C[restrict 81], SbPack K[restrict 10][9])
 {

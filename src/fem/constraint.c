@@ -346,11 +346,9 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
   for (size_t k = 0; k < 9 && i == j; k++) v[k / 3 * rs + k % 3 * cs] += size * Qi[k];
 }
 
-/*
-  If only constraints support a body K is singular. In a static run s_i times the squared components of the
-  constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts
-  them again, so that only M contains them.
-*/
+/* If only constraints support a body K is singular. In a static run s_i times the squared components of the
+   constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts
+   them again, so that only M contains them. */
 static void anchor(SbSpace s, const SbMatBlocks *x)
 {
   const SbConstraints c = s->constraints;

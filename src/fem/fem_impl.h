@@ -68,10 +68,8 @@ static inline void sb_insert_block(SbSpace s, const SbMatBlocks *x, PetscInt row
   }
 }
 
-/*
-  For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
-  to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms.
-*/
+/* For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
+   to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms. */
 void SbInsertClear(SbSpace space, const SbMatBlocks *x, PetscInt b, const SbStage *faces,
                    const PetscReal beta[]);
 /* quadratic.c: points of a batch. P1, CR and DG have one; P2 four, curved cells those of SbRuleQuintic. */
@@ -92,10 +90,8 @@ void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const P
                       SbPack U[30], SbPack F[SB_POINTS][9]);
 /* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one point). */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
-/*
-  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
-  tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points.
-*/
+/* The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
+   tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points. */
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
 /* The rule that is exact for det F; for a curved cell that of its points. */

@@ -39,10 +39,8 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
   }
 }
 
-/*
-  Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is
-  distributed to the own nodes and those across the faces.
-*/
+/* Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is
+   distributed to the own nodes and those across the faces. */
 SB_INLINE void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                             const SbPack K[][9])
 {
@@ -87,10 +85,8 @@ SB_INLINE void transpose(const Four in[4], Four out[4])
   out[3] = SHUFFLE(b, d, 2, 3, 6, 7);
 }
 
-/*
-  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge`
-  the position may be in the off-diagonal part, or on another rank.
-*/
+/* Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge`
+   the position may be in the off-diagonal part, or on another rank. */
 SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool edge,
                           PetscScalar *const value[2])
 {

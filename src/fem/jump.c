@@ -181,10 +181,8 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
-  twist modes; keep: m may not decrease. Returns whether some m changed.
-*/
+/* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
+   twist modes; keep: m may not decrease. Returns whether some m changed. */
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
                               PetscReal factor, PetscBool keep)
 {
@@ -273,10 +271,8 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-/*
-  Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed:
-  set if one changed on this rank by a percent or more.
-*/
+/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed:
+   set if one changed on this rank by a percent or more. */
 static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
 {
   const SbJump j = s->jump;

@@ -189,12 +189,10 @@ static PetscErrorCode localise(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets,
-  contains an edge if it contains both vertices; other groups contain the edges of their triangles and tets,
-  so that no edge through a thin body is in the group of its surface. Owners have all cells around their
-  edges, and send the result to the ghosts.
-*/
+/* Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets,
+   contains an edge if it contains both vertices; other groups contain the edges of their triangles and tets,
+   so that no edge through a thin body is in the group of its surface. Owners have all cells around their
+   edges, and send the result to the ghosts. */
 static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 {
   SbMesh mesh = s->mesh;
@@ -353,11 +351,9 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a
-  face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting does not depend on
-  the volumes and moduli on the two sides (docs/reference/theory.md).
-*/
+/* Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a
+   face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting does not depend on
+   the volumes and moduli on the two sides (docs/reference/theory.md). */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
   PetscReal *stiffness;

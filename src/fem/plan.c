@@ -9,10 +9,9 @@
 #include "fem_impl.h"
 #include "sblog.h"
 
-/*
-  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot
-  of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the group that they repeat.
-*/
+/* Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot
+   of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the group that they
+   repeat. */
 typedef struct {
   const PetscInt *node;
   PetscInt nodes;         /* number of nodes in a group */
@@ -173,11 +172,9 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. The diagonal part of
-  AIJ is set three scalar rows at a time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them
-  unchanged, six times faster at 200,000 tets than block by block.
-*/
+/* Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. The diagonal part of
+   AIJ is set three scalar rows at a time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them
+   unchanged, six times faster at 200,000 tets than block by block. */
 static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind)
 {
   const PetscInt *first = kind == SB_MATRIX_AIJ ? p->di + 1 : kind == SB_MATRIX_SBAIJ ? p->diagonal : p->di;

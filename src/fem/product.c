@@ -26,10 +26,8 @@ typedef struct {
   Vec ghosts;
 } Product;
 
-/*
-  y += A x. Row i has the columns column[start[i]..start[i+1]), i first: y_i += A_ii x_i, and for each block
-  right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i.
-*/
+/* y += A x. Row i has the columns column[start[i]..start[i+1]), i first: y_i += A_ii x_i, and for each block
+   right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. */
 SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
                                const PetscScalar value[restrict], const PetscScalar x[restrict],
                                PetscScalar y[restrict])

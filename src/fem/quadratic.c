@@ -168,14 +168,12 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
   }
 }
 
-/*
-  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D =
-  dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u + du) is lambda times
-  this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the
-  pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) +
-  dp/dF : dF; after its elimination the right-hand side is still the residual of u (Magisano, Leonetti and
-  Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
-*/
+/* Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D =
+   dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u + du) is lambda
+   times this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the
+   pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) +
+   dp/dF : dF; after its elimination the right-hand side is still the residual of u (Magisano, Leonetti and
+   Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution. */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
 {
   const PetscReal *u, *du = NULL;

@@ -13,10 +13,8 @@
 #include "sbkernel.h"
 #include "sblog.h"
 
-/*
-  P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
-  likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H.
-*/
+/* P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
+   likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H. */
 void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[])
 {

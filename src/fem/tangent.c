@@ -211,20 +211,17 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
   }
 }
 
-/*
-  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one
-  pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the
-  modes that the pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12
-  cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
-*/
+/* Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one
+   pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the
+   modes that the pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12
+   cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30. */
 #define KEPT 10.      /* times mu, */
 #define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
-/*
-  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the
-  mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2 m/du^2, which a filtered
-  tangent omits. For damping R replaces D in b. With `out`, b is stored there and lambda/V b b^T is not added.
-*/
+/* Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the
+   mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2 m/du^2, which a filtered
+   tangent omits. For damping R replaces D in b. With `out`, b is stored there and lambda/V b b^T is not
+   added. */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
 {

@@ -130,10 +130,8 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
   }
 }
 
-/*
-  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
-  j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1.
-*/
+/* C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
+   j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1. */
 SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
                                 const SbPack W[restrict 9], SbPack C[restrict 81])
 {

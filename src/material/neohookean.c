@@ -19,10 +19,8 @@
 */
 #include "material_impl.h"
 
-/*
-  Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and
-  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing cancels at small strains.
-*/
+/* Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and J -
+   1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing cancels at small strains. */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
   const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;

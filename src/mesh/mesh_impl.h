@@ -110,10 +110,8 @@ typedef struct {
   uint64_t set, face[4];
 } SbCellData;
 
-/*
-  Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A
-  vertex of cells on several ranks is stored on each of them with the same data.
-*/
+/* Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A
+   vertex of cells on several ranks is stored on each of them with the same data. */
 typedef struct {
   PetscInt Nvert, Ncell; /* global counts */
   PetscInt nvert, ncell;

@@ -21,11 +21,9 @@ static inline PetscInt vertex(const PetscInt n[3], PetscInt i, PetscInt j, Petsc
   return (k * (n[1] + 1) + j) * (n[0] + 1) + i;
 }
 
-/*
-  Six tets of a cell; corners as bits (1: far in x, 2: in y, 4: in z), each tet along one of the six edge
-  paths from corner 0 to corner 7. `mirror`: bits of the directions in which the cell is reflected. An odd
-  permutation and an odd number of reflections each change the orientation of the tet.
-*/
+/* Six tets of a cell; corners as bits (1: far in x, 2: in y, 4: in z), each tet along one of the six edge
+   paths from corner 0 to corner 7. `mirror`: bits of the directions in which the cell is reflected. An odd
+   permutation and an odd number of reflections each change the orientation of the tet. */
 static PetscErrorCode add_cell(const PetscInt n[3], const PetscInt at[3], SbImport *im)
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},

@@ -197,10 +197,8 @@ static PetscErrorCode read_nodes(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Reads the elements. In version 4 blocks have the entity and the type of their elements. In versions 1 and 2
-  type and tags stand in the line of each element, in a binary file before many of one type.
-*/
+/* Reads the elements. In version 4 blocks have the entity and the type of their elements. In versions 1 and 2
+   type and tags stand in the line of each element, in a binary file before many of one type. */
 static PetscErrorCode read_elements(Gmsh *g)
 {
   SbScan *s = &g->im->scan;

@@ -203,10 +203,8 @@ PetscErrorCode SbEvaluationEnd(SbModel m, SbEvaluation *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor
-  there: they prescribe the load path themselves.
-*/
+/* Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor
+   there: they prescribe the load path themselves. */
 static inline PetscReal load_factor(SbModel m, SbEffect e)
 {
   return e->steady ? m->load : 1.;

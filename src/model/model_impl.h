@@ -8,10 +8,8 @@
    attempted step; Update: energy check of a converged active set; `again`: they were reduced. Collective. */
 void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
-/*
-  model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1, and
-  f[nnode][3], zero, of F; V, A and F may be NULL. Collective.
-*/
+/* model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1, and
+   f[nnode][3], zero, of F; V, A and F may be NULL. Collective. */
 typedef struct {
   Vec U, V, A, F;
   SbStage stage;

@@ -67,12 +67,10 @@ static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt n
   }
 }
 
-/*
-  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components
-  allow. Bodies enclosed by others without enough space are fixed. Displacements are limited to a few gaps,
-  the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
-  fixed here; way[nbody + 1][3], m; moved: some body moves.
-*/
+/* Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components
+   allow. Bodies enclosed by others without enough space are fixed. Displacements are limited to a few gaps,
+   the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
+   fixed here; way[nbody + 1][3], m; moved: some body moves. */
 static void find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody, uint8_t fixed[],
                       PetscReal way[], PetscBool *moved)
 {
@@ -117,10 +115,8 @@ static void find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody
   for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
 }
 
-/*
-  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
-  Effects move the vertices of remaining contacts.
-*/
+/* Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
+   Effects move the vertices of remaining contacts. */
 PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
 {
   const SbSpace s = m->space;
@@ -159,11 +155,9 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the
-  kinetic and strain energy of the bodies, of mass m, at its start, plus half of the work of all loads and
-  support forces along the size of the smallest body.
-*/
+/* The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the
+   kinetic and strain energy of the bodies, of mass m, at its start, plus half of the work of all loads and
+   support forces along the size of the smallest body. */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {
   const SbSpace s = m->space;

@@ -96,10 +96,9 @@ static int best_diagonal(SbSpace s, PetscInt cell)
   return found;
 }
 
-/*
-  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells
-  in the order of VTK (corners, then the edges 01 12 02 03 13 23), and the cell that each tet is part of.
-*/
+/* The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its
+   cells in the order of VTK (corners, then the edges 01 12 02 03 13 23), and the cell that each tet is part
+   of. */
 static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
 {
   static const int to_vtk[SB_CELL_NODES] = {0, 1, 2, 3, 4, 7, 5, 6, 8, 9};

@@ -20,10 +20,8 @@
 #include <unistd.h>
 #include "output_impl.h"
 
-/*
-  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when
-  MPI_Finalize() makes it end. The error has been reported; the remainder of the program's end is skipped.
-*/
+/* After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when
+   MPI_Finalize() makes it end. The error has been reported; the remainder of the program's end is skipped. */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {
   (void)comm;

@@ -11,10 +11,8 @@
 #define SB_MESSAGE_MAX 1024
 #define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
 
-/*
-  Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are written,
-  so that the files do not depend on the partition.
-*/
+/* Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are
+   written, so that the files do not depend on the partition. */
 typedef struct {
   MPI_Comm comm;
   PetscSF sf;      /* leaves: the entities owned here, `each` at a time; roots: this rank's slice */

@@ -133,10 +133,9 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  The vertex or node at an edge nearest to a probe, of its body once that is known: squared distance, and into
-  the probe its original and, on its owner, its local number: of a vertex, or nvert_owned behind a node's.
-*/
+/* The vertex or node at an edge nearest to a probe, of its body once that is known: squared distance, and
+   into the probe its original and, on its owner, its local number: of a vertex, or nvert_owned behind a
+   node's. */
 static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, SbProbe *probe, PetscReal *best)
 {
   const SbMesh mesh = s->mesh;

@@ -252,10 +252,8 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For
-  another checkpoint frame[] names the frame of its step in its run's folder. Collective.
-*/
+/* The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For
+   another checkpoint frame[] names the frame of its step in its run's folder. Collective. */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       size_t size, char frame[], PetscBool *is)
 {

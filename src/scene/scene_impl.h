@@ -22,9 +22,7 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
 /* Adds a further scale, rotation and translation to the body. */
 void SbPlacementAdd(const SbPlacement *place, SbBody *body);
 
-/*
-  Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has
-  letters, digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or
-  "effect". The caller frees the names with PetscFree().
-*/
+/* Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has
+   letters, digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or
+   "effect". The caller frees the names with PetscFree(). */
 PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX]);

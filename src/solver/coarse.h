@@ -15,17 +15,13 @@
 */
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
 
-/*
-  Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns; by
-  unknowns of its own; of P2's edge nodes by the mean of two vertices.
-*/
+/* Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns; by
+   unknowns of its own; of P2's edge nodes by the mean of two vertices. */
 typedef enum { SB_MEMBER, SB_ITSELF, SB_MEAN } SbWay;
 
-/*
-  The coarse space, columns Z, and E = Z^T A Z, which consists of 3x3 blocks: one block row for a node that
-  moves by itself, two for an aggregate, translation t and rotation w. They are distributed over the ranks as
-  the nodes are.
-*/
+/* The coarse space, columns Z, and E = Z^T A Z, which consists of 3x3 blocks: one block row for a node that
+   moves by itself, two for an aggregate, translation t and rotation w. They are distributed over the ranks as
+   the nodes are. */
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
   SbSpace space;

@@ -15,12 +15,10 @@
 #include "coarse.h"
 #include "solver_impl.h"
 
-/*
-  Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer levels. Bar of
-  332,000 tets on 64 ranks, aggregates: 35 iterations with 114 messages of a rank each; with PETSc's defaults
-  50 and 50: 43 and 290. Bar of CR, nu 0.49, 53,000 tets on 64 ranks: 333 messages of a rank per iteration;
-  with PETSc's 556.
-*/
+/* Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer levels. Bar of
+   332,000 tets on 64 ranks, aggregates: 35 iterations with 114 messages of a rank each; with PETSc's defaults
+   50 and 50: 43 and 290. Bar of CR, nu 0.49, 53,000 tets on 64 ranks: 333 messages of a rank per iteration;
+   with PETSc's 556. */
 #define LAST_LEVEL 600
 #define PER_RANK 300
 

@@ -12,11 +12,9 @@
 #define ORIGINAL "SbPCSetUpOriginal_C"
 #define ORIGINAL_APPLY "SbPCApplyOriginal_C"
 
-/*
-  PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as the
-  matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them during the factorisation, and
-  they are freed after a failure.
-*/
+/* PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as
+   the matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them during the
+   factorisation, and they are freed after a failure. */
 static struct {
   PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
   PetscErrorCode (*release)(void *, int, const char[], const char[]);

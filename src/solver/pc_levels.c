@@ -21,11 +21,9 @@
 #include "pressure.h"
 #include "solver_impl.h"
 
-/*
-  Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored. Bar of CR,
-  nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and 4 ranks; with PETSc's default -1, which keeps all, 59,
-  81, 59 and 79, depending on the partition.
-*/
+/* Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored. Bar of
+   CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and 4 ranks; with PETSc's default -1, which keeps all,
+   59, 81, 59 and 79, depending on the partition. */
 #define WEAK 0.
 
 /* Prescribes in `to` the components prescribed in `from`: at the same node, or all vertices of the face. */

@@ -5,11 +5,9 @@
 #pragma once
 #include "sbassembly.h"
 
-/*
-  Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1 for every
-  body. The tangent without its volumetric part is assembled in each. With a P2 body only the space itself,
-  with pc_coarse.c.
-*/
+/* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1 for every
+   body. The tangent without its volumetric part is assembled in each. With a P2 body only the space itself,
+   with pc_coarse.c. */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   SbSpace space; /* borrowed */
@@ -41,10 +39,8 @@ PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
 /* z = a symmetric approximation of A[0]^-1, applied to r. Collective. */
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 
-/*
-  The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C = V
-  / lambda.
-*/
+/* The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C =
+   V / lambda. */
 typedef struct _p_SbPressureOperator *SbPressureOperator;
 struct _p_SbPressureOperator {
   SbSpace space; /* borrowed */

@@ -41,11 +41,10 @@ PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
 
 /* nodes solved exactly */
 
-/*
-  Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the node
-  fits, and a few such nodes dominate the number of iterations. They are solved exactly: with B = A_BB^-1 on
-  them the preconditioner is B + (1 - B A) P (1 - A B), symmetric and positive definite for any P that is.
-*/
+/* Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the
+   node fits, and a few such nodes dominate the number of iterations. They are solved exactly: with B =
+   A_BB^-1 on them the preconditioner is B + (1 - B A) P (1 - A B), symmetric and positive definite for any P
+   that is. */
 typedef struct {
   PetscInt n;         /* number of nodes */
   PetscInt *node;     /* [n] owned local nodes */

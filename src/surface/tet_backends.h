@@ -15,11 +15,8 @@ typedef struct {
   PetscBool remesh;     /* remesh the surface with triangles of the target size; else keep its triangles */
 } SbTetJob;
 
-/*
-  Each backend sets x, vert_number, item[3] with the region number as tags, and item[2], the facets between
-  regions and outside, with the number of a surface triangle as tags: the facet's own or, after remeshing, the
-  nearest one.
-  Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason of the failure.
-*/
+/* Each backend sets x, vert_number, item[3] with the region number as tags, and item[2], the facets between
+   regions and outside, with the number of a surface triangle as tags: the facet's own or, after remeshing,
+   the nearest one. Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason of the failure. */
 PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets);
 PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets);

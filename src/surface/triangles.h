@@ -48,11 +48,9 @@ PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, Pets
    missing vertex; fewer than three corners. */
 PetscErrorCode SbTrianglesAddCorner(SbScan *scan, int64_t number, int64_t v, SbTriangleFile *file);
 PetscErrorCode SbTrianglesAddFace(SbScan *scan, int64_t number, SbTriangleFile *file);
-/*
-  Triangulates nested polygons, convex or not, without new vertices: vert[start[k]] to vert[start[k + 1] - 1]
-  is polygon k of nloop; the areas with a point of hole[nhole][3] are left empty, all other enclosed areas are
-  filled. An error names the last scanned token.
-*/
+/* Triangulates nested polygons, convex or not, without new vertices: vert[start[k]] to vert[start[k + 1] - 1]
+   is polygon k of nloop; the areas with a point of hole[nhole][3] are left empty, all other enclosed areas
+   are filled. An error names the last scanned token. */
 PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
                                    const PetscInt vert[], PetscInt nhole, const PetscReal hole[],
                                    int64_t number, SbTriangleFile *file);

@@ -241,13 +241,11 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
 }
 
-/*
-  SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units.
-  PETSc's own options override all settings so far, those of the TS as well. Newton's linear solves are as
-  exact as its progress (Eisenstat and Walker), unless the user sets a tolerance. In a static run whose matrix
-  lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and
-  changes of volume dominate the residual: loose solves make it linear near nu = 1/2.
-*/
+/* SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units.
+   PETSc's own options override all settings so far, those of the TS as well. Newton's linear solves are as
+   exact as its progress (Eisenstat and Walker), unless the user sets a tolerance. In a static run whose
+   matrix lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact
+   solve, and changes of volume dominate the residual: loose solves make it linear near nu = 1/2. */
 static PetscErrorCode set_up_snes(SbRun run)
 {
   const SbModel m = run->model;

@@ -466,13 +466,11 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Barrier contact: from the start of the step to a first X that has the prescribed displacements, and
-  obstacles at their end positions. The integrator's predictor is taken if its motion is free of contact, else
-  free unknowns begin at the start of the step. A prescribed motion that would intersect a surface is part of
-  Newton's steps: the right-hand side has the derivative of the residual with respect to it, so that the
-  bodies it pushes move with it.
-*/
+/* Barrier contact: from the start of the step to a first X that has the prescribed displacements, and
+   obstacles at their end positions. The integrator's predictor is taken if its motion is free of contact,
+   else free unknowns begin at the start of the step. A prescribed motion that would intersect a surface is
+   part of Newton's steps: the right-hand side has the derivative of the residual with respect to it, so that
+   the bodies it pushes move with it. */
 static PetscErrorCode approach(SNES snes)
 {
   Newton *n = (Newton *)snes->data;

@@ -43,11 +43,9 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong,
-  a body may pass far through an obstacle. While forces grow along the path, strain energy grows by at most
-  (f_0 + f_1) . du, f_0 and f_1 the internal forces at the ends of the step; linear: half of that.
-*/
+/* Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong,
+   a body may pass far through an obstacle. While forces grow along the path, strain energy grows by at most
+   (f_0 + f_1) . du, f_0 and f_1 the internal forces at the ends of the step; linear: half of that. */
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 {
   const SbModel m = l->run->model;

@@ -64,10 +64,8 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((form
 /* Whether inverted.c rejected the last step, and would reject one of length dt, s. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
-/*
-  inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted reject. U:
-  displacements at its start and end. Not ok: it inverted tets; sets run->rejected_inverted, stop_reason.
-*/
+/* inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted reject. U:
+   displacements at its start and end. Not ok: it inverted tets; sets run->rejected_inverted, stop_reason. */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
 
 /* callbacks.c: the model for PETSc's TS and SNES. */
@@ -105,10 +103,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
    acceleration, without inertia. Contact forces between bodies are excluded. Collective. */
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
-/*
-  SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
-  guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does not
-  converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the first
-  solve with SNES_CONVERGED_ITERATING: to be repeated with the fraction run->time_of_impact of its length.
-*/
+/* SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
+   guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does
+   not converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the
+   first solve with SNES_CONVERGED_ITERATING: to be repeated with the fraction run->time_of_impact of its
+   length. */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
