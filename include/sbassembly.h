@@ -108,10 +108,9 @@ static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt 
     SbPack p[12];
 
     sb_gather_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, x, p);
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++)
         u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
-    }
   }
 }
 

@@ -49,9 +49,8 @@ static inline int SbBoxLongest(const PetscReal box[6])
 {
   int axis = 0;
 
-  for (int k = 1; k < 3; k++) {
+  for (int k = 1; k < 3; k++)
     if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
-  }
   return axis;
 }
 

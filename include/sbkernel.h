@@ -90,26 +90,23 @@ SB_INLINE void SbCross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3
 /* C = A B */
 SB_INLINE void SbMatMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
 {
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++)
       C[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
-  }
 }
 
 /* C = A^T B */
 SB_INLINE void SbMatTransposeMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
 {
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) C[3 * i + j] = A[i] * B[j] + A[3 + i] * B[3 + j] + A[6 + i] * B[6 + j];
-  }
 }
 
 /* C = A B^T */
 SB_INLINE void SbMatMulTranspose(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
 {
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) C[3 * i + j] = SbDot3(A + 3 * i, B + 3 * j);
-  }
 }
 
 /* cof A = d(det A)/dA, the transposed adjugate; its rows are cross products of the rows of A. */

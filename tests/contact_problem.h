@@ -79,10 +79,9 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(s->nnode_owned, &own));
-  for (PetscInt k = 0; k < p->blocks.n; k++) {
+  for (PetscInt k = 0; k < p->blocks.n; k++)
     if (p->blocks.node[k][1] == s->gnode_start + p->blocks.node[k][0])
       own[p->blocks.node[k][0]] += p->blocks.block[k][0] + p->blocks.block[k][4] + p->blocks.block[k][8];
-  }
   PetscCall(VecDuplicate(p->F, &D));
   PetscCall(MatGetDiagonal(p->K, D));
   PetscCall(VecGetArrayRead(D, &d));

@@ -144,9 +144,8 @@ static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &all, &count));
   *n = 0;
-  for (int i = 0; i < count; i++) { /* PETSc 3.18 counts the closing NULL */
+  for (int i = 0; i < count; i++) /* PETSc 3.18 counts the closing NULL */
     if (all[i]) PetscCall(PetscStrncpy(names[(*n)++], all[i], SB_NAME_MAX));
-  }
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,10 +180,9 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
 
     for (PetscInt i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], field[i].name, SB_NAME_MAX));
   } else {
-    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts); i++) {
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts); i++)
       if (!strcmp(parts[i].family, family))
         PetscCall(PetscStrncpy(names[(*n)++], parts[i].name, SB_NAME_MAX));
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -209,10 +207,9 @@ static inline PetscErrorCode part_find(const char *family, const char *name, Par
     *part = (Part){family, name, options, NULL, events, PETSC_FALSE};
     *found = PETSC_TRUE;
   } else if (*found && !part->events) {
-    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++) {
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++)
       if (part_families[k].kind && !strcmp(part_families[k].name, family))
         PetscCall(PetscSNPrintf(events, sizeof(events), "Sb%s_%s", part_families[k].kind, name));
-    }
     part->events = events;
   }
   if (*found && !part->scene) part->scene = "";

@@ -19,9 +19,8 @@ static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal e[3][3], normal[4][3], most = -1., det = 0.;
 
-  for (int a = 0; a < 3; a++) {
+  for (int a = 0; a < 3; a++)
     for (int k = 0; k < 3; k++) e[a][k] = x[3 * v[a + 1] + k] - x[3 * v[0] + k];
-  }
   for (int k = 0; k < 3; k++) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
 

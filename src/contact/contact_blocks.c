@@ -57,9 +57,8 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, co
     b->block[b->n++] = (SbContactBlock){.v = {low, high}};
   }
   to = b->block[b->slot[at]].H;
-  for (int p = 0; p < 3; p++) {
+  for (int p = 0; p < 3; p++)
     for (int q = 0; q < 3; q++) to[3 * p + q] += v <= w ? H[ld * p + q] : H[ld * q + p];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,10 +103,9 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
           for (int e = 0; e < 9; e++) T[n].H[e] = 0.;
           n++;
         }
-        for (int e = 0; e < 9; e++) {
+        for (int e = 0; e < 9; e++)
           if (!(m->fixed[j] >> (e % 3) & 1))
             T[at[g]].H[e] += m->weight[j] * H[entry[k] % 2 ? 3 * (e % 3) + e / 3 : e];
-        }
       }
     }
   }

@@ -331,9 +331,8 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, m->fixed, (PetscMPIInt)n, MPI_UINT8_T, MPI_MAX, s->comm));
   for (PetscInt v = 0; v < m->nbody_vertex; v++) {
     m->driven[v] = 1;
-    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++)
       if ((m->fixed[j] & 7) != 7) m->driven[v] = 0;
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -347,15 +346,13 @@ PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], P
     const PetscInt v = m->local[k];
 
     for (int i = 0; i < 3; i++) mine[3 * k + i] = m->X[3 * v + i];
-    for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
+    for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++)
       for (int i = 0; i < 3; i++) mine[3 * k + i] += m->weight[e] * u[3 * m->node[e] + i];
-    }
   }
   PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count, m->first,
                               MPIU_REAL, m->space->comm));
-  for (PetscInt k = 0; k < m->nbody_vertex; k++) {
+  for (PetscInt k = 0; k < m->nbody_vertex; k++)
     for (int i = 0; i < 3; i++) x[3 * m->order[k] + i] = all[3 * k + i];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

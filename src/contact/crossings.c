@@ -41,9 +41,8 @@ static PetscBool goes_through(SbContactMesh m, PetscBool self, const PetscReal x
   /* with an obstacle, contact between bodies belongs to another effect */
   if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return PETSC_FALSE;
   if (m->part[e[0]] == m->part[v[0]] && (!self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
-  for (int k = 0; k < 6; k++) {
+  for (int k = 0; k < 6; k++)
     if (e[k / 3] == v[k % 3]) return PETSC_FALSE;
-  }
   if (m->driven[e[0]] && m->driven[e[1]] && m->driven[v[0]] && m->driven[v[1]] && m->driven[v[2]])
     return PETSC_FALSE;
   if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0) return PETSC_FALSE;
@@ -112,9 +111,8 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
   for (PetscInt t = 0; t < m->nbody_triangle; t++) {
     const PetscInt *v = m->triangle + 3 * t, to = m->part[v[0]];
 
-    for (PetscInt b = 0; b < nbody; b++) {
+    for (PetscInt b = 0; b < nbody; b++)
       if (b != to) winding[nbody * b + to] += SbTriangleSolidAngle(x, v, point + 3 * b) / (4. * PETSC_PI);
-    }
   }
   for (PetscInt k = 0; k < nbody * nbody && !*found; k++) {
     if (PetscAbsReal(winding[k]) < 0.5) continue;

@@ -59,15 +59,13 @@ static const char *normalise(SbObstacle o)
   case BOWL:
     return o->p[3] > 0 ? NULL : "the radius must be positive";
   case BOX:
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       if (o->p[i] >= o->p[3 + i]) return "the first corner must be the lower one in x, y and z";
-    }
     return NULL;
   default:
     if (o->p[6] <= 0) return "the radius must be positive";
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       if (o->p[i] != o->p[3 + i]) return NULL;
-    }
     return "its two ends are one point";
   }
 }

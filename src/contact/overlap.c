@@ -263,9 +263,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
 
   /* vertices joined to an inside one by an edge that intersects nothing are inside, too */
   nlist = 0;
-  for (PetscInt v = 0; v < m->nvertex; v++) {
+  for (PetscInt v = 0; v < m->nvertex; v++)
     if (o->near[v] == SB_OVERLAP_INSIDE) list[nlist++] = v;
-  }
   for (PetscInt k = 0; k < nlist; k++) {
     for (PetscInt j = w.start[list[k]]; j < w.start[list[k] + 1]; j++) {
       const PetscInt *e = m->edge + 2 * w.edge[j], to = e[0] == list[k] ? e[1] : e[0];
@@ -281,9 +280,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     const SbPenetration p = o->point[i];
     PetscReal normal[3] = {0.};
 
-    for (PetscInt k = 0; k < p.n && p.weight[k] > 0.; k++) {
+    for (PetscInt k = 0; k < p.n && p.weight[k] > 0.; k++)
       for (int j = 0; j < 3; j++) normal[j] += p.weight[k] * w.normal[3 * p.v[k] + j];
-    }
     if (SbDot3(normal, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(normal, normal))) o->point[nleading++] = p;
   }
   if (nleading) o->n = nleading;
@@ -409,9 +407,8 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   for (PetscInt e = 0; e < m->nedge; e++) {
     const PetscInt *v = m->edge + 2 * e;
 
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 2; k++)
       if (o->near[v[k]] > SB_OVERLAP_ADJACENT && !o->near[v[1 - k]]) o->near[v[1 - k]] = SB_OVERLAP_ADJACENT;
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -209,9 +209,8 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
         }
         if (SbNormalise(direction) <= 0.) continue;
       }
-      for (int k = 0; k < 4; k++) {
+      for (int k = 0; k < 4; k++)
         if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);
-      }
       if (sum <= 0.) continue;
       n++;
       for (int k = 0; k < 4; k++) {
@@ -231,9 +230,8 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       for (PetscInt j = m->start[v]; count[v] && j < m->start[v + 1]; j++) {
         if (m->node[j] < 0) continue;
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++)
           if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[3 * v + i] / (PetscReal)count[v];
-        }
       }
     }
   }

@@ -29,9 +29,8 @@ static int compare_active(const void *x, const void *y, void *ctx)
 
   if (p->side != q->side) return p->side ? 1 : -1;
   if (p->kind != q->kind) return p->kind < q->kind ? -1 : 1;
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 4; k++)
     if (p->v[k] != q->v[k]) return p->v[k] < q->v[k] ? -1 : 1;
-  }
   return 0;
 }
 

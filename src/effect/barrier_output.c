@@ -260,9 +260,8 @@ PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, si
   } mine, first;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < b->nactive; i++) {
+  for (PetscInt i = 0; i < b->nactive; i++)
     if (!least || b->active[i].gap < least->gap) least = &b->active[i];
-  }
   mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
   mine.rank = s->rank;
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));

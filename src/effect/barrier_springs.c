@@ -36,9 +36,8 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 
   for (int k = 0; k < 2; k++) {
     SbBoxClear(box[k]);
-    for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+    for (PetscInt v = 0; v < m->nbody_vertex; v++)
       if (m->part[v] == body[k]) SbBoxAdd(box[k], b->x + 3 * v);
-    }
   }
   for (int i = 0; i < 6; i++) most = PetscMax(most, PetscAbsReal(box[0][i] - box[1][i]));
   return (PetscBool)(most < SAME * m->size);
@@ -225,10 +224,9 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
       x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
     }
     if (!find_spring(b, pair, x, &spring)) continue;
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 2; k++)
       if (part[k] < s->mesh->nbody)
         mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
-    }
     spring.stiffness = RIGID * mass / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact->bounce, 0., spring.approach);
     PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));

@@ -116,10 +116,9 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   for (PetscInt i = 0; i < n; i++) {
     const SbElement element = SbSpaceCellElement(space, facet[i].cell);
 
-    for (int k = 0; element->nodes_per[1] && k < 6; k++) {
+    for (int k = 0; element->nodes_per[1] && k < 6; k++)
       if (SbTetEdge[k][0] != facet[i].face && SbTetEdge[k][1] != facet[i].face)
         add_share(space, &facet[i], 4 + k, facet[i].area / 4, slot, c);
-    }
     if (element->nodes_per[0]) {
       const PetscReal share = element->nodes_per[1] ? facet[i].area / 12 : facet[i].area / 3;
 
@@ -129,10 +128,9 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   }
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));
-  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+  for (PetscInt b = 0; b < space->mesh->nbody; b++)
     for (int k = 0; k < 3; k++)
       box[k] = PetscMax(box[k], space->mesh->body[b].bbox[3 + k] - space->mesh->body[b].bbox[k]);
-  }
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->held)
     PetscCall(SbSpaceCreateConstraints(space, (PetscBool)(c->response == MULTIPLIER),
@@ -219,9 +217,8 @@ static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
   PetscFunctionBeginUser;
   *part = PetscMin(*part, c->impact);
   /* springs of new contacts have acted for a whole step */
-  for (PetscInt i = 0; c->impact < 1 && i < c->n; i++) {
+  for (PetscInt i = 0; c->impact < 1 && i < c->n; i++)
     if (!c->touch[i].was) c->touch[i].lambda = 0;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -139,9 +139,8 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
   }
   for (PetscInt i = 0; i < space->nnode_owned; i++) load->n += touched[i];
   PetscCall(PetscMalloc1(load->n, &load->node));
-  for (PetscInt i = space->nnode_owned - 1, k = load->n; i >= 0; i--) {
+  for (PetscInt i = space->nnode_owned - 1, k = load->n; i >= 0; i--)
     if (touched[i]) load->node[--k] = i;
-  }
   PetscCall(PetscFree(touched));
 
   /* a steady load is integrated once */

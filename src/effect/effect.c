@@ -76,13 +76,12 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   SbScopeSet(&scope, "effect", type, name);
 
   /* the sets that it acts on, and the factor on a load */
-  for (PetscInt i = 0; i < is->nrow; i++) {
+  for (PetscInt i = 0; i < is->nrow; i++)
     if (!strcmp(is->row[i].key, "on")) {
       SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option);
       PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
     } else if (!strcmp(is->row[i].key, "time"))
       PetscCall(SbEffectFormulas(&scope, "time", 1, PETSC_FALSE, &e->time, &e->steady));
-  }
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
 
   /* time in which it acts, for loads and supports */

@@ -28,9 +28,8 @@ static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *st
   const PetscReal g[3] = {s * vector[0], s * vector[1], s * vector[2]};
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < space->nnode_owned; i++) {
+  for (PetscInt i = 0; i < space->nnode_owned; i++)
     for (int c = 0; c < 3; c++) f[3 * i + c] += mass[i] * g[c];
-  }
   PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -76,9 +76,8 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
   /* a force on few nodes costs little in a large mesh */
   for (PetscInt i = 0; i < space->nnode_owned; i++) p->n += p->share[i] != 0;
   PetscCall(PetscMalloc1(p->n, &p->node));
-  for (PetscInt i = space->nnode_owned - 1, k = p->n; i >= 0; i--) {
+  for (PetscInt i = space->nnode_owned - 1, k = p->n; i >= 0; i--)
     if (p->share[i] != 0) p->node[--k] = i;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,9 +90,8 @@ static PetscErrorCode force_point_force(SbEffect e, SbSpace space, const SbStage
   PetscFunctionBeginUser;
   for (int c = 0; c < 3; c++) F[c] = s * SbFormulaEval(p->vector[c], stage->t, NULL);
   (void)space;
-  for (PetscInt i = 0; i < p->n; i++) {
+  for (PetscInt i = 0; i < p->n; i++)
     for (int c = 0; c < 3; c++) f[3 * p->node[i] + c] += p->share[p->node[i]] * F[c];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -109,10 +109,9 @@ static PetscBool is_free(SbSpace space, const RimEdge *edge)
   }
   for (int a = 0; a < 3 && edge->node[a] >= 0; a++) components |= ~space->fixed[edge->node[a]];
   /* e_k couples the other two components */
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     if (PetscAbsReal(e[k]) > STRAIGHT * longest && components >> (k + 1) % 3 & components >> (k + 2) % 3 & 1)
       return PETSC_TRUE;
-  }
   return PETSC_FALSE;
 }
 
@@ -175,9 +174,8 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   for (PetscInt b = 0; b < mesh->nbody; b++)
     p->whole[b] =
       (PetscBool)(p->follower && !space->element[b]->nodes_per[0] && count[b] == mesh->body[b].nfacet);
-  for (PetscInt k = 0; k < p->nfacet; k++) {
+  for (PetscInt k = 0; k < p->nfacet; k++)
     if (!p->whole[mesh->cell_body[p->facet[k].cell]]) p->facet[n++] = p->facet[k];
-  }
   p->nfacet = n;
   PetscCall(PetscFree(count));
   if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0)) PetscCall(find_rim(p, space));
@@ -230,17 +228,15 @@ static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *
 /* side += the derivatives of a field w[nnode][3] there; NULL: none. */
 static void add_sides(const FacetPoint *p, const PetscReal w[], PetscReal side[2][3])
 {
-  for (int a = 0; w && a < p->n; a++) {
+  for (int a = 0; w && a < p->n; a++)
     for (int k = 0; k < 6; k++) side[k / 3][k % 3] += p->along[k / 3][a] * w[3 * p->node[a] + k % 3];
-  }
 }
 
 /* f += factor times the weight and the basis at the point times N. */
 static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3], PetscReal f[])
 {
-  for (int a = 0; a < p->n; a++) {
+  for (int a = 0; a < p->n; a++)
     for (int i = 0; i < 3; i++) f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
-  }
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
@@ -250,9 +246,8 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   const PetscReal *u = load->follower ? stage->u : NULL;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+  for (PetscInt b = 0; b < space->mesh->nbody; b++)
     if (load->whole[b]) SbSpaceAddVolumeForce(space, b, u, -p, f);
-  }
   for (PetscInt k = 0; k < load->nfacet; k++) {
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
       PetscReal side[2][3] = {{0}}, N[3];
@@ -277,9 +272,8 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+  for (PetscInt b = 0; b < space->mesh->nbody; b++)
     if (load->whole[b]) PetscCall(SbSpaceAddVolumeTangent(space, b, stage->u, p, A));
-  }
   for (PetscInt k = 0; k < load->nfacet; k++) {
     PetscReal c[SB_CELL_NODES][SB_CELL_NODES][3] = {{{0}}};
     FacetPoint at;
@@ -335,9 +329,8 @@ static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const 
       }
     }
     SbCross(dx, W, turn);
-    for (PetscInt a = 0; a < n; a++) {
+    for (PetscInt a = 0; a < n; a++)
       for (int i = 0; i < 3; i++) y[3 * edge->node[a] + i] -= weight * phi[a] * turn[i];
-    }
   }
 }
 

@@ -57,9 +57,8 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
 
     PetscCall(SbSpaceGetSetFacets(space, k[i], &nmore, &more));
     PetscCall(SbReserve(*n + nmore, sizeof(**facets), &size, facets));
-    for (PetscInt j = 0; j < nmore; j++) {
+    for (PetscInt j = 0; j < nmore; j++)
       if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen)) (*facets)[(*n)++] = more[j];
-    }
     PetscCall(PetscFree(more));
     seen |= SB_SET_BIT(k[i]);
   }
@@ -108,8 +107,7 @@ PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind,
   if (kind == SB_ON_NODES && space->faces) PetscCall(check_nodes(space, on, mask));
   *n = 0;
   PetscCall(PetscMalloc1(count[kind], items));
-  for (PetscInt i = 0; i < count[kind]; i++) {
+  for (PetscInt i = 0; i < count[kind]; i++)
     if (!on->n || sets[kind][i] & mask) (*items)[(*n)++] = i;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -162,9 +162,8 @@ static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal 
     for (int k = 0; k < 2; k++) SbPoseApply(&pose[k], space->node_x + node, x[k]);
     for (int k = 0; k < 2; k++) {
       SbPoseWay(&pose[0], &pose[1], &pose[k], x[k], way);
-      for (int c = 0; c < 3; c++) {
+      for (int c = 0; c < 3; c++)
         if (d->bits[i] & (1 << c)) *work += 0.5 * r[k][node + c] * (way[c] - (x[1][c] - x[0][c]));
-      }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

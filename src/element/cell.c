@@ -217,9 +217,8 @@ SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V
       for (int l = 0; l < SB_BATCH; l++) {
         PetscReal G[9], M[9], T[9], b[9];
 
-        for (int j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++)
           for (int n = 0; n < 3; n++) M[3 * j + n] = C[9 * (3 * i + j) + 3 * k + n][l];
-        }
         SbPackGet(9, g, l, G);
         SbMatMulTranspose(M, G, T);
         SbMatMul(G, T, b);

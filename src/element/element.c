@@ -48,18 +48,16 @@ static void tabulate_vertex(const PetscReal x[4][3], PetscReal g[3][3], PetscRea
   for (int a = 0; a < 3; a++) SbSubtract(x[a + 1], x[0], e[a]);
   for (int a = 0; a < 3; a++) SbCross(e[(a + 1) % 3], e[(a + 2) % 3], g[a]);
   const PetscReal d = SbDot3(e[0], g[0]);
-  for (int a = 0; a < 3; a++) {
+  for (int a = 0; a < 3; a++)
     for (int i = 0; i < 3; i++) g[a][i] /= d;
-  }
   *V = d / 6;
 }
 
 static void tabulate_face(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V)
 {
   tabulate_vertex(x, g, V);
-  for (int a = 0; a < 3; a++) {
+  for (int a = 0; a < 3; a++)
     for (int i = 0; i < 3; i++) g[a][i] *= -3.;
-  }
 }
 
 static PetscErrorCode create_p1(SbElement e)

@@ -34,9 +34,8 @@ const SbPointRule SbRuleCubic = {5,
 
 SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30], SbPack u[restrict 12])
 {
-  for (int k = 0; k < 12; k++) {
+  for (int k = 0; k < 12; k++)
     for (int l = 0; l < SB_BATCH; l++) u[k][l] = (4 * L[k / 3] - 1) * U[k][l];
-  }
   for (int e = 0; e < 6; e++) {
     const int i = SbTetEdge[e][0], j = SbTetEdge[e][1];
 
@@ -53,16 +52,14 @@ SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30], 
 
 SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12], SbPack F[restrict 30])
 {
-  for (int k = 0; k < 12; k++) {
+  for (int k = 0; k < 12; k++)
     for (int l = 0; l < SB_BATCH; l++) F[k][l] += (4 * L[k / 3] - 1) * f[k][l];
-  }
   for (int e = 0; e < 6; e++) {
     const int i = SbTetEdge[e][0], j = SbTetEdge[e][1];
 
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
       for (int l = 0; l < SB_BATCH; l++)
         F[12 + 3 * e + k][l] += 4 * (L[j] * f[3 * i + k][l] + L[i] * f[3 * j + k][l]);
-    }
   }
 }
 
@@ -88,9 +85,8 @@ SB_KERNEL void SbQuadraticBlocks(const SbPointRule *rule, const SbPack B[restric
   static const int pair[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
   SbPack scaled[30];
 
-  for (int k = 0; k < 30; k++) {
+  for (int k = 0; k < 30; k++)
     for (int l = 0; l < SB_BATCH; l++) scaled[k][l] = factor[l] * b[k][l];
-  }
 
   for (int p = 0; p < SB_PAIRS; p++) {
     PetscReal weight[4 * SB_POINTS];

@@ -101,9 +101,8 @@ static void solve_forces(int n, const PetscReal G[9], const PetscReal F[9], cons
 {
   PetscReal A[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, C[9], det;
 
-  for (int k = 0; k < n; k++) {
+  for (int k = 0; k < n; k++)
     for (int l = 0; l < n; l++) A[3 * k + l] = SbDot3(G + 3 * k, F + 3 * l);
-  }
   SbMatCofactor(A, C);
   det = SbDot3(A, C);
   for (int k = 0; k < n; k++) {
@@ -173,9 +172,8 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
       PetscReal x[3];
 
       solve_forces(n, G, F, b, x);
-      for (int k = 0; k < n; k++) {
+      for (int k = 0; k < n; k++)
         for (int l = 0; l < 3; l++) c->Q[9 * node + 3 * l + j] += F[3 * k + l] * x[k];
-      }
     }
   }
 
@@ -300,9 +298,8 @@ void SbConstraintsReactions(SbSpace s, PetscReal r[])
 {
   const SbConstraints c = s->constraints;
 
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     if (!(s->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
-  }
   for (PetscInt i = 0; i < c->n; i++) {
     const SbConstraint *a = &c->constraint[i];
 

@@ -63,9 +63,8 @@ static inline void sb_insert_block(SbSpace s, const SbMatBlocks *x, PetscInt row
 
   if (position == SB_NOT_OWNED || (x->symmetric && row > column)) return;
   v = sb_block(x, s->plan, row, position, &rs, &cs);
-  for (size_t i = 0; i < 3; i++) {
+  for (size_t i = 0; i < 3; i++)
     for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
-  }
 }
 
 /* For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them

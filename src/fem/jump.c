@@ -131,9 +131,8 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&j));
   PetscCall(PetscMalloc3(mesh->ncell, &j->V, mesh->ncell, &j->modulus, 4 * mesh->ncell, &j->face));
-  for (PetscInt k = 0; k < s->nbatch; k++) {
+  for (PetscInt k = 0; k < s->nbatch; k++)
     for (PetscInt l = 0; l < s->batch_n[k]; l++) j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
-  }
   for (PetscInt c = 0; c < mesh->ncell; c++) j->modulus[c] = s->material[mesh->cell_material[c]]->mu;
 
   /* list the faces with an owned node, sorted by body */
@@ -168,10 +167,9 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     }
     l = j->n[b]++;
     face_nodes(s, face, node);
-    for (int k = 0; k < 8; k++) {
+    for (int k = 0; k < 8; k++)
       for (PetscInt lane = l; lane < (l ? l + 1 : SB_BATCH); lane++)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
-    }
     face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
     for (int side = 0; side < 2; side++)
       j->share[b][l] += face->cell[face->cell[1] == SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
@@ -360,9 +358,8 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
     const SbRegion *region = &s->region[r];
     const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
 
-    for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
+    for (PetscInt b = region->bstart; jumps && b < region->bend; b++)
       if (follow_batch(s, region, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED))) any = PETSC_TRUE;
-    }
   }
   return any;
 }

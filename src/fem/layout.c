@@ -79,9 +79,8 @@ static void number_owned(SbSpace s, uint64_t prescribed, Edges *edges)
   SbMesh mesh = s->mesh;
   PetscInt *node = s->cell_node, n = 0;
 
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     for (PetscInt i = 0; numbers(s, k) && i < per_cell[k] * mesh->ncell; i++) numbers(s, k)[i] = UNKNOWN;
-  }
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *per = SbSpaceCellElement(s, c)->nodes_per;
 
@@ -125,10 +124,9 @@ static PetscErrorCode complete_owned(SbSpace s, Edges *edges)
   PetscInt *node = s->cell_node;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 4 * mesh->ncell_owned; i < 4 * mesh->ncell; i++) {
+  for (PetscInt i = 4 * mesh->ncell_owned; i < 4 * mesh->ncell; i++)
     if (SbSpaceCellElement(s, i / 4)->nodes_per[0] && node[i] != UNKNOWN)
       edges->vertex[mesh->cell[i]] = node[i];
-  }
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
     const PetscInt other = s->neighbour ? s->neighbour[i] : -1;
 
@@ -140,9 +138,8 @@ static PetscErrorCode complete_owned(SbSpace s, Edges *edges)
     PetscCheck(node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No rank has numbered node %d of cell %d",
                (int)(i % 4), (int)(i / 4));
   }
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++)
     if (s->edge_node[i] != UNKNOWN) edges->at[edges->edge[i]] = s->edge_node[i];
-  }
   for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell_owned; i++) {
     if (!SbSpaceCellElement(s, i / 6)->nodes_per[1]) continue;
     s->edge_node[i] = edges->at[edges->edge[i]];
@@ -304,10 +301,9 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     uint64_t prescribed = 0; /* sets that an effect prescribes; none if no body has support nodes */
     Edges edges = {0};
 
-    for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++) {
+    for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++)
       if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
         prescribed |= SB_SET_BIT(k / mesh->nbody);
-    }
     if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
     if (quadratic) PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
@@ -379,10 +375,9 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
   }
   if (!broken) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
-  for (PetscInt b = 0; b < s->nbatch; b++) {
+  for (PetscInt b = 0; b < s->nbatch; b++)
     for (PetscInt l = 0, c = s->batch_cell[b]; l < s->batch_n[b]; l++, c++)
       stiffness[c] = SbMaterialWaveModulus(s->material[s->mesh->cell_material[c]]) / s->batch_V[b][l];
-  }
   PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
   for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
     const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH,

@@ -136,17 +136,15 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
     for (int i = 0; i < 3; i++) {
       for (int a = 0; a < 4; a++) {
         same[a][i] = (far4 - 1.) * u[a][i];
-        for (int c = 0; c < 4; c++) {
+        for (int c = 0; c < 4; c++)
           if (c != a) same[a][i] += far4 * u[between[a][c]][i];
-        }
       }
     }
     for (int k = 0; k < 4; k++) {
       Eight here[4][3];
 
-      for (int i = 0; i < 3; i++) {
+      for (int i = 0; i < 3; i++)
         for (int a = 0; a < 4; a++) here[a][i] = same[a][i] + step * u[between[a][k]][i];
-      }
       gradient((const Eight(*)[3])here, h + 9 * k, H[k]);
       mean += H[k][0] + H[k][4] + H[k][8];
     }
@@ -183,18 +181,16 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
     from = o->ghosted;
   }
   PetscCall(SbSpaceGetLocalRead(s, from, &x));
-  for (PetscInt i = 0; i < s->nnode; i++) {
+  for (PetscInt i = 0; i < s->nnode; i++)
     for (PetscInt c = 0; c < 3; c++) o->p[4 * i + c] = x[3 * i + c];
-  }
   PetscCall(SbSpaceRestoreLocalRead(s, from, &x));
   for (PetscInt k = 0; k < 3 * s->nfixed; k++) {
     const PetscInt i = s->fixed_node[k / 3];
 
     if (s->fixed[i] & (1 << k % 3)) o->p[4 * i + k % 3] = 0.;
   }
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     for (PetscInt c = 0; c < 4; c++) o->q[4 * i + c] = o->inertia[i] * o->p[4 * i + c];
-  }
   PetscCall(PetscArrayzero(o->q + 4 * s->nnode_owned, 4 * (s->nnode - s->nnode_owned)));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
@@ -212,9 +208,8 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   }
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     for (PetscInt c = 0; c < 3; c++) y[3 * i + c] = o->q[4 * i + c];
-  }
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
     const PetscInt i = 3 * s->fixed_node[k / 3] + k % 3;
 
@@ -427,10 +422,9 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
     for (PetscInt at = 0; at < ia[k + 1] - ia[k]; at++) {
       const PetscInt j = at < nd ? p->dj[p->di[i] + at] : p->oj[p->oi[i] + at - nd];
 
-      for (PetscInt e = 0; e < 9; e++) {
+      for (PetscInt e = 0; e < 9; e++)
         if (s->fixed[i] & (1 << e / 3) || s->fixed[j] & (1 << e % 3))
           block[9 * (ia[k] + at) + e] = i == j && e % 4 == 0 ? o->prescribed_diagonal : 0.;
-      }
     }
   }
   PetscCall(PetscFree(wanted));

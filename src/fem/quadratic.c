@@ -90,9 +90,8 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
       // theta = R : F - 3, with its derivative
       m->ops.volumetric(m, here, D);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 3. * lambda;
-      for (int k = 0; k < 9; k++) {
+      for (int k = 0; k < 9; k++)
         for (int l = 0; l < SB_BATCH; l++) p[l] -= lambda * D[k][l] * here[k][l];
-      }
     } else {
       m->ops.pressure(m, here, p);
       if (b) m->ops.volumetric(m, here, D);
@@ -129,9 +128,8 @@ void SbBatchMass(SbSpace s, const SbRegion *region, PetscInt b, SbPack mass[SB_P
 
     SbQuadraticBasis(at.rule->L[q], phi);
     SbPointVolume(&at, q, W);
-    for (int k = 0; k < npair; k++) {
+    for (int k = 0; k < npair; k++)
       for (int l = 0; l < SB_BATCH; l++) mass[k][l] += phi[SbPairA[k]] * phi[SbPairB[k]] * W[l];
-    }
   }
 }
 
@@ -158,9 +156,8 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
     SbPack D[9];
 
     if (P) region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
-    for (int k = 0; P && k < 9; k++) {
+    for (int k = 0; P && k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++) P[q][k][l] += p[l] * D[k][l];
-    }
     for (int l = 0; l < SB_BATCH; l++) {
       if (psi) psi[q][l] += p[l] * p[l] / (2. * lambda);
       if (pressure) pressure[q][l] = -p[l];

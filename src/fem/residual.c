@@ -30,18 +30,16 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
-      for (int k = 0; k < 30; k++) {
+      for (int k = 0; k < 30; k++)
         for (int l = 0; l < SB_BATCH; l++) fe[k][l] = p[l] * b10[k][l];
-      }
     }
     if (beta != 0.) {
       SbBatchGradients(s, region, b, stage->v, PETSC_TRUE, U, H);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
       for (int q = 0; q < at.n && mean; q++) {
         SbMaterialRotation(m, (const SbPack *)F[q], R);
-        for (int k = 0; k < 9; k++) {
+        for (int k = 0; k < 9; k++)
           for (int l = 0; l < SB_BATCH; l++) p[l] += at.weight[q][l] * beta * lambda * R[k][l] * H[q][k][l];
-        }
       }
     }
     for (int q = 0; q < at.n; q++) {
@@ -49,10 +47,9 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
         if (mean) SbMaterialRotation(m, (const SbPack *)F[q], R);
-        for (int k = 0; k < 9; k++) {
+        for (int k = 0; k < 9; k++)
           for (int l = 0; l < SB_BATCH; l++)
             P[k][l] = (elastic ? P[k][l] : 0.) + beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
-        }
       }
       SbPointForce(&at, q, (const SbPack *)P, fe);
     }
@@ -97,9 +94,8 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 
       if (stage->a) sb_gather_nodes(n, node, stage->a, w);
       if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
-      for (int k = 0; alpha != 0. && k < 3 * n; k++) {
+      for (int k = 0; alpha != 0. && k < 3 * n; k++)
         for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
-      }
       SbBatchMass(s, region, b, mass);
       for (int k = 0; k < 3 * npair; k++) {
         const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;

@@ -103,10 +103,9 @@ static PetscErrorCode tabulate_batches(SbSpace s)
   SbPack *curve;
 
   PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) {
+  for (PetscInt r = 0; r < s->nregion; r++)
     if (is_curved(s, s->region[r].cstart))
       bytes += each * (size_t)(s->region[r].bend - s->region[r].bstart) * sizeof(SbPack);
-  }
   PetscCall(PetscMalloc3(s->nbatch, &s->batch_cell, s->nbatch, &s->batch_n, s->nbatch * 4 * SB_BATCH,
                          &s->batch_node));
   PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
@@ -257,9 +256,8 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++)
       for (PetscInt l = 0; l < SB_BATCH; l++) sums[1] += region->material->density * s->batch_V[b][l];
-    }
   }
   PetscCallMPI(MPI_Allreduce(sums, all, 2, MPIU_REAL, MPI_SUM, s->comm));
   /* the tolerance includes rounding, which grows with the number of equal terms */
@@ -271,9 +269,8 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
 
 void SbSpaceCellPositions(SbSpace s, PetscInt cell, PetscReal x[SB_CELL_NODES][3])
 {
-  for (PetscInt a = 0; a < SB_CELL_NODES; a++) {
+  for (PetscInt a = 0; a < SB_CELL_NODES; a++)
     for (int k = 0; k < 3; k++) x[a][k] = s->node_x[3 * SbSpaceCellNode(s, cell, a) + k];
-  }
 }
 
 PetscReal SbSpaceCurvedIntegrals(SbSpace s, PetscInt cell, const SbFacet *facet,

@@ -131,9 +131,8 @@ typedef struct {
 SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restrict 9], SbPack C[restrict 81])
 {
   for (int i = 0; i < 9; i++) {
-    for (int k = 0; k < 9; k++) {
+    for (int k = 0; k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] -= lambda * (D[i][l] * D[k][l]);
-    }
   }
 }
 
@@ -156,9 +155,8 @@ static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, 
   SbPolar(F, R);
   scaled_volumes(V, x->damping, W);
   SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
-  for (int k = 0; k < 90; k++) {
+  for (int k = 0; k < 90; k++)
     for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
-  }
 }
 
 /* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
@@ -308,9 +306,8 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
     SbPack mass[SB_PAIRS];
 
     SbBatchMass(s, region, b, mass);
-    for (int k = 0; k < 3 * npair; k++) {
+    for (int k = 0; k < 3 * npair; k++)
       for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
-    }
   }
   SbInsertBatch(s, &fill->x, b, npair, PETSC_FALSE, (const SbPack(*)[9])K);
 }
@@ -360,9 +357,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
     for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
       const PetscReal scale = faces && fill[n].space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
 
-      for (int k = 0; k < 90; k++) {
+      for (int k = 0; k < 90; k++)
         for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
-      }
       fill_batch(&fill[n], r, b, inertia, copy);
     }
     fill_batch(&fill[0], r, b, inertia, K);

@@ -71,9 +71,8 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace s)
   for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
   PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
   s->nfixed = 0;
-  for (PetscInt i = 0; i < s->nnode; i++) {
+  for (PetscInt i = 0; i < s->nnode; i++)
     if (s->fixed[i]) s->fixed_node[s->nfixed++] = i;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

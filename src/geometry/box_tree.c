@@ -172,9 +172,8 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
   // initialise unused children as empty boxes
   for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++) {
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; k < 6; k++)
       for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
-    }
   }
   PetscCall(build(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -173,9 +173,8 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
 
     // the ends of the edge have weights of equal sign, the vertex of the opposite sign
     for (int a = 0; a < 4; a++) npositive += s->weight[a] > 0;
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       if (npositive == 1 ? s->weight[a] < 0 : s->weight[a] > 0) end[n++] = a;
-    }
     SbSubtract(x + 3 * end[1], x + 3 * end[0], t[0]);
     for (int k = 0; k < 3; k++) {
       c[end[1]][k] = t[0][k] / SbDot3(t[0], t[0]);
@@ -275,9 +274,8 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   for (int k = 0; k < 3; k++) m[0][k] = (k == least) - n[least] * n[k];
   (void)SbNormalise(m[0]);
   SbCross(n, m[0], m[1]);
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 4; i++)
     for (int l = 0; l < 2; l++) along[i][l] = SbDot3(c[i], m[l]);
-  }
   for (int i = 0; i < 3; i++) {
     alpha[i] = h[i][0] * w[0] + h[i][1] * w[1] + h[i][2] * w[2] + h[i][3] * w[3];
     for (int l = 0; l < 2; l++)
@@ -322,9 +320,8 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
         }
       }
       for (int k = 0; k < 4 && part; k++) G[1 + k / 2][1 + k % 2] = f * K[5 * (3 + k / 2) + 3 + k % 2];
-      for (int p = 0; p < 3; p++) {
+      for (int p = 0; p < 3; p++)
         for (int q = 0; q < 3; q++) R[p][q] = n[p] * G[0][q] + m[0][p] * G[1][q] + m[1][p] * G[2][q];
-      }
       for (int p = 0; p < 3; p++) {
         for (int q = 0; q < 3; q++) {
           const PetscReal value = R[p][0] * n[q] + R[p][1] * m[0][q] + R[p][2] * m[1][q];
@@ -352,9 +349,8 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
     d[0][k] = 2 * (vv * u[k] - uv * v[k]);
     d[1][k] = 2 * (uu * v[k] - uv * u[k]);
   }
-  for (int a = 0; g && a < 4; a++) {
+  for (int a = 0; g && a < 4; a++)
     for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * d[a / 2][k];
-  }
   for (int a = 0; H && a < 4; a++) {
     for (int b = 0; b < 4; b++) {
       const PetscReal sign = a % 2 == b % 2 ? 1 : -1;

@@ -60,9 +60,8 @@ static void axes_of(PetscReal const *const t[3], int axis[2])
   SbSubtract(t[1], t[0], e);
   SbSubtract(t[2], t[0], f);
   SbCross(e, f, n);
-  for (int k = 1; k < 3; k++) {
+  for (int k = 1; k < 3; k++)
     if (PetscAbsReal(n[k]) > PetscAbsReal(n[most])) most = k;
-  }
   axis[0] = (most + 1) % 3;
   axis[1] = (most + 2) % 3;
 }
@@ -107,9 +106,8 @@ static PetscBool meet_in_plane(const PetscReal p[3], const PetscReal q[3], Petsc
   int axis[2], side[3];
 
   axes_of(t, axis);
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     if (segments_meet(axis, p, q, t[k], t[(k + 1) % 3])) return PETSC_TRUE;
-  }
   for (int k = 0; k < 3; k++) side[k] = orient_plane(axis, t[k], t[(k + 1) % 3], p);
   return (PetscBool)(side[0] && side[0] == side[1] && side[1] == side[2]);
 }

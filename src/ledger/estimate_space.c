@@ -173,13 +173,11 @@ static PetscErrorCode create_weights(SbRecovery r)
 
     if (mesh->cell[i] >= mesh->nvert_owned) continue;
     monomials(mesh, i / 4, (int)(i % 4), p);
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       for (int b = a; b < 4; b++) *sum++ += p[a] * p[b];
-    }
   }
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n; k++)
     if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, row + 4 * k);
-  }
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     if (mesh->cell[i] >= mesh->nvert_owned) continue;
     monomials(mesh, i / 4, (int)(i % 4), p);
@@ -240,9 +238,8 @@ static PetscErrorCode create_quadratic(SbRecovery r)
     r->fit[r->slot[i]].size += SbDot3(p + 1, p + 1);
     ncell[r->slot[i]]++;
   }
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n; k++)
     if (ncell[k]) r->fit[k].size = PetscSqrtReal(r->fit[k].size / (PetscReal)ncell[k]);
-  }
 
   // normal equations: sums of products of monomials
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
@@ -251,9 +248,8 @@ static PetscErrorCode create_quadratic(SbRecovery r)
 
     if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
     point_monomials(mesh, i / 4, (int)(i % 4), r->fit[slot].size, p);
-    for (int q = 0; q < 5; q++) {
+    for (int q = 0; q < 5; q++)
       for (int k = 0; k < NFIT * NFIT; k++) r->factor[slot][q == 4][k] += p[q][k / NFIT] * p[q][k % NFIT];
-    }
   }
   for (PetscInt s = 0; s < n; s++) {
     if (!ncell[s]) continue;
@@ -288,9 +284,8 @@ static PetscErrorCode fit_quadratic(SbRecovery r, SbPointStress stress[])
     if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
     point_monomials(mesh, i / 4, (int)(i % 4), fit->size, p);
     for (int m = 0; m < NFIT; m++) {
-      for (int q = 0; q < 4; q++) {
+      for (int q = 0; q < 4; q++)
         for (int k = 0; k < 9; k++) fit->c[k][m] += p[q][m] * stress[i / 4].P[q][k];
-      }
       fit->c[9][m] += p[4][m] * stress[i / 4].pressure;
     }
   }
@@ -321,9 +316,8 @@ static PetscReal recovered(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
 
     for (int k = 0; k < 3; k++) d[k] = 0.5 * (r->mesh->x[3 * v[to] + k] - r->mesh->x[3 * v[from] + k]);
     monomials_of(d, fit->size, p);
-    for (int m = 0; m < NFIT; m++) {
+    for (int m = 0; m < NFIT; m++)
       for (int k = 0; k < NVALUE; k++) value[k] += 0.5 * p[m] * fit->c[k][m];
-    }
   }
   memcpy(P, value, 9 * sizeof(*P));
   return value[9];
@@ -545,9 +539,8 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   if (est->stress) PetscCall(fit_quadratic(r, est->stress));
   PetscCall(SbMeshBroadcastCells(mesh, 9, MPIU_REAL, est->P));
   PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++)
     for (int k = 0; k < 9; k++) r->value[9 * r->slot[i] + k] += r->weight[i] * est->P[9 * (i / 4) + k];
-  }
   PetscCall(SbMeshBroadcastVertices(mesh, 9 * r->nlayer, MPIU_REAL, r->value));
 
   /* sums over the cells of each body */

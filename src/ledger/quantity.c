@@ -72,9 +72,8 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     for (int j = 0; j < 3; j++) q->x[j] = q->node < 0 ? 0. : s->node_x[3 * q->node + j];
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
   }
-  for (PetscInt k = 0; k < m->nset; k++) {
+  for (PetscInt k = 0; k < m->nset; k++)
     if (!strcmp(m->set[k].name, q->on)) q->set = SB_SET_BIT(k);
-  }
   PetscCall(VecGetArray(q->weight, &w));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int k = 0; k < 3; k++) {

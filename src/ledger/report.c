@@ -67,9 +67,8 @@ static int largest(SbLedger l)
 {
   int most = 0;
 
-  for (int i = 1; i < SB_ERROR_COUNT; i++) {
+  for (int i = 1; i < SB_ERROR_COUNT; i++)
     if (SbLedgerError(l, i) > SbLedgerError(l, most)) most = i;
-  }
   return most;
 }
 
@@ -78,9 +77,8 @@ static PetscInt worst_body(SbLedger l)
 {
   PetscInt worst = 0;
 
-  for (PetscInt b = 1; b < l->run->model->nbody; b++) {
+  for (PetscInt b = 1; b < l->run->model->nbody; b++)
     if (l->space_error[b] > l->space_error[worst]) worst = b;
-  }
   return worst;
 }
 
@@ -98,9 +96,8 @@ static PetscReal growth(SbRun run)
   } of[] = {{"cholmod", 8.}, {"mumps", 8.},    {"umfpack", 8.},
             {"gamg", 1.},    {"pressure", 1.}, {"two_level", 1.}};
 
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++)
     if (strstr(run->solver, of[i].part)) return of[i].factor;
-  }
   return 2.;
 }
 

@@ -52,9 +52,8 @@ static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPac
 {
   (void)m;
   (void)F;
-  for (int k = 0; k < 9; k++) {
+  for (int k = 0; k < 9; k++)
     for (int l = 0; l < SB_BATCH; l++) R[k][l] = k % 4 == 0;
-  }
 }
 
 static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])

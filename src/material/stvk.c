@@ -135,9 +135,8 @@ static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], con
   const PetscBool filter = (PetscBool)(m->tangent == SB_TANGENT_EXACT_SPD);
 
   (void)F;
-  for (int k = 0; k < 9; k++) {
+  for (int k = 0; k < 9; k++)
     for (int l = 0; l < SB_BATCH; l++) C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
-  }
 }
 
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)

@@ -150,10 +150,9 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
       all |= SB_SET_BIT(k);
     else if (set[k].shape == SB_SET_BOUNDARY)
       hull |= SB_SET_BIT(k);
-    else if (set[k].shape != SB_SET_BODY && set[k].shape != SB_SET_GROUP) {
+    else if (set[k].shape != SB_SET_BODY && set[k].shape != SB_SET_GROUP)
       for (PetscInt v = 0; v < im->nvert; v++)
         m->vert[v] |= inside(&set[k], im->x + 3 * v, slack) ? SB_SET_BIT(k) : 0;
-    }
   }
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     const PetscInt *v = im->item[3].vert + 4 * c;

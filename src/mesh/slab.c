@@ -140,10 +140,10 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
     const Face *f = face + i;
 
     for (m = 1; i + m < route->nrecv && !memcmp(f->vert, f[m].vert, sizeof(f->vert));) m++;
-    if (m == 2) {
+    if (m == 2)
       for (int k = 0; k < 2; k++)
         across[f[k].at] = (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
-    } else if (m > 2 && !nshared++)
+    else if (m > 2 && !nshared++)
       first = i;
   }
   if (nshared)

@@ -223,12 +223,11 @@ static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
       if (im->middle[at[k]].end[1] == PetscMax(a, b)) of_tet[at[k]] = PETSC_TRUE;
   }
   if (found) PetscCall(PetscArraycpy(found, of_tet, im->nmiddle.n));
-  for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+  for (PetscInt i = 0; i < im->nmiddle.n; i++)
     if (of_tet[i])
       im->middle[n++] = im->middle[i];
     else if (lost.node == -1)
       lost = im->middle[i];
-  }
   im->nmiddle.n = n;
   PetscCall(PetscFree2(low, of_tet));
   PetscCall(PetscFree(start));

@@ -132,10 +132,9 @@ static PetscErrorCode next_line(Nastran *b, PetscBool *there)
     if (!end) end = s->end;
     if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
     // text without the comment; tabs become blanks up to the next multiple of 8 columns
-    for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) {
-      do line->text[n++] = isprint((unsigned char)*from) ? *from : ' ';
+    for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) do
+        line->text[n++] = isprint((unsigned char)*from) ? *from : ' ';
       while (*from == '\t' && n % 8 && n + 1 < LINE);
-    }
     cut = (PetscBool)(from < end && *from != '$');
     line->text[n] = 0;
     line->length = n;

@@ -11,10 +11,9 @@ PetscErrorCode SbModelContactResume(SbModel m)
   PetscFunctionBeginUser;
   if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   SbSpaceClearConstraints(s);
-  for (int across = 0; across < 2; across++) { /* first the normals of all effects */
+  for (int across = 0; across < 2; across++) /* first the normals of all effects */
     for (PetscInt e = 0; e < m->nassemble_constraints; e++)
       SbEffectCall(m->assemble_constraints[e], assemble_constraints, s, (PetscBool)across);
-  }
   PetscCall(SbSpaceAssembleConstraints(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -79,10 +78,9 @@ PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec 
   PetscFunctionBeginUser;
   PetscCall(SbEvaluationBegin(m, t, &e));
   e.stage.dt = dt;
-  for (PetscInt k = 0; k < m->nbegin_step; k++) {
+  for (PetscInt k = 0; k < m->nbegin_step; k++)
     if (m->begin_step[k]->ops.target_velocity)
       SbEffectCall(m->begin_step[k], target_velocity, m->space, &e.stage);
-  }
   PetscCall(SbEvaluationEnd(m, &e));
   PetscCall(VecGetArray(V, &v));
   SbConstraintsPrescribe(m->space, PETSC_TRUE, v);
@@ -99,9 +97,8 @@ PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
   PetscCall(PetscMalloc1(m->space->nnode, &gap));
   PetscCall(SbEvaluationBegin(m, t, &e));
   for (PetscInt i = 0; i < m->space->nnode; i++) gap[i] = PETSC_MAX_REAL;
-  for (PetscInt k = 0; k < m->neffect; k++) {
+  for (PetscInt k = 0; k < m->neffect; k++)
     if (m->effect[k]->ops.gap) SbEffectCall(m->effect[k], gap, m->space, &e.stage, gap, e.f);
-  }
   for (PetscInt i = 0; i < 3 * m->space->nnode; i++)
     if (gap[i / 3] < PETSC_MAX_REAL) e.f[i] *= gap[i / 3];
   PetscCall(SbEvaluationEnd(m, &e));
@@ -115,10 +112,9 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec F)
 
   PetscFunctionBeginUser;
   PetscCall(SbEvaluationBegin(m, t, &e));
-  for (PetscInt k = 0; k < m->neffect; k++) {
+  for (PetscInt k = 0; k < m->neffect; k++)
     if (m->effect[k]->ops.contact_points && m->effect[k]->ops.force)
       SbEffectCall(m->effect[k], force, m->space, &e.stage, e.f);
-  }
   if (m->space->constraints) SbConstraintsAddForces(m->space, e.f);
   PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);

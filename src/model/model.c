@@ -90,9 +90,8 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   do {                                                                      \
     PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST");        \
     (m)->op = list;                                                         \
-    for (PetscInt i_ = 0; i_ < (m)->neffect; i_++) {                        \
+    for (PetscInt i_ = 0; i_ < (m)->neffect; i_++)                          \
       if ((m)->effect[i_]->ops.op) (m)->op[(m)->n##op++] = (m)->effect[i_]; \
-    }                                                                       \
     list += (m)->n##op;                                                     \
   } while (0)
 
@@ -111,9 +110,8 @@ PetscErrorCode SbModelSetUp(SbModel m)
   }
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
-  for (PetscInt b = 0; b < m->nbody; b++) {
+  for (PetscInt b = 0; b < m->nbody; b++)
     if (m->body[b].in_memory && m->body[b].in_memory->mass > 0.) PetscCall(match_mass(m, b));
-  }
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
   /* skip supports that do not act at this time */
@@ -175,9 +173,8 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
   }
   if (U) PetscCall(VecRestoreArrayRead(U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
-  for (PetscInt b = 0; b < m->nbody; b++) {
+  for (PetscInt b = 0; b < m->nbody; b++)
     for (PetscInt k = 0; k < 3; k++) centre[b][k] /= centre[b][3];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -219,20 +216,16 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   /* constant ones first: they have a common factor */
-  for (PetscInt e = 0; e < m->nforce; e++) {
+  for (PetscInt e = 0; e < m->nforce; e++)
     if (m->force[e]->steady && SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
-  }
-  if (m->load != 1.) {
+  if (m->load != 1.)
     for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
-  }
-  for (PetscInt e = 0; e < m->nforce; e++) {
+  for (PetscInt e = 0; e < m->nforce; e++)
     if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential) && SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
-  }
-  if (sign != 1.) {
+  if (sign != 1.)
     for (PetscInt i = 0; i < n; i++) f[i] *= sign;
-  }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -307,10 +300,9 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
 PetscErrorCode SbModelProjectTangent(SbModel m, PetscBool filter)
 {
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < m->nmaterial; k++) {
+  for (PetscInt k = 0; k < m->nmaterial; k++)
     if (m->material[k]->adaptive)
       PetscCall(SbMaterialSetTangent(m->material[k], filter ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
-  }
   m->space->tentative = (PetscBool)(m->may_filter && !filter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -322,13 +314,11 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
 
   PetscFunctionBeginUser;
   if (!m->nprescribe && !s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; e < m->nprescribe; e++) {
+  for (PetscInt e = 0; e < m->nprescribe; e++)
     if (m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
-  }
   for (PetscInt k = 0; k < 3 * s->nfixed; k++) s->fixed_value[k] *= m->load;
-  for (PetscInt e = 0; e < m->nprescribe; e++) {
+  for (PetscInt e = 0; e < m->nprescribe; e++)
     if (!m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
-  }
   PetscCall(VecGetArray(U, &u));
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
     const PetscInt node = s->fixed_node[k / 3];

@@ -26,9 +26,8 @@ static int by_value(const void *a, const void *b)
   const PetscReal difference[6] = {
     body, p->n[0] - q->n[0], p->n[1] - q->n[1], p->n[2] - q->n[2], p->gap - q->gap, p->to - q->to};
 
-  for (int i = 0; i < 6; i++) {
+  for (int i = 0; i < 6; i++)
     if (difference[i] != 0.) return difference[i] < 0. ? -1 : 1;
-  }
   return 0;
 }
 
@@ -52,9 +51,8 @@ static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt n
       const PetscReal missing = t->to - gap_after(t, way);
       PetscReal sum = 0.;
 
-      for (int k = 0; k < 6; k++) {
+      for (int k = 0; k < 6; k++)
         if (!(fixed[t->body[k / 3]] >> (k % 3) & 1)) sum += PetscSqr(t->n[k % 3]);
-      }
       if (missing <= 0. || sum < MISSED) continue;
       worst = PetscMax(worst, missing / t->to);
       for (int k = 0; k < 6; k++) {
@@ -206,9 +204,8 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
   if (!m->nrestitution || !V0) PetscFunctionReturn(PETSC_SUCCESS);
   SbModelRestitutionBegin(m, dt, U0, V0);
   PetscCall(SbEvaluationBegin(m, t, &at));
-  for (PetscInt e = 0; e < m->npotential; e++) {
+  for (PetscInt e = 0; e < m->npotential; e++)
     if (m->potential[e]->ops.meet) CONTACT_CALL(m->potential[e], meet, m->space, dt, at.stage.u, at.stage.v);
-  }
   PetscCall(SbEvaluationEnd(m, &at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -299,9 +296,8 @@ PetscErrorCode SbModelPotentialGradient(SbModel m, Vec U, PetscReal scale, Petsc
   for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], potential, s, u, &sum, f);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   PetscCall(VecGetArray(F, &out));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     if (!free_only || !(s->fixed[i / 3] & (1 << (i % 3)))) out[i] += scale * f[i];
-  }
   PetscCall(VecRestoreArray(F, &out));
   PetscCall(PetscFree(f));
   if (energy) PetscCallMPI(MPI_Allreduce(&sum, energy, 1, MPIU_REAL, MPI_SUM, m->comm));

@@ -119,10 +119,9 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
 
   /* the mesh in one number: a restart on another mesh is refused */
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++)
     for (PetscInt c = 0; c < 3; c++)
       sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
-  }
   for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
     for (PetscInt a = 0; a < 4; a++)
       sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);

@@ -42,9 +42,8 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
   /* cells of each node: a rank has all those of its own nodes; ghosts get the number from their owners */
   PetscCall(PetscCalloc1(3 * s->nnode, &count));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++)
     if (s->edge_node[i] >= 0) count[3 * s->edge_node[i]] += 1.;
-  }
   PetscCall(SbSpaceUpdateGhosts(s, count));
   PetscCall(PetscMalloc1(s->nnode, &p->valence));
   for (PetscInt i = 0; i < s->nnode; i++) p->valence[i] = count[3 * i];
@@ -147,9 +146,8 @@ typedef struct {
 /* value += factor times the force at a node */
 static void add_force(const Forces *f, PetscInt node, PetscReal factor, PetscReal value[3])
 {
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     if (!f->prescribed || f->s->fixed[node] & (1 << k)) value[k] += factor * f->r[3 * node + k];
-  }
 }
 
 /* Adds a cell's share of the forces at its nodes to one of its corners. */
@@ -186,14 +184,13 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
     const SbPlace at = SbPointsPlace(run, out, i);
     const PetscInt node = at.vertex < 0 ? at.node : at.corner < 0 ? vertex_node(s, p, at.vertex) : -1;
 
-    if (at.corner >= 0) {
+    if (at.corner >= 0)
       add_corner_force(&f, p->valence, at.corner, values + 3 * i);
-    } else if (node >= 0) {
+    else if (node >= 0)
       add_force(&f, node, out->discontinuous ? 1. / p->valence[node] : 1., values + 3 * i);
-    } else {
+    else
       for (PetscInt k = p->start[at.vertex]; k < p->start[at.vertex + 1]; k++)
         add_corner_force(&f, p->valence, p->corner[k], values + 3 * i);
-    }
   }
   PetscCall(SbSpaceRestoreLocalRead(s, R, &f.r));
   PetscFunctionReturn(PETSC_SUCCESS);

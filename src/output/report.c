@@ -130,10 +130,9 @@ PetscErrorCode SbReportHeader(SbRun run)
     if (strcmp(effect->name, effect->type)) SbAppend(sizeof(text), text, " (%s)", effect->type);
   }
   PetscCall(entry("effects", "%s", text[0] ? text : "none"));
-  for (PetscInt e = 0; e < run->model->neffect; e++) {
+  for (PetscInt e = 0; e < run->model->neffect; e++)
     if (run->model->effect[e]->note[0])
       PetscCall(entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note));
-  }
   // integrator and steps
   SbRunIntegrator(run, sizeof(name), name);
   if (run->arc.on)

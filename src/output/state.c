@@ -243,10 +243,9 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nsupport, 1, MPIU_INT, MPI_SUM, out->comm));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     row[i] = (PetscInt)number[i] + (s->node_orig[i] >= edge ? n - out->node.N : 0);
-  for (PetscInt i = 0; n != out->node.N && s->dirichlet_node && i < 4 * s->mesh->ncell; i++) {
+  for (PetscInt i = 0; n != out->node.N && s->dirichlet_node && i < 4 * s->mesh->ncell; i++)
     if (s->dirichlet_node[i] >= 0 && s->dirichlet_node[i] < s->nnode_owned)
       row[s->dirichlet_node[i]] = row[s->cell_node[i]];
-  }
   *ok = (PetscBool)(*ok && (n == out->node.N || (weak && n >= out->node.N - nsupport)));
   PetscCall(PetscFree(number));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -196,9 +196,8 @@ static PetscErrorCode find_vanishing(SbCoarse c)
     PetscCall(PetscArrayzero(projector, 36));
     PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &six, gram, &six, eigen, work, &nwork, &info));
     PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
-    for (int v = 0; v < 6 && eigen[v] <= VANISHING * eigen[5]; v++) {
+    for (int v = 0; v < 6 && eigen[v] <= VANISHING * eigen[5]; v++)
       for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -284,9 +283,8 @@ static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscI
 
             if (b < 0 || mark[b] == stamp) continue;
             mark[b] = stamp;
-            for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++, nz++) {
+            for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++, nz++)
               if (pass) c->ja[nz] = (b < c->n ? c->first + b : c->other[b - c->n]) + q;
-            }
           }
         }
       }
@@ -383,9 +381,8 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
     const PetscInt *unit = c->unit + 2 * i;
     PetscReal f[3], moment[6] = {0.};
 
-    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++) {
+    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++)
       if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) m[3 * unit[e / 3] + e % 3] += 0.5 * r[3 * i + e % 3];
-    }
     if (unit[0] < 0 || c->way[i] == SB_MEAN) continue;
     for (int q = 0; q < 3; q++) {
       f[q] = c->way[i] == SB_MEMBER && s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
@@ -432,9 +429,8 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
     const PetscInt *unit = c->unit + 2 * i;
     PetscReal u[3];
 
-    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++) {
+    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++)
       if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) z[3 * i + e % 3] += 0.5 * x[3 * unit[e / 3] + e % 3];
-    }
     for (int q = 0; q < 3 && unit[0] >= 0 && c->way[i] == SB_ITSELF; q++) z[3 * i + q] += x[3 * unit[0] + q];
     if (c->way[i] != SB_MEMBER) continue;
     motion(c->d + 3 * i, x + 3 * unit[0], u);

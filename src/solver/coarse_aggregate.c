@@ -46,9 +46,8 @@ static void find_seeds(SbPlan p, PetscInt nnode, PetscInt size, PetscInt agg[], 
 
     /* a free neighbour of the balls so far, else any free node */
     for (; head < tail && from < 0; head += from < 0) {
-      for (PetscInt k = p->di[queue[head]]; k < p->di[queue[head] + 1] && from < 0; k++) {
+      for (PetscInt k = p->di[queue[head]]; k < p->di[queue[head] + 1] && from < 0; k++)
         if (agg[p->dj[k]] == -1) from = p->dj[k];
-      }
     }
     while (from < 0 && next < nnode && agg[next] != -1) next++;
     if (from < 0 && next == nnode) break;
@@ -85,10 +84,9 @@ PetscErrorCode SbAggregate(SbSpace s, PetscInt wanted, PetscInt *n, PetscInt agg
     /* each seed moves to the node nearest to the centroid of its aggregate */
     for (PetscInt k = 0; k < 4 * *n; k++) sum[k] = 0.;
     for (PetscInt a = 0; a < *n; a++) best[a] = PETSC_MAX_REAL;
-    for (PetscInt i = 0; i < nnode; i++) {
+    for (PetscInt i = 0; i < nnode; i++)
       for (PetscInt c = 0; c < 4 && agg[i] >= 0; c++)
         sum[4 * agg[i] + c] += c < 3 ? s->node_x[3 * i + c] : 1.;
-    }
     for (PetscInt i = 0; i < nnode; i++) {
       const PetscInt a = agg[i];
       PetscReal d2 = 0.;

@@ -66,10 +66,9 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
   PetscFunctionBeginUser;
   // entries of each row in columns of this rank and of others
   PetscCall(PetscCalloc2(3 * c->n, &own, 3 * c->n, &foreign));
-  for (PetscInt row = 0; row < 3 * c->n; row++) {
+  for (PetscInt row = 0; row < 3 * c->n; row++)
     for (PetscInt k = c->ia[row / 3]; k < c->ia[row / 3 + 1]; k++)
       (c->ja[k] >= c->first && c->ja[k] < c->first + c->n ? own : foreign)[row] += 3;
-  }
   // the matrix E, of 6x6 blocks for aggregates
   PetscCall(MatCreate(c->space->comm, &c->E));
   PetscCall(MatSetSizes(c->E, 3 * c->n, 3 * c->n, PETSC_DETERMINE, PETSC_DETERMINE));

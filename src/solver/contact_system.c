@@ -165,13 +165,12 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
       stamp[m] = c->nsolve;
     }
     PetscCall(PetscSortIntWithArray(m, column, stamp));
-    for (PetscInt k = 0; k < m; k++) {
+    for (PetscInt k = 0; k < m; k++)
       if (!k || column[k] != column[k - 1]) {
         ja[nz] = column[k];
         used[nz++] = stamp[k];
       } else
         used[nz - 1] = used[nz - 1] < 0 || stamp[k] < 0 ? -1 : PetscMax(used[nz - 1], stamp[k]);
-    }
     ia[r + 1] = nz;
     c->rows.contact[r] =
       (uint8_t)(c->space->fixed[r] != 7 && c->last[r] >= 0 && c->last[r] + KEEP >= c->nsolve);
@@ -185,9 +184,8 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   c->rows.ja = ja;
   c->used = used;
   PetscCall(PetscMalloc1(9 * (size_t)nz, &c->rows.value));
-  for (PetscInt r = 0; r < n; r++) {
+  for (PetscInt r = 0; r < n; r++)
     for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = SbRowFind(ia, ja, r, c->kj[k]);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,12 +211,10 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, NULL, c->ka, NULL, c->tangent));
   /* blocks of the tangent are overwritten, those of contact alone start from zero */
-  for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
+  for (PetscInt k = 0; k < rows->ia[rows->n]; k++)
     if (c->used[k] >= 0) PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
-  }
-  for (PetscInt k = 0; k < c->ka[rows->n]; k++) {
+  for (PetscInt k = 0; k < c->ka[rows->n]; k++)
     for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
-  }
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt place = SbRowFind(rows->ia, rows->ja, b->node[k][0], b->node[k][1]);
     PetscReal *to = rows->value + 9 * (size_t)place;

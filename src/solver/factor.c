@@ -180,9 +180,8 @@ static PetscErrorCode add_update(const SbElimination *e, PetscInt g, Work *work,
       PetscScalar *column = to + (size_t)(3 * at[j] + a) * (size_t)ld;
 
       for (PetscInt b = a; b < 3; b++) column[3 * at[j] + b] += from[3 * j + b];
-      for (PetscInt i = j + 1; i < nrow; i++) {
+      for (PetscInt i = j + 1; i < nrow; i++)
         for (PetscInt b = 0; b < 3; b++) column[3 * at[i] + b] += from[3 * i + b];
-      }
     }
   }
   PetscCall(PetscFree(work->update[g]));
@@ -305,9 +304,8 @@ SB_KERNEL void SbFactorForward(SbFactor f, const float b[], float kept[])
   float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
 
   // copy into the order of elimination; w <- L^-1 w, from the first panel to the last
-  for (PetscInt i = 0; i < e->n; i++) {
+  for (PetscInt i = 0; i < e->n; i++)
     for (PetscInt c = 0; c < 3; c++) w[3 * i + c] = b[3 * e->order[i] + c];
-  }
   for (PetscInt q = 0; q < f->npanel; q++) {
     const Panel *p = &f->panel[q];
     const PetscInt ncol = 3 * p->ncol;
@@ -319,9 +317,8 @@ SB_KERNEL void SbFactorForward(SbFactor f, const float b[], float kept[])
     // subtract their contribution from the rows below
     for (PetscInt j = 0; j < ncol; j++) x[j] = pivot[j];
     panel_multiply(round_up(3 * p->nrow), ncol, a, pivot, scale + 1, below);
-    for (PetscInt k = 0; k < p->nrow; k++) {
+    for (PetscInt k = 0; k < p->nrow; k++)
       for (int c = 0; c < 3; c++) w[3 * p->row[k] + c] -= below[3 * k + c];
-    }
   }
   // the right-hand side of the kept nodes
   for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) kept[i - 3 * e->nfree] = w[i];
@@ -343,9 +340,8 @@ SB_KERNEL void SbFactorBackward(SbFactor f, const float kept[], float x[])
     float *own = w + 3 * p->first;
 
     // contribution of the solution in the rows below to the right-hand side of the panel
-    for (PetscInt k = 0; k < p->nrow; k++) {
+    for (PetscInt k = 0; k < p->nrow; k++)
       for (int c = 0; c < 3; c++) below[3 * k + c] = w[3 * p->row[k] + c];
-    }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
     // the unknowns of the panel: transposed inverse times the difference
@@ -354,9 +350,8 @@ SB_KERNEL void SbFactorBackward(SbFactor f, const float kept[], float x[])
     panel_transposed(square, ncol, a, pivot, scale, own);
   }
   // into the order of the caller
-  for (PetscInt i = 0; i < e->n; i++) {
+  for (PetscInt i = 0; i < e->n; i++)
     for (PetscInt c = 0; c < 3; c++) x[3 * e->order[i] + c] = w[3 * i + c];
-  }
 }
 
 PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])

@@ -27,9 +27,8 @@ static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja
   PetscCall(PetscMalloc4(n + 1, &xadj, ia[n] + 1, &adj, n, &perm, n, &iperm));
   for (PetscInt i = 0; i < n; i++) {
     xadj[i] = k;
-    for (PetscInt e = ia[i]; e < ia[i + 1]; e++) {
+    for (PetscInt e = ia[i]; e < ia[i + 1]; e++)
       if (ja[e] != i && ja[e] < n) adj[k++] = (idx_t)ja[e];
-    }
   }
   xadj[n] = k;
   METIS_SetDefaultOptions(options);
@@ -72,9 +71,8 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
   PetscCall(PetscMalloc4(n, &size, n, &end, n, &fresh, n, &old));
   // sizes of the subtrees; a parent comes after its children
   for (PetscInt j = 0; j < n; j++) size[j] = 1;
-  for (PetscInt j = 0; j < n; j++) {
+  for (PetscInt j = 0; j < n; j++)
     if (parent[j] >= 0) size[parent[j]] += size[j];
-  }
   // from the last root on: each subtree before those of later siblings; end[]: where the next child's ends
   for (PetscInt j = n - 1; j >= 0; j--) {
     PetscInt *place = parent[j] < 0 ? &last : &end[parent[j]];
@@ -157,9 +155,8 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
     /* structure of column j without j, sorted: own entries and those of its children */
     nrows[j] = 0;
     for (PetscInt k = ia[node]; k < ia[node + 1]; k++) append(j, e->inverse[ja[k]], mark, &nrows[j], out);
-    for (PetscInt c = child[j]; c >= 0; c = sibling[c]) {
+    for (PetscInt c = child[j]; c >= 0; c = sibling[c])
       for (PetscInt k = 0; k < nrows[c]; k++) append(j, rows[c][k], mark, &nrows[j], out);
-    }
     PetscCall(PetscSortInt(nrows[j], out));
     PetscCall(PetscMalloc1(nrows[j], &rows[j]));
     PetscCall(PetscArraycpy(rows[j], out, nrows[j]));

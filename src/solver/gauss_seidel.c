@@ -113,10 +113,9 @@ PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[],
     PetscCall(PetscArrayzero(extra, 3 * n));
     PetscCall(SbMatGetBlocks(A, &b));
     if (b.part[1]) PetscCall(SbMatGetPattern(b.part[1], &n, &far, &column));
-    for (PetscInt i = 0; i < n && far; i++) {
+    for (PetscInt i = 0; i < n && far; i++)
       for (PetscInt k = 9 * far[i]; k < 9 * far[i + 1]; k++)
         extra[3 * i + k % 3] += 0.5 * PetscAbsReal(b.value[1][k]);
-    }
     PetscCall(SbMatRestoreBlocks(&b));
   }
   PetscCall(MatSeqSBAIJGetArray(local, &a));

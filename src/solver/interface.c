@@ -117,9 +117,8 @@ PetscErrorCode SbInterfaceCreate(SbSpace s, SbInterface *face)
   PetscCall(PetscMalloc1(s->nnode, &f->index));
   PetscCall(choose_nodes(s, f->index, &f->n));
   PetscCall(PetscMalloc1(f->n, &f->mine));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (f->index[i] >= 0) f->mine[f->nmine++] = i;
-  }
   f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
   PetscCall(PetscMalloc1(f->nblock, &f->rows));
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->n, &f->scale));
@@ -234,9 +233,8 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
 
     r.nrow = block_of(n, b, &r.first);
     r.offset = f->nword;
-    for (PetscMPIInt k = 1; k < size; k++) {
+    for (PetscMPIInt k = 1; k < size; k++)
       if (load[k] < load[least]) least = k;
-    }
     words = round_up(r.first + r.nrow) * (size_t)r.nrow / 2;
     load[least] += (PetscInt64)(sizeof(*f->word) * words);
     if (least != rank) continue;

@@ -35,9 +35,8 @@ static PetscErrorCode note_allocate(size_t size, PetscBool clear, int line, cons
 
 static PetscErrorCode note_release(void *p, int line, const char function[], const char file[])
 {
-  for (int k = 0; k < noted.n; k++) {
+  for (int k = 0; k < noted.n; k++)
     if (noted.wrapped[k] == p) noted.wrapped[k] = NULL;
-  }
   return (*noted.release)(p, line, function, file);
 }
 

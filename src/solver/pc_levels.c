@@ -40,15 +40,13 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
     const PetscBool face = (PetscBool)(SbSpaceCellElement(to, i / 4)->nodes_per[0] &&
                                        !SbSpaceCellElement(from, i / 4)->nodes_per[0]);
 
-    for (PetscInt c = 0; c < 9 && fixed; c++) {
+    for (PetscInt c = 0; c < 9 && fixed; c++)
       if (fixed & (1 << (c % 3))) mark[3 * node[face ? (a + 1 + c / 3) % 4 : a] + c % 3] = 1.;
-    }
   }
   /* owners know all cells of their nodes, and send the marks to the other ranks */
   PetscCall(SbSpaceUpdateGhosts(to, mark));
-  for (PetscInt k = 0; k < 3 * to->nnode; k++) {
+  for (PetscInt k = 0; k < 3 * to->nnode; k++)
     if (mark[k] > 0.) PetscCall(SbSpacePrescribe(to, k / 3, 1 << (k % 3)));
-  }
   PetscCall(SbSpacePrescribeDone(to));
   PetscCall(PetscFree(mark));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -48,10 +48,9 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
       SbPack cell_u[30], sum = {0};
 
       sb_gather_strain(s, region, b, local, cell_u);
-      for (int k = 0; k < 3 * region->nnode; k++) {
+      for (int k = 0; k < 3 * region->nnode; k++)
         for (int l = 0; l < SB_BATCH; l++)
           sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
-      }
       for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
     }
   }
@@ -90,10 +89,9 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
       SbPack force[30], lane = {0};
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
-      for (int k = 0; k < 3 * region->nnode; k++) {
+      for (int k = 0; k < 3 * region->nnode; k++)
         for (int l = 0; l < SB_BATCH; l++)
           force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
-      }
       sb_scatter_strain(s, region, b, force, f);
     }
   }

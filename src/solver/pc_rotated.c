@@ -77,9 +77,8 @@ static PetscErrorCode number_nodes(Rotated *p)
   PetscCall(SbSpaceGetRows(s, NULL, ninterior, p->node, p->ia, p->ja, NULL));
   nz = 0;
   for (PetscInt k = 0, e = 0; k < ninterior; k++) {
-    for (; e < p->ia[k + 1]; e++) {
+    for (; e < p->ia[k + 1]; e++)
       if (p->local[p->ja[e]] >= 0) p->ja[nz++] = p->local[p->ja[e]];
-    }
     p->ia[k + 1] = nz;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,9 +99,8 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   /* the operator's rows of the interior, then those of interface and fully prescribed nodes */
   PetscCall(PetscMalloc4(n, &node, n + 1, &ia, nall, &ja, 9 * (size_t)nall, &block));
   PetscCall(PetscArraycpy(node, p->node, ninterior));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < n; i++)
     if (index[i] >= 0 || s->fixed[i] == 7) node[count++] = i;
-  }
   PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
 
   /* factor the interior, without the columns of fully prescribed nodes */

@@ -129,9 +129,8 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
 
 static const SbSolverPreset *find_preset(const char *name)
 {
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(presets); k++) {
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(presets); k++)
     if (!strcmp(presets[k].name, name)) return &presets[k];
-  }
   return NULL;
 }
 
@@ -214,9 +213,8 @@ static PetscErrorCode find_type(const char *choice, const SbSolverPreset **prese
     PetscCall(preset_value(base, "-pc_type", sizeof(own), own));
     *preset = strcmp(own, type) ? NULL : base;
   }
-  for (size_t k = 0; !*preset; k++) {
+  for (size_t k = 0; !*preset; k++)
     if (!strcmp(by_type[k].name, type) || !by_type[k].name[0]) *preset = &by_type[k];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -107,10 +107,9 @@ static PetscInt norm_support(KSP ksp, KSPNormType norm)
 {
   PetscInt best = 0;
 
-  for (PCSide side = PC_LEFT; side < PC_SIDE_MAX; side++) {
+  for (PCSide side = PC_LEFT; side < PC_SIDE_MAX; side++)
     if (ksp->pc_side_set == PC_SIDE_DEFAULT || ksp->pc_side_set == side)
       best = PetscMax(best, ksp->normsupporttable[norm][side]);
-  }
   return best;
 }
 

@@ -489,9 +489,8 @@ PetscErrorCode SbRunSetUp(SbRun run)
   char reason[128];
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) {
+  for (PetscInt b = 0; b < m->nbody; b++)
     if (s->alpha[b] != 0. || s->beta[b] != 0.) run->damped = m->dynamic;
-  }
   PetscCall(SbSpaceCreateVec(s, &run->mass));
   PetscCall(VecGetArrayWrite(run->mass, &mass));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) mass[i] = s->node_mass[i / 3];

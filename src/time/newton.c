@@ -175,9 +175,8 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   if (m->npotential) {
     PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
     PetscCall(VecAYPX(n->rhs, n->run->barrier_weight, snes->vec_func));
-    for (PetscInt k = 0; k < n->blocks.n; k++) {
+    for (PetscInt k = 0; k < n->blocks.n; k++)
       for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->barrier_weight;
-    }
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {

@@ -37,9 +37,8 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
       (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
   /* the cells of DG have separate nodes: united across faces; edge nodes of P2 follow */
-  for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++) {
+  for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++)
     if (s->edge_node[i] >= 0) (void)SbUnionJoin(parent, s->cell_node[4 * (i / 6)], s->edge_node[i]);
-  }
   for (PetscInt b = 0; s->batch_weight && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
@@ -318,9 +317,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(VecAbs(d));
   PetscCall(label_parts(s, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (label[i] == s->gnode[i]) own[mine++] = label[i];
-  }
   PetscCall(SbAllgatherv(s->comm, MPIU_INT, mine, own, &npart, &list, NULL));
   PetscCall(PetscSortInt(npart, list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
@@ -352,9 +350,8 @@ PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far)
   PetscReal size = 0., most;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) {
+  for (PetscInt b = 0; b < m->nbody; b++)
     for (int c = 0; c < 3; c++) size = PetscMax(size, m->body[b].bbox[3 + c] - m->body[b].bbox[c]);
-  }
   PetscCall(VecNorm(X, NORM_INFINITY, &most));
   *far = (PetscBool)(most > FAR * size);
   PetscFunctionReturn(PETSC_SUCCESS);

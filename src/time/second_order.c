@@ -406,10 +406,9 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
   const PetscBool staged = (PetscBool)(so->set.alpha_f != 1. || so->set.alpha_m != 1.);
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 11; k++) {
+  for (int k = 0; k < 11; k++)
     if (k < 5 || (k < 8 ? staged : k < 10 ? so->set.impulses : ts->usessnes))
       PetscCall(VecDuplicate(ts->vec_sol, &so->all[k]));
-  }
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -61,9 +61,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
   int none = 1;
 
   (void)argc;
-  for (int i = 0; name && i < NFUZZ; i++) {
+  for (int i = 0; name && i < NFUZZ; i++)
     if (!strcmp(name, fuzz_readers[i].name)) reader = i;
-  }
   if (reader < 0) {
     fprintf(stderr, "fuzz: set SB_FUZZ_READER to one of:");
     for (int i = 0; i < NFUZZ; i++) fprintf(stderr, " %s", fuzz_readers[i].name);

@@ -174,9 +174,8 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-verbose", &verbose));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-case", name, sizeof(name), &named));
   /* options after -more must not be parsed by PETSc */
-  for (int i = 1; i + 1 < argc; i++) {
+  for (int i = 1; i + 1 < argc; i++)
     if (!strcmp(argv[i], "-more")) PetscCall(PetscStrncpy(more, argv[i + 1], sizeof(more)));
-  }
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-runs", &runs, NULL));
   if (list) {
     list_cases();

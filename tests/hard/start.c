@@ -33,9 +33,8 @@ PetscErrorCode HardNoise(HardRun *r, PetscReal amplitude, Vec X)
   PetscCall(draw(r, &noise));
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
       if (!(s->fixed[i] & (1 << k))) x[3 * i + k] += amplitude * noise[3 * s->node_orig[i] + k];
-    }
   }
   PetscCall(VecRestoreArray(X, &x));
   PetscCall(PetscFree(noise));
@@ -54,9 +53,8 @@ PetscErrorCode HardPlace(HardRun *r, void (*place)(const HardRun *r, const Petsc
     PetscReal to[3];
 
     place(r, x, to);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
       if (!(s->fixed[i] & (1 << k))) u[3 * i + k] += to[k] - x[k];
-    }
   }
   PetscCall(VecRestoreArray(r->run->U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);

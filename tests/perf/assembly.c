@@ -46,9 +46,8 @@ static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9]
   SbPack u[12], F[9], R[9];
 
   for (int a = 0; a < 4; a++) {
-    for (int l = 0; l < SB_BATCH; l++) {
+    for (int l = 0; l < SB_BATCH; l++)
       for (int i = 0; i < 3; i++) u[3 * a + i][l] = w->u[3 * node[a * SB_BATCH + l] + i];
-    }
   }
   SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, F);
   m->ops.frame(m, (const SbPack *)F, R);

@@ -50,9 +50,8 @@ static PetscInt sort_unique(PetscInt n, PetscInt x[])
   PetscInt left = 0;
 
   qsort(x, (size_t)n, sizeof(*x), by_number);
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n; k++)
     if (!k || x[k] != x[k - 1]) x[left++] = x[k];
-  }
   return left;
 }
 
@@ -64,10 +63,9 @@ static PetscErrorCode list_stars(SbSpace s, PetscInt **start, PetscInt **node)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(mesh->nvert_owned + 1, &at));
-  for (PetscInt k = 0; k < 4 * mesh->ncell; k++) {
+  for (PetscInt k = 0; k < 4 * mesh->ncell; k++)
     if (mesh->cell[k] < mesh->nvert_owned)
       at[mesh->cell[k]] += 6; /* three faces, each perhaps with a support */
-  }
   for (PetscInt v = 0; v <= mesh->nvert_owned; v++) {
     const PetscInt n = v < mesh->nvert_owned ? at[v] : 0;
 
@@ -117,10 +115,9 @@ static PetscErrorCode number_stars(Stars *t, IS *all)
     n += t->length[v];
   }
   n = sort_unique(n, list);
-  for (PetscInt v = 0; v < t->n; v++) {
+  for (PetscInt v = 0; v < t->n; v++)
     for (PetscInt k = t->start[v]; k < t->start[v] + t->length[v]; k++)
       PetscCall(PetscFindInt(t->node[k], n, list, &t->node[k]));
-  }
   PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, n, list, PETSC_COPY_VALUES, all));
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -44,9 +44,8 @@ static double peak(void)
   long value = 0;
   FILE *f = fopen("/proc/self/status", "r");
 
-  while (f && fgets(line, sizeof(line), f)) {
+  while (f && fgets(line, sizeof(line), f))
     if (!strncmp(line, "VmHWM:", 6)) value = strtol(line + 6, NULL, 10);
-  }
   if (f) (void)fclose(f);
   return (double)value;
 }

@@ -37,9 +37,8 @@ static inline void axis_rotation(const PetscReal axis[3], PetscReal angle, Petsc
   const PetscReal n = sqrt(SbDot3(axis, axis)), a[3] = {axis[0] / n, axis[1] / n, axis[2] / n};
   const PetscReal c = cos(angle), s = sin(angle);
 
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) Q[3 * i + j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
-  }
   for (int i = 0; i < 3; i++) {
     Q[3 * i + (i + 1) % 3] -= s * a[(i + 2) % 3];
     Q[3 * i + (i + 2) % 3] += s * a[(i + 1) % 3];
@@ -78,9 +77,8 @@ static inline void with_stretches(PetscReal s0, PetscReal s1, PetscReal s2, Pets
 /* A batch with F in lane 2 and unrelated numbers around it. */
 static inline void batch(const PetscReal F[9], SbPack f[9])
 {
-  for (int l = 0; l < SB_BATCH; l++) {
+  for (int l = 0; l < SB_BATCH; l++)
     for (int k = 0; k < 9; k++) f[k][l] = (k % 4 == 0) + 0.1 * l - 0.03 * k;
-  }
   SbPackPut(9, F, 2, f);
 }
 
@@ -177,9 +175,8 @@ static inline void check_derivatives(SbMaterial m, const PetscReal F[9], const c
     SB_CHECK(r[1][0] < 1e-13 * (m->E + m->lambda), "%s: remainder %g of a linear stress", what, r[1][0]);
   else
     SB_CHECK_NEAR(log2(r[1][0] / r[1][1]), 2, 0.1, what);
-  for (int i = 0; i < 9; i++) {
+  for (int i = 0; i < 9; i++)
     for (int k = 0; k < i; k++) SB_CHECK(C[9 * i + k] == C[9 * k + i], "%s: tangent not symmetric", what);
-  }
 }
 
 /* The curvature of theta is the derivative of its derivative: D(F + t H) - D(F) - t C : H is at most quadratic in t. */
@@ -396,9 +393,8 @@ static inline void check_lanes(SbMaterial m)
     stress_of(m, F, p);
     tangent_of(m, F, c);
     for (int place = 0; place < SB_BATCH; place++) {
-      for (int l = 0; l < SB_BATCH; l++) {
+      for (int l = 0; l < SB_BATCH; l++)
         for (int k = 0; k < 9; k++) f[k][l] = l == place ? F[k] : l % 3 ? uniform() : NAN;
-      }
       m->ops.energy(m, (const SbPack *)f, psi);
       m->ops.stress(m, (const SbPack *)f, P);
       m->ops.tangent(m, (const SbPack *)f, C);

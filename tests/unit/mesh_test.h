@@ -84,9 +84,8 @@ static inline PetscErrorCode test_curve(SbImport *im)
 /* Whether a tag set has the group; items of one dimension that belong to it. */
 static inline PetscBool test_in_group(const SbImport *im, PetscInt tags, const char *name)
 {
-  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
+  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
     if (!strcmp(im->group[im->tags_group[t]].name, name)) return PETSC_TRUE;
-  }
   return PETSC_FALSE;
 }
 

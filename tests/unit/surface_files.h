@@ -85,11 +85,10 @@ static inline PetscInt test_middle(TestSurface *s, PetscInt a, PetscInt b)
   }
   length = PetscSqrtReal(length);
   for (int k = 0; k < 3; k++) m[k] /= length;
-  for (PetscInt v = 6; v < s->nvert; v++) {
+  for (PetscInt v = 6; v < s->nvert; v++)
     if (PetscAbsReal(s->x[v][0] - m[0]) + PetscAbsReal(s->x[v][1] - m[1]) + PetscAbsReal(s->x[v][2] - m[2]) <
         1e-9)
       return v;
-  }
   for (int k = 0; k < 3; k++) s->x[s->nvert][k] = m[k];
   return s->nvert++;
 }
@@ -101,9 +100,8 @@ static inline void test_surface_sphere(int n, TestSurface *s)
   PetscInt(*old)[3] = (PetscInt(*)[3])malloc((size_t)most * sizeof(*old));
 
   test_surface_grow(s, most, most);
-  for (int v = 0; v < 6; v++) {
+  for (int v = 0; v < 6; v++)
     for (int k = 0; k < 3; k++) s->x[v][k] = k == v / 2 ? (v % 2 ? -1 : 1) : 0;
-  }
   s->nvert = 6;
   for (int f = 0; f < 8; f++) {
     const int turned = (f & 1) ^ (f >> 1 & 1) ^ (f >> 2 & 1);
@@ -140,12 +138,10 @@ static inline void test_surface_shifted_copy(TestSurface *s, PetscReal scale, Pe
   const PetscInt nvert = s->nvert, ntri = s->ntri;
 
   test_surface_grow(s, nvert, ntri);
-  for (PetscInt v = 0; v < nvert; v++) {
+  for (PetscInt v = 0; v < nvert; v++)
     for (int k = 0; k < 3; k++) s->x[nvert + v][k] = scale * s->x[v][k] + (k ? 0 : shift);
-  }
-  for (PetscInt f = 0; f < ntri; f++) {
+  for (PetscInt f = 0; f < ntri; f++)
     for (int k = 0; k < 3; k++) s->tri[ntri + f][k] = nvert + s->tri[f][k];
-  }
   s->nvert += nvert;
   s->ntri += ntri;
 }
@@ -247,9 +243,8 @@ static inline PetscErrorCode test_file_write(const char *extension, PetscBool bi
   if (f) {
     if (text) fprintf(f, "%s", text);
     if (s && binary) write_stl_binary(f, s);
-    for (size_t k = 0; s && !binary && k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++) {
+    for (size_t k = 0; s && !binary && k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
       if (!strcmp(extension, kinds[k].extension)) (*kinds[k].write)(f, s);
-    }
   }
   PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -82,9 +82,8 @@ static PetscErrorCode against_product(SbSpace s, Mat A, const Rows *r, Vec X, Pe
     for (PetscInt c = 0; c < 3; c++) {
       PetscReal sum = -y[3 * r->node[k] + c];
 
-      for (PetscInt at = r->ia[k]; at < r->ia[k + 1]; at++) {
+      for (PetscInt at = r->ia[k]; at < r->ia[k + 1]; at++)
         for (PetscInt e = 0; e < 3; e++) sum += r->block[9 * at + 3 * c + e] * x[3 * r->ja[at] + e];
-      }
       *worst = PetscMax(*worst, PetscAbsReal(sum));
     }
   }

@@ -186,9 +186,8 @@ static PetscErrorCode check_refit(void)
   }
   SB_CHECK(tree.built == 1, "the tree was made %d times", (int)tree.built);
   for (int step = 0; step < 20; step++) {
-    for (PetscInt i = 0; i < MOST; i++) {
+    for (PetscInt i = 0; i < MOST; i++)
       for (int k = 0; k < 6; k++) moved[i][k] = box[i][k] + (k % 3 == 0 && i % 2 ? step : 0);
-    }
     PetscCall(SbBoxTreeRefit(&tree, b));
     check_query(&tree, MOST, b);
   }

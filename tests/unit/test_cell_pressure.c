@@ -60,9 +60,8 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
   PetscCall(deform(random, 0., F));
   m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(p[l], 0., 1e-14 * m->lambda, "pressure at rest");
-  for (int k = 0; k < 9; k += 4) {
+  for (int k = 0; k < 9; k += 4)
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = 0.9;
-  }
   m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, p[l]);
   PetscCall(SbMaterialDestroy(&m));

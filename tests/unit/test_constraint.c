@@ -98,9 +98,8 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   SB_CHECK(PetscAbsReal(xAy - yAx) <= 1e-12 * PetscAbsReal(xAx), "%s: x.A y = %.16g, y.A x = %.16g", what,
            xAy, yAx);
   PetscCall(VecGetArray(z, &v));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (at_end(s, i, 1)) SB_CHECK_NEAR(SbDot3(v + 3 * i, oblique), 0, 1e-10, what);
-  }
   PetscCall(VecRestoreArray(z, &v));
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&y));
@@ -152,9 +151,8 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
       SB_CHECK_NEAR(r[3 * c->node + i], c->force * push[i], 1e-7, "the residual is along what pushes");
     total[0] += c->force * push[2];
   }
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (at_end(s, i, 0)) total[0] += r[3 * i + 2];
-  }
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
   PetscCallMPI(MPI_Allreduce(&total[0], &total[1], 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));

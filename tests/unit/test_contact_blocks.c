@@ -63,9 +63,8 @@ int main(int argc, char **argv)
   for (int i = 0; i < 3 * NN; i++) {
     for (int j = 0; j < 3 * NN; j++) {
       wanted[i][j] = 0.;
-      for (int p = 0; p < 3 * NV; p++) {
+      for (int p = 0; p < 3 * NV; p++)
         for (int q = 0; q < 3 * NV; q++) wanted[i][j] += S[p][i] * H[p][q] * S[q][j];
-      }
     }
   }
   for (PetscInt k = 0; k < spread.n; k++) {
@@ -76,10 +75,9 @@ int main(int argc, char **argv)
     count[i][j]++;
     for (int e = 0; e < 9; e++) got[3 * i + e / 3][3 * j + e % 3] = spread.block[k][e];
   }
-  for (int i = 0; i < OWN; i++) {
+  for (int i = 0; i < OWN; i++)
     for (int j = 0; j < NN; j++)
       SB_CHECK(count[i][j] <= 1, "%d blocks of nodes %d and %d", (int)count[i][j], i, j);
-  }
   for (int i = 0; i < 3 * OWN; i++) {
     for (int j = 0; j < 3 * NN; j++)
       SB_CHECK(PetscAbsReal(got[i][j] - wanted[i][j]) < 1e-12, "unknowns %d and %d: %g, not %g", i, j,

@@ -39,9 +39,8 @@ int main(int argc, char **argv)
     fixture_use(elements[k], elements[k], PETSC_FALSE);
     PetscCall(fixture_pair_create(1, PETSC_STATIC_ARRAY_LENGTH(sets), sets, &p));
     PetscCall(check_loads(&p, PETSC_STATIC_ARRAY_LENGTH(cases), cases));
-    for (PetscInt i = 0; i < x->space->nnode; i++) {
+    for (PetscInt i = 0; i < x->space->nnode; i++)
       if (x->space->node_x[3 * i + 2] > 0.75) SB_CHECK(x->f[3 * i + 2] == 0, "force outside the set");
-    }
     PetscCall(check_effect_refused(
       &p.all, "flat", "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
       "-effect_flat_on|set shell|9 vertices"));

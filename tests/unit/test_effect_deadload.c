@@ -92,9 +92,8 @@ static PetscErrorCode check_element(const char *element)
     const int beyond[2][3] = {{6, 0, 0}, {0, 6, 0}};
 
     for (int i = 0; i <= 4; i++) {
-      for (int j = 0; i + j <= 4; j++) {
+      for (int j = 0; i + j <= 4; j++)
         for (int k = 0; i + j + k <= 4; k++) PetscCall(check_monomial(&x, ncorner, (const int[3]){i, j, k}));
-      }
     }
     for (int i = 0; i < 2; i++) PetscCall(check_monomial(&x, ncorner, beyond[i]));
     if (ncorner == 4) PetscCall(check_time(&x));

@@ -14,9 +14,8 @@ static PetscErrorCode count(const Fixture *x, PetscInt *all)
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
+  for (PetscInt i = 0; i < x->space->nnode_owned; i++)
     for (int c = 0; c < 3; c++) n += (x->space->fixed[i] >> c) & 1;
-  }
   PetscCallMPI(MPI_Allreduce(&n, all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -34,9 +33,8 @@ static PetscErrorCode check_values(Fixture *x, SbEffect bottom, SbEffect west)
   for (PetscInt k = 0; k < x->space->nfixed; k++) {
     const PetscBool low = x->space->node_x[3 * x->space->fixed_node[k] + 2] < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
 
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
       SB_CHECK_NEAR(x->space->fixed_value[3 * k + c], low && c != 1 ? 10 : 0, 0, "prescribed value");
-    }
   }
   PetscCall(PetscMalloc1(3 * x->space->nnode, &residual));
   for (PetscInt i = 0; i < 3 * x->space->nnode; i++) residual[i] = 1 + (PetscReal)(i % 3);

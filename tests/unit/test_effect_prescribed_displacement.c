@@ -71,9 +71,8 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
   }
   if (!x->space->faces) {
     // Moment of k x r about k: r^2, over 3 x 3 nodes at distances (x - 1)^2 + y^2.
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++) expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
-    }
   } else {
     // The eight triangles of the top: relative to its centre their centroids are at 1/6 and 1/3 along x and y, however the
     // diagonals run; so (x - 1)^2 and y^2 both sum to 4 (1/36 + 1/9) + 8/4.

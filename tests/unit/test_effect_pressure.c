@@ -23,9 +23,8 @@ static PetscErrorCode volume(const Fixture *x, const PetscReal u[], PetscReal *a
     const PetscInt *node = &x->space->cell_node[4 * cell];
     PetscReal p[4][3], e[9];
 
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       for (int i = 0; i < 3; i++) p[a][i] = x->space->node_x[3 * node[a] + i] + u[3 * node[a] + i];
-    }
     for (int k = 0; k < 9; k++) e[k] = p[k / 3 + 1][k % 3] - p[0][k % 3];
     sum += SbMatDet(e) / 6;
   }
@@ -200,9 +199,8 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
     PetscCall(effect_force(x, e, 2));
     for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] += h * Aw[i] - f[i];
     // With a constrained rim its own rows do not count.
-    if (rim) {
+    if (rim)
       for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] *= w[3 * (i / 3)] == 0 ? 0 : 1;
-    }
     PetscCall(dot(x, x->f, x->f, &remainder[k]));
     remainder[k] = PetscSqrtReal(remainder[k]);
   }

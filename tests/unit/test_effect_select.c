@@ -67,10 +67,9 @@ static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, Pets
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectItems(x->space, on_sets(a, b), SB_ON_CELLS, &n, &cells));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < n; i++)
     if (cells[i] < x->mesh->ncell_owned)
       sum += SbTetDeterminant(x->mesh->x, x->mesh->cell + 4 * cells[i]) / 6;
-  }
   PetscCallMPI(MPI_Allreduce(&sum, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all, volume, 1e-13, "volume of the cells");
   PetscCall(PetscFree(cells));

@@ -66,9 +66,8 @@ static void test_orientation(SbElement e)
 
   e->ops.tabulate(x, g, &V);
   SB_CHECK_NEAR(V, 1. / 6, 1e-16, "volume of the unit tet");
-  for (int a = 0; a < 3; a++) {
+  for (int a = 0; a < 3; a++)
     for (int i = 0; i < 3; i++) SB_CHECK_NEAR(g[a][i], factor * (a == i), 0, "gradient in the unit tet");
-  }
   e->ops.tabulate(y, h, &V);
   SB_CHECK_NEAR(V, -1. / 6, 1e-16, "volume inverted");
   for (int i = 0; i < 3; i++) {
@@ -86,9 +85,8 @@ static void test_mass(SbElement e)
   for (int point = 0; point < 4; point++) {
     PetscReal phi[4] = {0};
 
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       for (int v = 0; v < 4; v++) phi[a] += (v == point ? near : far) * e->ops.vertex[v][a];
-    }
     for (int a = 0; a < 4; a++) {
       first[a] += phi[a] / 4;
       for (int b = 0; b < 4; b++) second[a][b] += phi[a] * phi[b] / 4;

@@ -16,9 +16,8 @@ static void make_cells(SbElement e, PetscReal size, Cells *c)
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal x[4][3], g[3][3], V;
 
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       for (int i = 0; i < 3; i++) x[a][i] = size * (0.15 * uniform() + (a == i + 1));
-    }
     e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
     SbPackPut(12, &x[0][0], l, c->X);
     SbPackPut(9, &g[0][0], l, c->g);
@@ -82,18 +81,15 @@ static void test_gradient(SbElement e)
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)F) < 1e-13,
              "F of an affine map is off by %g", lane_difference(9, (const SbPack *)A, (const SbPack *)F));
     SbCellGradientRate((const SbPack *)c.g, (const SbPack *)u, H);
-    for (int k = 0; k < 9; k += 4) {
+    for (int k = 0; k < 9; k += 4)
       for (int l = 0; l < SB_BATCH; l++) H[k][l] += 1;
-    }
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)H) < 1e-13,
              "the rate of an affine map is wrong");
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++) u[k][l] = 1e3 * (1 + k % 3);
-    }
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
-    for (int k = 0; k < 9; k++) {
+    for (int k = 0; k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++) SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
-    }
   }
 }
 
@@ -239,15 +235,13 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
 
     make_cells(e, size, &c);
     random_state(&c, 0.6, A, u);
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++) v[k][l] = uniform();
-    }
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
     m->ops.frame(m, (const SbPack *)F, R);
     SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, K);
-    for (int k = 0; k < 9; k++) {
+    for (int k = 0; k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->mu : 0;
-    }
     SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, (const SbPack *)W,
                           J);
     for (int p = 0; p < 10; p++) {
@@ -295,9 +289,8 @@ static void test_rotation(SbElement e, SbMaterial m)
     }
     affine(&c, (const SbPack *)A, (const SbPack *)b, u);
     force_of(m, &c, (const SbPack *)u, f);
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(f[k][l], 0, 1e-12 * m->E, "force of a rotated cell");
-    }
   }
 }
 
@@ -312,9 +305,8 @@ static void test_patch(SbElement e, SbMaterial m)
                                   {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   PetscReal X[9][3] = {{0}}, f[9][3] = {{0}}, F[9], P[9], virial[9] = {0}, volume = 0;
 
-  for (int k = 0; k < 8; k++) {
+  for (int k = 0; k < 8; k++)
     for (int i = 0; i < 3; i++) X[k][i] = (k >> i) & 1;
-  }
   X[8][0] = 0.35;
   X[8][1] = 0.6;
   X[8][2] = 0.45;

@@ -73,9 +73,8 @@ int main(int argc, char **argv)
     for (PetscInt c = 0; c < 3; c++) {
       PetscReal sum = -r[3 * e.node[k] + c];
 
-      for (PetscInt at = e.ia[k]; at < e.ia[k + 1]; at++) {
+      for (PetscInt at = e.ia[k]; at < e.ia[k + 1]; at++)
         for (PetscInt d = 0; d < 3; d++) sum += e.block[9 * at + 3 * c + d] * z[3 * e.ja[at] + d];
-      }
       worst = PetscMax(worst, PetscAbsReal(sum));
     }
   }

@@ -19,9 +19,8 @@ static PetscBool joined(const PetscInt d[3], PetscInt gap, PetscInt i, PetscInt 
   const PetscInt p[3] = {i % d[0], i / d[0] % d[1], i / (d[0] * d[1])};
   const PetscInt q[3] = {j % d[0], j / d[0] % d[1], j / (d[0] * d[1])};
 
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     if (PetscAbsInt(p[k] - q[k]) > 1) return PETSC_FALSE;
-  }
   return (PetscBool)(!gap || p[2] / gap == q[2] / gap);
 }
 
@@ -39,9 +38,8 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
   p->ia[0] = 0;
   for (PetscInt i = 0; i < n; i++) {
     p->ia[i + 1] = p->ia[i];
-    for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt j = 0; j < n; j++)
       if (joined(d, gap, i, j)) p->ja[p->ia[i + 1]++] = j;
-    }
   }
   /* off-diagonal entries in (-1, 1), with a dominant diagonal */
   for (PetscInt i = 0; i < 3 * n; i++) {
@@ -55,10 +53,9 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
     p->dense[i * 3 * n + i] += 1.;
   }
   for (PetscInt i = 0; i < n; i++) {
-    for (PetscInt k = p->ia[i]; k < p->ia[i + 1]; k++) {
+    for (PetscInt k = p->ia[i]; k < p->ia[i + 1]; k++)
       for (PetscInt e = 0; e < 9; e++)
         p->block[9 * k + e] = p->dense[(3 * i + e / 3) * 3 * n + 3 * p->ja[k] + e % 3];
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -76,9 +73,8 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc4(m * m + 1, &schur, n, &x, n, &b, n, &y));
   PetscCall(PetscMalloc1(m + 1, &kept));
-  for (PetscInt i = 0; i < m; i++) {
+  for (PetscInt i = 0; i < m; i++)
     for (PetscInt j = 0; j < m; j++) schur[i * m + j] = p->dense[(free + i) * n + free + j];
-  }
   PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &f));
   for (int again = 0; again < 2; again++) {
     PetscReal *work = NULL;
@@ -164,10 +160,9 @@ static PetscErrorCode check_schur(Problem *p)
       for (PetscInt j = k + 1; j < n && l != 0.; j++) p->dense[i * n + j] -= l * p->dense[k * n + j];
     }
   }
-  for (PetscInt j = 0; j < m; j++) {
+  for (PetscInt j = 0; j < m; j++)
     for (PetscInt i = j; i < m; i++)
       error = PetscMax(error, PetscAbsReal(mine[j * m + i] - p->dense[(free + i) * n + free + j]));
-  }
   SB_CHECK(error < 1e-11, "Schur complement is off by %g", error);
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -180,9 +175,8 @@ static PetscErrorCode check_indefinite(Problem *p)
 
   PetscFunctionBeginUser;
   PetscCall(SbFactorCreate(p->n, 0, p->ia, p->ja, &f));
-  for (PetscInt k = p->ia[5]; k < p->ia[6]; k++) {
+  for (PetscInt k = p->ia[5]; k < p->ia[6]; k++)
     if (p->ja[k] == 5) p->block[9 * k] = -1.;
-  }
   PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, NULL, &ok));
   SB_CHECK(!ok, "an indefinite matrix was factored");
   PetscCall(SbFactorDestroy(&f));

@@ -81,9 +81,8 @@ static PetscReal face_corners(SbMesh mesh, PetscInt i, const PetscReal *corner[3
 {
   PetscReal edge[6], n[3];
 
-  for (PetscInt a = 0, k = 0; a < 4; a++) {
+  for (PetscInt a = 0, k = 0; a < 4; a++)
     if (a != i % 4) corner[k++] = mesh->x + 3 * mesh->cell[4 * (i / 4) + a];
-  }
   for (int k = 0; k < 6; k++) edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
   SbCross(edge, edge + 3, n);
   return 0.5 * PetscSqrtReal(SbDot3(n, n));

@@ -45,10 +45,9 @@ static void test_small_strains(SbMaterial m)
     const PetscReal t = ldexp(1, -n), tr = H[0] + H[4] + H[8];
     PetscReal hooke = m->lambda / 2 * tr * tr;
 
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++)
         hooke += m->mu / 4 * (H[3 * i + j] + H[3 * j + i]) * (H[3 * i + j] + H[3 * j + i]);
-    }
     for (int k = 0; k < 9; k++) F[k] = (k % 4 == 0) + t * H[k];
     const PetscReal error = fabs(energy_of(m, F) / (t * t * hooke) - 1);
     if (n > 9 && n < 14) SB_CHECK_NEAR(difference_before / error, 2, 0.2, "order of the small-strain limit");

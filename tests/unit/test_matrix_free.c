@@ -32,9 +32,8 @@ static PetscErrorCode hold(SbSpace s, Vec X)
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    for (PetscInt c = 0; c < 3; c++) {
+    for (PetscInt c = 0; c < 3; c++)
       if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
-    }
   }
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,9 +7,8 @@ static int common(const PetscInt a[4], const PetscInt b[4])
 {
   int n = 0;
 
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 4; i++)
     for (int j = 0; j < 4; j++) n += a[i] == b[j];
-  }
   return n;
 }
 

@@ -36,10 +36,9 @@ static PetscErrorCode test_growth(void)
   PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 1000; i++) {
+  for (PetscInt i = 0; i < 1000; i++)
     for (int d = 0; d < 4; d++)
       PetscCall(SbImportAddItem(&im, d, (PetscInt[]){i, i + 1, i + 2, i + 3}, i % 7, i + d));
-  }
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < im.item[d].n; i++) {
       for (int k = 0; k <= d; k++) wrong += im.item[d].vert[(d + 1) * i + k] != i + k;

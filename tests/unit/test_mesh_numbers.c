@@ -31,9 +31,8 @@ static PetscBool has_group(const SbImport *im, int dim, PetscInt item, PetscInt 
 {
   const PetscInt tags = im->item[dim].tags[item];
 
-  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
+  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
     if (im->tags_group[t] == group) return PETSC_TRUE;
-  }
   return PETSC_FALSE;
 }
 
@@ -66,9 +65,8 @@ static PetscErrorCode test_members(void)
   }
   PetscCall(SbImportJoinGroups(&im));
   for (int d = 0; d < 4; d++) {
-    for (PetscInt i = 0; i < NITEM; i++) {
+    for (PetscInt i = 0; i < NITEM; i++)
       for (int g = 0; g <= NGROUP; g++) wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];
-    }
   }
   SB_CHECK(!wrong, "%d wrong memberships", (int)wrong);
   SB_CHECK(!im.nmember.n, "the list is not empty");

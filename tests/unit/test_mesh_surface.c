@@ -60,10 +60,9 @@ static PetscReal of_group(const SbImport *im, int dim, const char *name)
     for (PetscInt i = 0; i < im->item[dim].n; i++) {
       const PetscInt set = im->item[dim].tags[i];
 
-      for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1]; k++) {
+      for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1]; k++)
         if (im->tags_group[k] == g)
           sum += dim == 3 ? SbTetDeterminant(im->x, im->item[3].vert + 4 * i) / 6 : 1;
-      }
     }
   }
   return sum;

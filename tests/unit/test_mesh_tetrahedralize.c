@@ -9,9 +9,8 @@ static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSurface 
 {
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceCreate(t->nvert, t->ntri, inner < t->ntri ? 2 : 1, s));
-  for (PetscInt v = 0; v < t->nvert; v++) {
+  for (PetscInt v = 0; v < t->nvert; v++)
     for (int k = 0; k < 3; k++) s->x[3 * v + k] = t->x[v][k];
-  }
   for (PetscInt f = 0; f < t->ntri; f++) {
     for (int k = 0; k < 3; k++) s->tri[3 * f + k] = t->tri[f][k];
     s->side[2 * f] = f < inner ? -1 : 0;

@@ -21,10 +21,9 @@ static void check_across(const SbTriangles *t)
     const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1], g = t->across[i];
     PetscBool found = PETSC_FALSE;
 
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
       if (t->tri[3 * g + k] == b && t->tri[3 * g + (k + 1) % 3] == a)
         found = (PetscBool)(t->across[3 * g + k] == i / 3);
-    }
     bad += !found;
   }
   SB_CHECK(!bad, "%d edges without their neighbour", (int)bad);

@@ -76,10 +76,9 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
   for (PetscInt c = 0; c < out->cell.n; c++) {
     PetscReal d[3][3], det;
 
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a < 3; a++)
       for (int i = 0; i < 3; i++)
         d[a][i] = x[3 * (PetscInt)cell[4 * c + a + 1] + i] - x[3 * (PetscInt)cell[4 * c] + i];
-    }
     det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
           d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
           d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);

@@ -11,9 +11,8 @@ static PetscReal value_of(const char *text, const char *name, int row)
   int column = 0, found = -1;
   const char *p, *end = strchr(text, '\n');
 
-  for (p = text; p < end; p += strcspn(p, ",\n") + 1, column++) {
+  for (p = text; p < end; p += strcspn(p, ",\n") + 1, column++)
     if (strcspn(p, ",\n") == length && !strncmp(p, name, length)) found = column;
-  }
   if (found < 0) return NAN;
   for (p = end + 1; *p == '#' || row-- > 0; p = strchr(p, '\n') + 1)
     if (!strchr(p, '\n')) return NAN;

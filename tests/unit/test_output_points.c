@@ -79,14 +79,12 @@ static PetscReal corner_of(SbMesh mesh, PetscInt cell, int v, PetscReal *V)
   for (int a = 0; a < 4; a++) {
     PetscReal x[3] = {0., 0., 0.};
 
-    for (int b = 0; b < 4; b++) {
+    for (int b = 0; b < 4; b++)
       for (int k = 0; k < 3 && b != a; k++) x[k] += mesh->x[3 * p[b] + k] / 3.;
-    }
     sum += (a == v ? -2. : 1.) * bump(x);
   }
-  for (int a = 0; a < 3; a++) {
+  for (int a = 0; a < 3; a++)
     for (int k = 0; k < 3; k++) e[a][k] = mesh->x[3 * p[a + 1] + k] - mesh->x[3 * p[0] + k];
-  }
   SbCross(e[0], e[1], n);
   *V = SbDot3(n, e[2]) / 6.;
   return sum;

@@ -21,9 +21,8 @@ static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal sc
 {
   SbPack p;
 
-  for (int k = 0; k < 9; k++) {
+  for (int k = 0; k < 9; k++)
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = scale * f[k];
-  }
   m->ops.pressure(m, (const SbPack *)F, p);
   return -p[0] / m->lambda;
 }
@@ -77,9 +76,8 @@ static PetscErrorCode random_free(SbSpace s, PetscRandom random, PetscReal size,
   PetscCall(VecSetRandom(x, random));
   PetscCall(VecScale(x, size));
   PetscCall(VecGetArray(x, &v));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     if (s->fixed[i / 3] & (1 << i % 3)) v[i] = 0.;
-  }
   PetscCall(VecRestoreArray(x, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -75,9 +75,8 @@ static void reference(const PetscReal F[9], Long R[9], Long s[3])
 {
   Long a[3][3], v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, u[3][3];
 
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) a[j][i] = F[3 * i + j];
-  }
   one_sided_jacobi(a, v);
   for (int p = 0; p < 2; p++) {
     s[p] = sqrtl(dot(a[p], a[p]));

@@ -207,9 +207,8 @@ int main(int argc, char **argv)
     static const char *const packages[] = {"cholmod", "umfpack", "mumps", "hypre"};
     PetscBool has = PETSC_TRUE;
 
-    for (size_t p = 0; p < PETSC_STATIC_ARRAY_LENGTH(packages); p++) {
+    for (size_t p = 0; p < PETSC_STATIC_ARRAY_LENGTH(packages); p++)
       if (strstr(solvers[k], packages[p])) PetscCall(SbHasPackage(packages[p], &has));
-    }
     if (!has) continue;
     PetscCall(PetscSNPrintf(text, sizeof(text), "-solver %s", solvers[k]));
     PetscCall(tip(text, &z, stop, &iterations));

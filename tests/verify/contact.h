@@ -9,9 +9,8 @@
 
 static inline SbEffect contact_effect(SbModel m, const char *name)
 {
-  for (PetscInt e = 0; e < m->neffect; e++) {
+  for (PetscInt e = 0; e < m->neffect; e++)
     if (!strcmp(m->effect[e]->name, name)) return m->effect[e];
-  }
   return NULL;
 }
 
@@ -158,9 +157,8 @@ static inline const PetscReal *record_column(const Record *r, const char *name)
 {
   static PetscReal none = NAN;
 
-  for (PetscInt c = 0; c < r->ncolumn; c++) {
+  for (PetscInt c = 0; c < r->ncolumn; c++)
     if (!strcmp(r->name[c], name)) return r->value + c;
-  }
   SB_CHECK(0, "the run has no column %s", name);
   return &none;
 }

@@ -122,10 +122,9 @@ static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
 
       for (int k = 0; k < 3; k++)
         p[k] = s->x[3 * a + k] + (PetscReal)(q % 8) / 8 * (s->x[3 * b + k] - s->x[3 * a + k]);
-      for (PetscInt o = 0; o < m->nbody; o++) {
+      for (PetscInt o = 0; o < m->nbody; o++)
         if (o != s->mesh->part[s->mesh->triangle[3 * f]])
           *inside = PetscMax(*inside, pour_depth(s, list[o], n[o], p));
-      }
     }
   }
   for (PetscInt b = 0; b < m->nbody; b++) PetscCall(PetscFree(list[b]));

@@ -106,9 +106,8 @@ static inline PetscErrorCode verify_gather(SbModel m, Vec U, PetscReal **value)
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * n, value));
   PetscCall(VecGetArrayRead(U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
     for (int k = 0; k < 3; k++) (*value)[3 * s->node_orig[i] + k] = u[3 * i + k];
-  }
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, *value, (PetscMPIInt)(3 * n), MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -264,9 +264,8 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscCall(VecSet(lower, PETSC_NINFINITY));
   PetscCall(VecSet(upper, PETSC_INFINITY));
   PetscCall(VecGetArray(lower, &low));
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++) {
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
     if (!m->space->fixed[i]) low[3 * i + 2] = floor - m->space->node_x[3 * i + 2];
-  }
   PetscCall(VecRestoreArray(lower, &low));
   PetscCall(SNESCreate(m->comm, &snes));
   PetscCall(SNESSetType(snes, SNESVINEWTONRSLS));

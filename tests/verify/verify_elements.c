@@ -85,9 +85,8 @@ static PetscErrorCode check_supports(void)
   PetscReal strain[NKIND][2], difference[2];
 
   PetscFunctionBeginUser;
-  for (int kind = 0; kind < NKIND; kind++) {
+  for (int kind = 0; kind < NKIND; kind++)
     for (int k = 0; k < 2; k++) PetscCall(bar(kind, k ? 4 : 2, &strain[kind][k]));
-  }
   for (int k = 0; k < 2; k++) difference[k] = PetscAbsReal(strain[2][k] / strain[3][k] - 1.);
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,

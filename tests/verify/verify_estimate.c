@@ -118,10 +118,9 @@ static PetscErrorCode stress_get(SbModel m, Vec U, Stress *s)
       }
     }
     for (int i = 0; i < 36; i++) sum[i % 9] += s->P[c][i / 9][i % 9];
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++)
       for (int k = 0; k < 9; k++)
         s->at[c][a][k] = s->npoint == 1 ? P[9 * c + k] : (s->P[c][a][k] - far * sum[k]) / (near - far);
-    }
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(PetscFree3(psi, P, point));
@@ -139,9 +138,8 @@ static PetscErrorCode stress_free(Stress *s)
 /* Subtracts from S the stress of a cell at barycentric coordinates b. */
 static void subtract(const Stress *s, PetscInt cell, const PetscReal b[4], PetscReal S[9])
 {
-  for (int a = 0; a < 4; a++) {
+  for (int a = 0; a < 4; a++)
     for (int k = 0; k < 9; k++) S[k] -= b[a] * s->at[cell][a][k];
-  }
 }
 
 /* Adds the energy of a stress difference S. P2: the pressure energy is that of the mean pressure of a cell. */
@@ -189,9 +187,8 @@ static PetscErrorCode exact_error(SbModel m, Vec U, PetscReal nu, Exact exact, P
     for (int q = 0; q < 14; q++) {
       PetscReal p[3] = {0., 0., 0.}, S[9];
 
-      for (int a = 0; a < 4; a++) {
+      for (int a = 0; a < 4; a++)
         for (int k = 0; k < 3; k++) p[k] += b[q][a] * m->mesh->x[3 * v[a] + k];
-      }
       exact(nu, p, S);
       subtract(&s, c, b[q], S);
       add_difference(m, &s, NULL, c, w[q] * s.V[c], S);

@@ -69,9 +69,8 @@ int main(int argc, char **argv)
     {"soft", 1e-2, 0.3}, {"stiff", 1e10, 0.3}, {"lambda only", 1e4, 0.4999999}};
 
   SB_TEST_BEGIN(argc, argv);
-  for (size_t e = 0; e < PETSC_STATIC_ARRAY_LENGTH(elements); e++) {
+  for (size_t e = 0; e < PETSC_STATIC_ARRAY_LENGTH(elements); e++)
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(inclusions); k++)
       PetscCall(check(elements[e], &inclusions[k]));
-  }
   SB_TEST_END();
 }

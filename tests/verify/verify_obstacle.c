@@ -58,9 +58,7 @@ static PetscErrorCode check_mesh(void)
   VERIFY_MORE(record_max(&r[0], "floor_force_z"), 20, "largest force of the box, N");
   /* distances agree up to rounding; friction converges to a tolerance relative to its force, which rounding can affect */
   VERIFY_LESS(verify_difference(length, u[0], u[1]), 1e-6, "difference of displacements on box and mesh");
-  for (int k = 0; k < 2; k++) {
-    PetscCall(PetscFree(u[k]));
-  }
+  for (int k = 0; k < 2; k++) PetscCall(PetscFree(u[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,9 +84,8 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
     "-ts_max_time %g" VERIFY_BODY("a", "box:0.1,0.06,0.04:4", "corotated", "2e4", "0.4"),
     obstacle, DRAG_DT, DRAG_DT * DRAG_STEPS));
   VERIFY_NEAR(r.rejected, 0, 0, "steps that failed");
-  for (PetscInt i = 0; i < r.n && i <= DRAG_STEPS; i++) {
+  for (PetscInt i = 0; i < r.n && i <= DRAG_STEPS; i++)
     for (int k = 0; k < 3; k++) force[3 * i + k] = record_at(&r, columns[k], i);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,9 +103,8 @@ static PetscErrorCode check_facets(void)
 
   PetscFunctionBeginUser;
   test_surface_sphere(3, &s);
-  for (PetscInt v = 0; v < s.nvert; v++) {
+  for (PetscInt v = 0; v < s.nvert; v++)
     for (int k = 0; k < 3; k++) s.x[v][k] = 0.015 * s.x[v][k] + (k == 0 ? 0.05 : k == 1 ? 0.031 : 0.055);
-  }
   PetscCall(test_file_write(".off", PETSC_FALSE, &s, NULL, path));
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(drag("sphere:0.05,0.031,0.055,0.015", force[0]));

@@ -32,9 +32,8 @@ static void move_vertex(const VerifyPlace *place, PetscReal x[3])
   PetscReal r[3];
 
   for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 3; k++)
     if (place->at[k] == 0 || place->at[k] == place->n[k]) return;
-  }
   if (m->shape == DISTORTED) {
     for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)place->n[k];
   } else if (m->shape == SLIVERS && place->at[0] == 3 && place->at[1] == 2 && place->at[2] > 1 &&

@@ -164,9 +164,8 @@ static PetscErrorCode penetration(SbRun run, const char *name, PetscReal *depth)
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
   PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  for (PetscInt k = 0; k < e->ncolumn; k++) {
+  for (PetscInt k = 0; k < e->ncolumn; k++)
     if (!strcmp(e->column[k], name)) *depth = values[k];
-  }
   PetscCall(PetscFree(values));
   PetscCallMPI(MPI_Bcast(depth, 1, MPIU_REAL, 0, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -284,10 +283,9 @@ static PetscErrorCode check_held(const char *more)
   SB_CHECK_NEAR(s.run->t_now, 0.06, 1e-9, "end");
   SB_CHECK(!s.run->stop_reason[0] && s.model->body[0].in_memory, "%s: %s", more, s.run->stop_reason);
   PetscCall(VecGetArrayRead(s.run->U, &u));
-  for (PetscInt i = 0; i < s.model->space->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s.model->space->nnode_owned; i++)
     for (int k = 0; k < 3; k++)
       worst = PetscMax(worst, s.model->space->fixed[i] & (1 << k) ? PetscAbsReal(u[3 * i + k]) : 0.);
-  }
   PetscCall(VecRestoreArrayRead(s.run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   SB_CHECK(worst == 0. && s.run->energies.max_displacement > 0.01, "%s: the support gives by %g m", more,

@@ -118,9 +118,8 @@ static PetscBool among(const char *name, const char *list)
 {
   const size_t length = strlen(name);
 
-  for (const char *at = list; (at = strstr(at, name)); at++) {
+  for (const char *at = list; (at = strstr(at, name)); at++)
     if ((at == list || at[-1] == ',') && (!at[length] || at[length] == ',')) return PETSC_TRUE;
-  }
   return PETSC_FALSE;
 }
 
@@ -138,9 +137,8 @@ static PetscErrorCode check_output_rows(void)
     const char *key = rows[i].row->key, *part = NULL;
     PetscBool known = PETSC_FALSE;
 
-    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_options); k++) {
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_options); k++)
       if (!strcmp(part_options[k].key, key)) part = part_options[k].part;
-    }
     SB_CHECK(part, "-%s has no row in part_options of tests/parts.h: say which output it names or changes",
              key);
     for (PetscInt k = 0; part && k < n; k++) known = (PetscBool)(known || !strcmp(names[k], part));
