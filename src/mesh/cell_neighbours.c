@@ -108,21 +108,6 @@ PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, 
 PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value)
 {
   PetscFunctionBeginUser;
-  if (!mesh->cell_sf) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!mesh->vert_sf) {
-    const PetscInt nghost = mesh->nvert - mesh->nvert_owned;
-    PetscLayout layout;
-    PetscInt *leaf;
-
-    PetscCall(PetscMalloc1(nghost, &leaf));
-    for (PetscInt i = 0; i < nghost; i++) leaf[i] = mesh->nvert_owned + i;
-    PetscCall(PetscLayoutCreateFromSizes(mesh->comm, mesh->nvert_owned, PETSC_DECIDE, 1, &layout));
-    PetscCall(PetscSFCreate(mesh->comm, &mesh->vert_sf));
-    PetscCall(PetscSFSetGraphLayout(mesh->vert_sf, layout, nghost, leaf, PETSC_COPY_VALUES,
-                                    mesh->gvert + mesh->nvert_owned));
-    PetscCall(PetscLayoutDestroy(&layout));
-    PetscCall(PetscFree(leaf));
-  }
-  PetscCall(SbForestBroadcast(mesh->vert_sf, n, type, value, value));
+  if (mesh->vert_sf) PetscCall(SbForestBroadcast(mesh->vert_sf, n, type, value, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

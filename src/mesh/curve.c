@@ -129,23 +129,14 @@ PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, ui
 
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[])
 {
-  PetscInt *leaf, *root, ncurved = 0, total = n, ndealt;
-  PetscReal *dealt;
-  PetscLayout rows;
+  PetscInt *leaf, *root, ncurved = 0, total = n;
+  PetscLayout blocks;
   PetscSF sf;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, mesh->comm));
   if (!total) PetscFunctionReturn(PETSC_SUCCESS);
-  // offsets go from the ranks that read them to the home ranks of the cells' original numbers
-  PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &rows));
-  PetscCall(PetscLayoutGetLocalSize(rows, &ndealt));
-  PetscCall(PetscMalloc1(18 * (size_t)ndealt, &dealt));
-  PetscCall(PetscSFCreate(mesh->comm, &sf));
-  PetscCall(PetscSFSetGraphLayout(sf, rows, n, NULL, PETSC_COPY_VALUES, orig));
-  PetscCall(SbForestReduce(sf, 18, MPIU_REAL, off, dealt));
-  PetscCall(PetscSFDestroy(&sf));
-  // and from the home ranks to all ranks that have the cells, ghosts included
+  // from the ranks that read them to all that have the cells, ghosts included
   PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
   PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
@@ -153,12 +144,11 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
     leaf[ncurved] = c;
     root[ncurved++] = mesh->cell_orig[c];
   }
-  PetscCall(PetscSFCreate(mesh->comm, &sf));
-  PetscCall(PetscSFSetGraphLayout(sf, rows, ncurved, leaf, PETSC_COPY_VALUES, root));
-  PetscCall(SbForestBroadcast(sf, 18, MPIU_REAL, dealt, mesh->edge_off));
+  PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &blocks));
+  PetscCall(PetscSFCreateByMatchingIndices(blocks, n, orig, NULL, 0, ncurved, root, leaf, 0, NULL, &sf));
+  PetscCall(SbForestBroadcast(sf, 18, MPIU_REAL, off, mesh->edge_off));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(PetscLayoutDestroy(&rows));
+  PetscCall(PetscLayoutDestroy(&blocks));
   PetscCall(PetscFree2(leaf, root));
-  PetscCall(PetscFree(dealt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,8 +19,6 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
   PetscCall(PetscFree(c->data));
   PetscCall(PetscFree(c->vertex));
   PetscCall(PetscFree(c->owner));
-  PetscCall(PetscFree(c->copied));
-  if (c->ghost.scount) PetscCall(SbRouteDestroy(&c->ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -287,11 +285,12 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
       local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
   }
   PetscCall(list_copies(local, &border, all, rank, size, &copies));
-  local->copied = copies.item;
   PetscCall(PetscFree(border.vert));
   PetscCall(PetscFree(border.pair));
-  PetscCall(SbRouteCreate(comm, copies.n, copies.rank, &local->ghost));
-  PetscCall(send_cells(local, PETSC_TRUE, &local->ghost, local->copied, copies.rank, &ghost));
+  PetscCall(SbRouteCreate(comm, copies.n, copies.rank, &route));
+  PetscCall(send_cells(local, PETSC_TRUE, &route, copies.item, copies.rank, &ghost));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCall(PetscFree(copies.item));
   PetscCall(PetscFree(copies.rank));
   // append the ghost cells, and those of their vertices that this rank does not have
   n = local->nvert;

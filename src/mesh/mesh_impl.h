@@ -165,8 +165,6 @@ typedef struct {
   SbCellData *data;     /* [ncell] */
   SbVertexData *vertex; /* [nvert] */
   PetscMPIInt *owner;   /* [nvert] */
-  SbRoute ghost;        /* communication of copies of owned cells to other ranks; several ranks only */
-  PetscInt *copied;     /* [ghost.nsend] owned cell that is copied */
   PetscInt nvert_cells; /* number of vertices of owned cells */
 } SbLocalMesh;
 

@@ -18,12 +18,24 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
   return 0;
 }
 
+/* Star forest from items of this rank, number[nowned], to copies on others, which follow in the arrays. */
+static PetscErrorCode create_forest(MPI_Comm comm, PetscInt N, PetscInt nowned, PetscInt n,
+                                    const PetscInt number[], PetscSF *sf)
+{
+  PetscLayout blocks;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, N, 1, &blocks));
+  PetscCall(PetscSFCreateByMatchingIndices(blocks, nowned, number, NULL, 0, n - nowned, number + nowned, NULL,
+                                           nowned, NULL, sf));
+  PetscCall(PetscLayoutDestroy(&blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Cells in their new order; local[]: new numbers of the vertices. */
 static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], SbMesh mesh)
 {
-  const PetscInt nghost = p->ncell - p->ncell_owned;
-  PetscInt *order, *key, *some, *at, *start, *got;
-  PetscSFNode *remote;
+  PetscInt *order, *key, *some, *at, *start;
 
   PetscFunctionBeginUser;
   // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or straight
@@ -47,22 +59,6 @@ static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], S
   PetscCall(PetscFree(some));
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(start));
-  // star forest from owned cells to their ghost copies
-  if (p->ghost.size) {
-    for (PetscInt c = 0; c < p->ncell; c++) key[order[c]] = c; /* now the new number of each cell */
-    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), p->copied, key, &got));
-    PetscCall(PetscMalloc1(nghost, &remote));
-    for (PetscInt g = 0; g < nghost; g++) {
-      const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* position as received */
-
-      key[g] = p->ncell_owned + g;
-      remote[g] = (PetscSFNode){SbRouteSource(&p->ghost, came), got[came]};
-    }
-    PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
-    PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, key, PETSC_COPY_VALUES, remote,
-                              PETSC_OWN_POINTER));
-    PetscCall(PetscFree(got));
-  }
   PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig, mesh->ncell,
                          &mesh->cell_body, mesh->ncell, &mesh->cell_material, mesh->ncell, &mesh->cell_set,
                          4 * (size_t)mesh->ncell, &mesh->face_set));
@@ -86,14 +82,15 @@ static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], S
 
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
 {
-  PetscInt *local, *global, *compact, *back, *cell, *order, *ghost, *key, *orig, *got;
+  PetscInt *local, *compact, *back, *cell, *order, *ghost, *orig, *global;
   PetscInt n = 0, mine[2], sum[2] = {0, 0};
-  PetscMPIInt rank, *dest;
-  SbRoute route;
+  PetscMPIInt rank, size;
+  PetscSF sf;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
-  PetscCall(PetscMalloc2(p->nvert, &local, p->nvert, &global));
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
+  PetscCall(PetscMalloc4(p->nvert, &local, p->nvert, &ghost, p->nvert, &orig, p->nvert, &global));
   // local numbers of owned vertices
   PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
   for (PetscInt v = 0; v < p->nvert; v++) {
@@ -118,42 +115,26 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   PetscCallMPI(MPI_Allreduce(mine, sum, 2, MPIU_INT, MPI_SUM, mesh->comm));
   mesh->Nvert = sum[0];
   mesh->Ncell = sum[1];
-  for (PetscInt v = 0; v < p->nvert; v++)
-    if (p->owner[v] == rank) global[v] = mesh->gvert_start + local[v];
-  // ghost vertices: their owners are asked for global numbers, by original number
-  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->nvert_cells, &orig, p->nvert, &dest));
-  n = 0;
-  for (PetscInt v = 0; v < p->nvert; v++) {
-    if (p->owner[v] == rank) continue;
-    ghost[n] = v;
-    key[n] = p->vertex[v].orig;
-    dest[n++] = p->owner[v];
-  }
-  for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
-  PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, key, &got));
-  for (PetscInt i = 0; i < route.nrecv; i++) {
-    PetscInt v;
+  // ghost vertices get the global numbers of their original ones, and local numbers in this order
+  for (PetscInt v = 0, m = mesh->nvert_owned; v < p->nvert; v++) {
+    const PetscInt at = p->owner[v] == rank ? local[v] : m++;
 
-    PetscCall(PetscFindInt(got[i], p->nvert_cells, orig, &v));
-    PetscCheck(v >= 0 && p->owner[v] == rank, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "Vertex %" PetscInt_FMT " is not owned here", got[i]);
-    got[i] = global[v];
+    ghost[at] = v;
+    orig[at] = p->vertex[v].orig;
+    global[at] = mesh->gvert_start + at;
   }
-  PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, key));
-  PetscCall(PetscFree(got));
-  PetscCall(SbRouteDestroy(&route));
-  for (PetscInt i = 0; i < n; i++) global[ghost[i]] = key[i];
-  PetscCall(PetscSortIntWithArray(n, key, ghost));
-  for (PetscInt i = 0; i < n; i++) local[ghost[i]] = mesh->nvert_owned + i;
-  PetscCall(PetscFree4(ghost, key, orig, dest));
+  PetscCall(create_forest(mesh->comm, mesh->Nvert, n, p->nvert, orig, &sf));
+  PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, global, global));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscSortIntWithArray(p->nvert - n, global + n, ghost + n));
+  for (PetscInt i = n; i < p->nvert; i++) local[ghost[i]] = i;
   // vertex arrays in the new order
   PetscCall(PetscMalloc5(mesh->nvert, &mesh->gvert, mesh->nvert, &mesh->vert_orig, mesh->nvert,
                          &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert, &mesh->x));
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     const PetscInt l = local[v];
 
-    mesh->gvert[l] = global[v];
+    mesh->gvert[l] = global[l];
     mesh->vert_orig[l] = p->vertex[v].orig;
     mesh->vert_body[l] = p->vertex[v].body;
     mesh->vert_set[l] = p->vertex[v].set;
@@ -161,7 +142,12 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   }
   PetscCall(PetscFree(p->vertex));
   PetscCall(fill_cells(p, local, mesh));
-  PetscCall(PetscFree2(local, global));
+  PetscCall(PetscFree4(local, ghost, orig, global));
   PetscCall(SbLocalMeshDestroy(p));
+  if (size > 1) {
+    PetscCall(create_forest(mesh->comm, mesh->Ncell, mesh->ncell_owned, mesh->ncell, mesh->cell_orig,
+                            &mesh->cell_sf));
+    PetscCall(create_forest(mesh->comm, mesh->Nvert, n, mesh->nvert, mesh->gvert, &mesh->vert_sf));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

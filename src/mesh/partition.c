@@ -84,62 +84,48 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
 /* Gathers the graph on rank 0, by original numbers: the result is alike for any distribution of cells. */
 static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscMPIInt part[])
 {
-  PetscInt *orig, *remote, *across, *all_orig, *all_across;
-  PetscMPIInt rank, size, *dest, *all_part;
-  SbRoute route;
+  PetscInt *orig, *remote, *across, *all, N;
+  idx_t *start, *adj, *result;
+  PetscMPIInt rank, size, *owner;
+  PetscSF forest;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(
-    PetscMalloc4(w->ncell, &orig, w->nremote, &remote, 4 * (size_t)w->ncell, &across, w->ncell, &dest));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    orig[c] = w->data[c].orig;
-    dest[c] = 0;
-  }
+  N = rank ? 0 : w->Ncell;
+  PetscCall(PetscMalloc3(w->ncell, &orig, w->nremote, &remote, 4 * (size_t)w->ncell, &across));
+  PetscCall(PetscMalloc5(4 * (size_t)N, &all, 4 * (size_t)N, &adj, N + 1, &start, N, &result, N, &owner));
+  for (PetscInt c = 0; c < w->ncell; c++) orig[c] = w->data[c].orig;
   PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, orig, remote));
   for (PetscInt s = 0; s < 4 * w->ncell; s++) {
     const PetscInt n = w->neighbour[s];
 
     across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
   }
-  PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, orig, &all_orig));
-  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), NULL, across, &all_across));
-  PetscCall(PetscMalloc1(route.nrecv, &all_part));
+  PetscCall(SbForestOnRank0(comm, w->Ncell, w->ncell, orig, &forest));
+  PetscCall(SbForestReduce(forest, 4, MPIU_INT, across, all));
   if (!rank) {
-    idx_t n = (idx_t)w->Ncell, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;
-    idx_t *start, *adj, *result;
-    PetscInt *position;
+    idx_t n = (idx_t)N, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;
     int status;
 
     // graph in compressed row form, partitioned by METIS
-    PetscCall(
-      PetscMalloc4(w->Ncell + 1, &start, 4 * (size_t)w->Ncell, &adj, w->Ncell, &result, w->Ncell, &position));
-    for (PetscInt c = 0; c < w->Ncell; c++) position[all_orig[c]] = c;
-    for (PetscInt c = 0; c < w->Ncell; c++) {
-      const PetscInt *other = all_across + 4 * (size_t)position[c];
-
-      start[c] = k;
-      for (int f = 0; f < 4; f++)
-        if (other[f] >= 0) adj[k++] = (idx_t)other[f];
+    for (PetscInt s = 0; s < 4 * N; s++) {
+      if (s % 4 == 0) start[s / 4] = k;
+      if (all[s] >= 0) adj[k++] = (idx_t)all[s];
     }
     start[n] = k;
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
     status =
       METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
-    for (PetscInt c = 0; c < w->Ncell; c++) all_part[c] = (PetscMPIInt)result[all_orig[c]];
-    PetscCall(PetscFree4(start, adj, result, position));
     PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
                status);
+    for (PetscInt c = 0; c < N; c++) owner[c] = (PetscMPIInt)result[c];
   }
-  PetscCall(SbRouteReply(&route, sizeof(PetscMPIInt), all_part, part));
-  PetscCall(PetscFree(all_orig));
-  PetscCall(PetscFree(all_across));
-  PetscCall(PetscFree(all_part));
-  PetscCall(SbRouteDestroy(&route));
-  PetscCall(PetscFree4(orig, remote, across, dest));
+  PetscCall(SbForestBroadcast(forest, 1, MPI_INT, owner, part));
+  PetscCall(PetscSFDestroy(&forest));
+  PetscCall(PetscFree3(orig, remote, across));
+  PetscCall(PetscFree5(all, adj, start, result, owner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
