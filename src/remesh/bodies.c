@@ -37,27 +37,19 @@ static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt
 typedef struct {
   SbModel model;
   const SbGathered *g;
-  PetscInt body, vert0, cell0, nvert, ncell;
+  PetscInt body, vert0, cell0;
   SbElement element;
-  PetscInt each;  /* numbers per node: 3 nfield */
-  PetscInt *cell; /* [ncell][4] old tets */
-  PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
-  SbFaces faces;  /* faces of the old tets */
-  SbKey *edge;    /* [nedge] edges of the old P2 tets, ascending */
+  PetscInt each; /* numbers per node: 3 nfield */
+  SbOldMesh old;
+  PetscInt *at; /* [nvert] a corner 4 cell + a of each old vertex */
+  SbKey *edge;  /* [nedge] edges of the old P2 tets, ascending */
   PetscInt nedge;
-  SbLocator rest;
   PetscBool done;      /* the body has a new mesh */
   SbNewMesh mesh;      /* the new mesh, or the old one: then its arrays are borrowed */
   PetscInt *own;       /* [max(nvert, ncell)] 0, 1, ...: `kept` and `within` of the old mesh */
   uint64_t groups;     /* bits of the sets that are groups */
   uint64_t inclusions; /* bits of those groups that are inclusions of the body */
 } Work;
-
-/* Offsets of the edge nodes of an old cell from the edges' middles, at rest; NULL: no cell is curved. */
-static const PetscReal *off_of(const Work *w, PetscInt cell)
-{
-  return w->edge && w->g->edge_off ? w->g->edge_off + 18 * (size_t)(w->cell0 + cell) : NULL;
-}
 
 /* The sets of the face `slot` = 4 cell + face of the old mesh. */
 static uint64_t face_set(const Work *w, PetscInt slot)
@@ -75,7 +67,7 @@ static PetscInt old_slot(const Work *w, PetscInt slot)
     if (vert[k] >= w->mesh.nkept) return -1;
     vert[k] = w->mesh.kept[vert[k]];
   }
-  return SbFacesFind(&w->faces, vert, slots) == 1 ? slots[0] : -1;
+  return SbFacesFind(&w->old.faces, vert, slots) == 1 ? slots[0] : -1;
 }
 
 /* Makes the new mesh. */
@@ -83,28 +75,20 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
 {
   const SbGathered *g = w->g;
   char where[3 * SB_NAME_MAX];
-  PetscErrorCode ierr;
-  PetscInt *region, nkind = 0;
-  SbOldMesh old = {.nvert = w->nvert,
-                   .ncell = w->ncell,
-                   .X = g->X + 3 * w->vert0,
-                   .x = g->x + 3 * w->vert0,
-                   .cell = w->cell,
-                   .faces = &w->faces,
-                   .edge_off = off_of(w, 0)};
+  PetscInt nkind = 0;
   uint64_t(*kind)[2], lost = 0, *volume;
   PetscBool *surface;
 
   PetscFunctionBeginUser;
   // error for sets with inner points, curves or triangles of a file, which would be lost
-  PetscCall(PetscCalloc2(old.nvert, &volume, old.nvert, &surface));
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
+  PetscCall(PetscCalloc2(w->old.nvert, &volume, w->old.nvert, &surface));
+  for (PetscInt i = 0; i < 4 * w->old.ncell; i++) {
+    volume[w->old.cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
     if (!(face_set(w, i) & SB_ON_BOUNDARY)) lost |= face_set(w, i) & w->groups;
     for (int k = 1; k < 4 && face_set(w, i) & SB_ON_BOUNDARY; k++)
-      surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
+      surface[w->old.cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
   }
-  for (PetscInt v = 0; v < old.nvert; v++)
+  for (PetscInt v = 0; v < w->old.nvert; v++)
     lost |= surface[v] ? 0 : g->vert_set[w->vert0 + v] & w->groups & ~volume[v];
   PetscCall(PetscFree2(volume, surface));
   for (PetscInt k = 0; k < w->model->nset; k++)
@@ -114,9 +98,8 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                w->model->set[k].group);
   PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
   // tets of different materials or groups must be separated by faces
-  PetscCall(PetscMalloc1(w->ncell, &region));
-  PetscCall(PetscMalloc1(w->ncell, &kind));
-  for (PetscInt c = 0; c < w->ncell; c++) {
+  PetscCall(PetscMalloc1(w->old.ncell, &kind));
+  for (PetscInt c = 0; c < w->old.ncell; c++) {
     const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
                    sets = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
     PetscInt k = 0;
@@ -126,13 +109,11 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
       kind[nkind][0] = material;
       kind[nkind++][1] = sets;
     }
-    region[c] = k;
+    w->old.region[c] = k;
   }
   PetscCall(PetscFree(kind));
-  old.region = region;
-  ierr = SbRemeshBody(where, &old, how, &w->mesh);
-  PetscCall(PetscFree(region));
-  PetscFunctionReturn(ierr);
+  PetscCall(SbRemeshBody(where, &w->old, how, &w->mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Counts triangles in groups, or writes them; for an old mesh also inner ones. */
@@ -177,8 +158,8 @@ static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal
   PetscReal weight[4], psi[SB_CELL_NODES] = {0.};
   PetscInt cell;
 
-  (void)SbLocatorFind(w->rest, near, &cell, weight);
-  if (near != X) SbTetBarycentric(w->g->X + 3 * w->vert0, w->cell + 4 * cell, X, weight);
+  (void)SbLocatorFind(w->old.rest, near, &cell, weight);
+  if (near != X) SbTetBarycentric(w->g->X + 3 * w->vert0, w->old.cell + 4 * cell, X, weight);
   if (w->edge) SbQuadraticBasis(weight, psi);
   for (int i = 0; i < 16 && !w->edge; i++) psi[i % 4] += weight[i / 4] * w->element->ops.vertex[i / 4][i % 4];
   for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
@@ -313,7 +294,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
     p->mass = g->mass[w->body];
     p->bound = m->quality; /* quality of the worst tet; the caller derives the bound for re-meshing */
   } else {
-    PetscCall(PetscArraycpy(value, g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
+    PetscCall(PetscArraycpy(value, g->value + each * (size_t)w->cell0, each * (size_t)w->old.ncell));
     if (before) {
       p->step = before->step;
       p->mass = before->mass;
@@ -327,16 +308,16 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
 PetscErrorCode SbRemeshResultCreate(const SbGathered *g, SbRemeshResult *r)
 {
   PetscFunctionBeginUser;
-  *r = (SbRemeshResult){.nbody = g->nbody, .next = {.nfield = g->nfield, .width = g->width}};
-  PetscCall(PetscCalloc3(g->nbody, &r->in_memory, g->nbody, &r->outcome, g->nbody, &r->done));
+  *r = (SbRemeshResult){.next = {.nbody = g->nbody, .nfield = g->nfield, .width = g->width}};
+  PetscCall(PetscCalloc2(g->nbody, &r->in_memory, g->nbody, &r->outcome));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *r)
 {
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < r->nbody; b++) PetscCall(SbMemoryMeshDestroy(&r->in_memory[b]));
-  PetscCall(PetscFree3(r->in_memory, r->outcome, r->done));
+  for (PetscInt b = 0; b < r->next.nbody; b++) PetscCall(SbMemoryMeshDestroy(&r->in_memory[b]));
+  PetscCall(PetscFree2(r->in_memory, r->outcome));
   PetscCall(SbGatheredDestroy(&r->next));
   PetscCall(PetscFree2(r->renamed.from, r->renamed.to));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -352,6 +333,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   PetscCall(PetscMalloc1(m->nbody, &work));
   for (PetscInt b = 0; b < m->nbody; b++) {
     Work *w = &work[b];
+    SbOldMesh *old = &w->old;
     SbCaughtError caught = {0, ""};
 
     *w = (Work){.model = m,
@@ -359,23 +341,26 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
                 .body = b,
                 .vert0 = g->vert0[b],
                 .cell0 = g->cell0[b],
-                .nvert = g->vert0[b + 1] - g->vert0[b],
-                .ncell = g->cell0[b + 1] - g->cell0[b],
                 .element = m->element[b],
-                .each = 3 * g->nfield};
+                .each = 3 * g->nfield,
+                .old = {.nvert = g->vert0[b + 1] - g->vert0[b],
+                        .ncell = g->cell0[b + 1] - g->cell0[b],
+                        .X = g->X + 3 * g->vert0[b],
+                        .x = g->x + 3 * g->vert0[b]}};
     for (PetscInt k = 0; k < m->nset; k++) w->groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
     for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
       w->inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
-    PetscCall(
-      PetscMalloc3(4 * (size_t)w->ncell, &w->cell, w->nvert, &w->at, PetscMax(w->nvert, w->ncell), &w->own));
-    for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-      w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
-      w->at[w->cell[i]] = i;
+    PetscCall(PetscMalloc4(4 * (size_t)old->ncell, &old->cell, old->ncell, &old->region, old->nvert, &w->at,
+                           PetscMax(old->nvert, old->ncell), &w->own));
+    for (PetscInt i = 0; i < 4 * old->ncell; i++) {
+      old->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
+      w->at[old->cell[i]] = i;
     }
-    for (PetscInt i = 0; i < PetscMax(w->nvert, w->ncell); i++) w->own[i] = i;
-    if (w->element->nodes_per[1]) PetscCall(list_edges(w->ncell, w->cell, &w->nedge, &w->edge));
-    PetscCall(SbFacesCreate(w->nvert, w->ncell, w->cell, &w->faces));
-    PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, off_of(w, 0), &w->rest));
+    for (PetscInt i = 0; i < PetscMax(old->nvert, old->ncell); i++) w->own[i] = i;
+    if (w->element->nodes_per[1]) PetscCall(list_edges(old->ncell, old->cell, &w->nedge, &w->edge));
+    if (w->edge && g->edge_off) old->edge_off = g->edge_off + 18 * (size_t)w->cell0;
+    PetscCall(SbFacesCreate(old->nvert, old->ncell, old->cell, &old->faces));
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &old->rest));
     // re-mesh the body; an error becomes the message
     if (due[b]) {
       SB_CATCH(&caught, make_mesh(w, how));
@@ -383,19 +368,18 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
       if (caught.code) PetscCall(SbNewMeshDestroy(&w->mesh));
     }
     if (!w->done)
-      w->mesh = (SbNewMesh){.nvert = w->nvert,
-                            .ncell = w->ncell,
-                            .nkept = w->nvert,
-                            .X = g->X + 3 * w->vert0,
-                            .cell = w->cell,
+      w->mesh = (SbNewMesh){.nvert = old->nvert,
+                            .ncell = old->ncell,
+                            .nkept = old->nvert,
+                            .X = (PetscReal *)old->X,
+                            .cell = old->cell,
                             .kept = w->own,
                             .within = w->own,
-                            .edge_off = (PetscReal *)off_of(w, 0)};
+                            .edge_off = (PetscReal *)old->edge_off};
     r->outcome[b] = (SbRemeshOutcome){
-      {w->nvert, w->mesh.nvert}, {w->ncell, w->mesh.ncell}, w->mesh.nmoved, w->mesh.quality, ""};
+      {old->nvert, w->mesh.nvert}, {old->ncell, w->mesh.ncell}, w->mesh.nmoved, w->mesh.quality, ""};
     (void)snprintf(r->outcome[b].message, sizeof(r->outcome[b].message), "%.511s", caught.text);
-    r->done[b] = w->done;
-    room += w->nvert + 2 * w->faces.nboundary + w->nedge;
+    room += old->nvert + 2 * old->faces.nboundary + w->nedge;
   }
   // counts of the next meshes, and arrays for their values
   PetscCall(PetscCalloc2(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0));
@@ -411,10 +395,10 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(finish_body(&work[b], step, r));
     if (work[b].done) PetscCall(SbNewMeshDestroy(&work[b].mesh));
-    PetscCall(SbLocatorDestroy(&work[b].rest));
-    PetscCall(PetscFree3(work[b].cell, work[b].at, work[b].own));
+    PetscCall(SbLocatorDestroy(&work[b].old.rest));
+    PetscCall(PetscFree4(work[b].old.cell, work[b].old.region, work[b].at, work[b].own));
     PetscCall(PetscFree(work[b].edge));
-    PetscCall(SbFacesDestroy(&work[b].faces));
+    PetscCall(SbFacesDestroy(&work[b].old.faces));
   }
   PetscCall(PetscSortIntWithArray(r->renamed.n, r->renamed.from, r->renamed.to));
   PetscCall(PetscFree(work));

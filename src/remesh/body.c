@@ -28,10 +28,10 @@
 #define PLACES 6      /* trial positions of a vertex, each half as far as the one before */
 #define STRAIGHT 1e-6 /* offset of an edge node over the edge length that counts as zero */
 
-/* Point locators in the old mesh. */
+/* The old mesh, with what a new one is made of. */
 typedef struct {
   const SbOldMesh *old;
-  SbLocator rest, flat; /* locator at rest; among straight tets, for a body with curved ones, else NULL */
+  SbLocator flat; /* among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
   SbKey *curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
 } Material;
@@ -39,7 +39,7 @@ typedef struct {
 /* Whether face f of tet c belongs to the hull; each triangle once. */
 static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], PetscInt c, int f)
 {
-  const PetscInt other = old->faces->neighbour[4 * c + f];
+  const PetscInt other = old->faces.neighbour[4 * c + f];
 
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
 }
@@ -68,7 +68,7 @@ static void follow(const Material *at, SbNewMesh *m, PetscInt v)
   PetscInt cell;
   PetscReal w[4];
 
-  (void)SbLocatorFind(at->rest, m->X + 3 * v, &cell, w);
+  (void)SbLocatorFind(at->old->rest, m->X + 3 * v, &cell, w);
   mix(at->old, at->old->x, cell, w, m->x + 3 * v);
   if (m->flat) mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
 }
@@ -117,7 +117,7 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
     PetscInt cell;
     PetscReal w[4];
 
-    (void)SbLocatorFind(now ? now : at->flat ? at->flat : at->rest, y + 3 * v, &cell, w);
+    (void)SbLocatorFind(now ? now : at->flat ? at->flat : at->old->rest, y + 3 * v, &cell, w);
     PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume %s",
                how->rest ? "at rest" : "now");
     if (now || at->flat)
@@ -357,7 +357,6 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
                              Material *at, SbNewMesh *m)
 {
   SbTets tets = {0};
-  PetscBool *used, all = PETSC_TRUE;
   PetscInt *component, nregion, ntri = 0, n = 0, nkept;
 
   PetscFunctionBeginUser;
@@ -365,7 +364,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   // components: tets of one region that are connected by faces
   for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
-    const PetscInt other = old->faces->neighbour[s];
+    const PetscInt other = old->faces.neighbour[s];
 
     if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
   }
@@ -374,7 +373,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
   PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
-    const PetscInt other = old->faces->neighbour[s];
+    const PetscInt other = old->faces.neighbour[s];
 
     if (!in_hull(old, component, s / 4, s % 4)) continue;
     for (int k = 0; k < 3; k++) hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
@@ -396,17 +395,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   m->ncell = tets.ncell;
   m->x = tets.x;
   m->cell = tets.cell;
-  // a mesher has to return tets that use all vertices
-  PetscCheck(m->ncell && m->nvert >= hull->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "the mesher made no tetrahedra");
-  PetscCall(PetscCalloc1(m->nvert, &used));
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) used[m->cell[i]] = PETSC_TRUE;
-  for (PetscInt v = 0; v < m->nvert; v++) all = (PetscBool)(all && used[v]);
-  PetscCall(PetscFree(used));
-  PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "the mesher left out vertices of the surface, or made some of no tetrahedron");
-  // locators in the old mesh; its curved edges between kept vertices
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
+  // locator among straight tets; curved edges between kept vertices
   if (old->edge_off) {
     PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
     PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
@@ -435,7 +424,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
       middle[k] = 0;
       for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
     }
-    (void)SbLocatorFind(at->rest, middle, &m->within[c], w);
+    (void)SbLocatorFind(at->old->rest, middle, &m->within[c], w);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -450,7 +439,6 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
   PetscCall(PetscMemzero(m, sizeof(*m)));
   ierr = remesh(where, old, how, &hull, &at, m);
   PetscCall(SbSurfaceDestroy(&hull));
-  PetscCall(SbLocatorDestroy(&at.rest));
   PetscCall(SbLocatorDestroy(&at.flat));
   PetscCall(PetscFree(at.curved));
   if (ierr) PetscCall(SbNewMeshDestroy(m));

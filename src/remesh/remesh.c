@@ -24,7 +24,7 @@ struct _p_SbRemesh {
   PetscLogEvent event;
   PetscInt nbody;
   PetscBool *named; /* [nbody] may be re-meshed */
-  PetscBool *due;   /* [nbody] is to be re-meshed now */
+  PetscBool *due;   /* [nbody] is to be re-meshed now; afterwards: has been */
   PetscReal *asked; /* [nbody] quality bound of the options; 0: none */
   PetscReal *bound; /* [nbody] current quality bound */
   PetscReal *worst; /* [nbody] quality of the worst tet after the last step */
@@ -303,7 +303,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 
     if (!to) continue;
     PetscCall(SbBodyMomenta(old->model, before->U, from, momenta));
-    PetscCall(SbBodySetMomenta(s.model, run->U, to, result->done, (const PetscReal(*)[6])momenta, &speed[i]));
+    PetscCall(SbBodySetMomenta(s.model, run->U, to, r->due, (const PetscReal(*)[6])momenta, &speed[i]));
   }
   PetscCall(PetscFree(momenta));
   PetscCall(SbEffectsHandOver(before, run, &result->renamed));
@@ -335,7 +335,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
                         .speed = speed[0],
                         .shift = PetscSqrtReal(SbDistance2(e[0].centre, e[1].centre))};
 
-    if (!result->done[b]) continue;
+    if (!r->due[b]) continue;
     PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));
     PetscCall(SbReportRemeshed(run, &entry));
   }
@@ -367,7 +367,6 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscCall(SbGatheredDestroy(&g));
   PetscCallMPI(
     MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)), MPI_BYTE, 0, m->comm));
-  PetscCallMPI(MPI_Bcast(result.done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
@@ -375,7 +374,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   *any = r->changes;
   r->changes = PETSC_FALSE;
   for (PetscInt b = 0; b < m->nbody; b++) {
-    const PetscBool done = result.done[b];
+    const PetscBool done = (PetscBool)(r->due[b] && !result.outcome[b].message[0]);
     const PetscReal reached = done ? result.outcome[b].quality : r->worst[b];
 
     *any = (PetscBool)(*any || done);
@@ -388,6 +387,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
     r->rest[b] = done && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
     r->from[b] = run->step_now + r->rest[b];
     if (result.in_memory[b] && done) result.in_memory[b]->bound = r->bound[b];
+    r->due[b] = done; /* which replace() needs */
   }
   if (*any) PetscCall(replace(r, scene, &result));
   PetscCall(SbRemeshResultDestroy(&result));

@@ -40,14 +40,15 @@ typedef struct {
   PetscBool rest;    /* the reference configuration is tetrahedralised, else the current one */
   PetscReal quality; /* least quality of tets at rest, and now (SbTetQuality) */
 } SbRemeshing;
-/* The old mesh; all arrays borrowed. */
+/* The old mesh; numbers from the body's first vertex and tet; positions and offsets are borrowed. */
 typedef struct {
   PetscInt nvert, ncell;
   const PetscReal *X, *x;    /* [nvert][3] positions at rest, now; m */
-  const PetscInt *cell;      /* [ncell][4] vertices */
-  const PetscInt *region;    /* [ncell] region numbers; faces between regions are kept */
-  const SbFaces *faces;      /* faces of `cell` */
+  PetscInt *cell;            /* [ncell][4] vertices */
+  PetscInt *region;          /* [ncell] region numbers; faces between regions are kept */
+  SbFaces faces;             /* faces of `cell` */
   const PetscReal *edge_off; /* [ncell][6][3] edge offsets at rest; NULL: straight edges */
+  SbLocator rest;            /* of places at rest */
 } SbOldMesh;
 /* The new mesh of the body; arrays owned, SbNewMeshDestroy(). */
 typedef struct {
@@ -77,10 +78,8 @@ typedef struct {
   char message[512];
 } SbRemeshOutcome;
 typedef struct {
-  PetscInt nbody;
   SbMemoryMesh **in_memory; /* [nbody] meshes of all bodies, on rank 0; NULL: elsewhere, or taken */
   SbRemeshOutcome *outcome; /* [nbody] numbers, quality and message of each body */
-  PetscBool *done;          /* [nbody] the body has a new mesh */
   SbGathered next;          /* next scene with its state; X, vert_set and so on are not set */
   SbRenamed renamed;        /* renumbered nodes of the surfaces of all bodies */
 } SbRemeshResult;           /* SbRemeshResultDestroy() */
