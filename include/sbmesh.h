@@ -182,8 +182,10 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
   23; PetscFree().
 */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
-/* The leaves 0, 1, ... n - 1 of the roots root[n] of N on rank 0. Collective; the caller destroys it. */
-PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt root[], PetscSF *forest);
+/* Star forest of the leaves 0, 1, ... n - 1 with the roots root[n], of which this rank has the next nroot.
+   Collective; the caller destroys it. */
+PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const PetscInt root[],
+                              PetscSF *forest);
 /* Brings n numbers of each root to its leaves, or those of each leaf to its root. Collective. */
 PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
 PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf, void *root);

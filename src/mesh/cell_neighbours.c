@@ -47,18 +47,16 @@ PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt root[], PetscSF *sf)
+PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const PetscInt root[],
+                              PetscSF *forest)
 {
-  PetscSFNode *remote;
-  PetscMPIInt rank;
+  PetscLayout layout;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMalloc1(n, &remote));
-  for (PetscInt i = 0; i < n; i++) remote[i] = (PetscSFNode){.rank = 0, .index = root[i]};
-  PetscCall(PetscSFCreate(comm, sf));
-  PetscCall(PetscSFSetGraph(*sf, rank ? 0 : N, n, NULL, PETSC_COPY_VALUES, remote, PETSC_OWN_POINTER));
-  PetscCall(PetscSFSetUp(*sf));
+  PetscCall(PetscLayoutCreateFromSizes(comm, nroot, PETSC_DETERMINE, 1, &layout));
+  PetscCall(PetscSFCreate(comm, forest));
+  PetscCall(PetscSFSetGraphLayout(*forest, layout, n, NULL, PETSC_COPY_VALUES, root));
+  PetscCall(PetscLayoutDestroy(&layout));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -102,7 +102,7 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
 
     across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
   }
-  PetscCall(SbForestOnRank0(comm, w->Ncell, w->ncell, orig, &forest));
+  PetscCall(SbForestCreate(comm, N, w->ncell, orig, &forest));
   PetscCall(SbForestReduce(forest, 4, MPIU_INT, across, all));
   if (!rank) {
     idx_t n = (idx_t)N, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;

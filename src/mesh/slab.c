@@ -26,12 +26,11 @@ typedef struct {
   PetscReal *x;      /* [nkept][3] position, m */
   PetscInt *number;  /* [nkept] original number, -1: unused by tets */
   uint64_t *mask;    /* [nkept] sets of each vertex */
-  SbRoute vert;      /* communication from the vertices of this rank's tets to their home ranks */
+  PetscSF vert;      /* from vertices at their home ranks to those of this rank's tets */
   PetscInt *used;    /* [im->nvert] file numbers of these vertices, ascending */
-  PetscInt *asked;   /* [vert.nrecv] position of each received vertex in the block */
   PetscInt *start;   /* [nkept + 1] offsets into user[] */
-  PetscInt *user;    /* [start[nkept]] ranks that use a vertex, ascending */
-  PetscBool *shared; /* [im->nvert] whether other ranks use the vertex too */
+  PetscMPIInt *user; /* [start[nkept]] ranks that use a vertex */
+  PetscInt *nuser;   /* [im->nvert] number of ranks that use the vertex */
 } Slab;
 
 static inline PetscMPIInt home(const Slab *s, PetscInt vert)
@@ -67,50 +66,46 @@ static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Positions and original numbers of the vertices of this rank's tets. */
+/* Positions and original numbers of the vertices of this rank's tets; the ranks that use each of the block. */
 static PetscErrorCode ask_home_ranks(Slab *s)
 {
-  typedef struct {
-    PetscReal x[3];
-    PetscInt number, nuser;
-  } Answer;
   SbImport *im = s->im;
-  Answer *answer, *result;
+  const PetscInt *nuser;
+  PetscMPIInt *mine;
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
-  PetscCall(send_home(s, im->nvert, sizeof(PetscInt), s->used, &s->vert, &s->asked));
-  // ranks that use each vertex of the block; original numbers of used vertices
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
-  PetscCall(SbBucketByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
-  for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
+  PetscCall(SbForestCreate(s->comm, s->nkept, im->nvert, s->used, &s->vert));
+  PetscCall(PetscSFComputeDegreeBegin(s->vert, &nuser));
+  PetscCall(PetscSFComputeDegreeEnd(s->vert, &nuser));
+  // original numbers of used vertices
+  for (PetscInt v = 0; v < s->nkept; v++) n += nuser[v] > 0;
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
   before -= n;
+  im->nunused = s->nkept - n;
   PetscCall(PetscMalloc1(s->nkept, &s->number));
-  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = s->start[v + 1] > s->start[v] ? before++ : -1;
-  s->im->nunused = s->nkept - n;
-  // reply with position, original number and number of ranks
-  PetscCall(PetscMalloc2(s->vert.nrecv, &answer, im->nvert, &result));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) {
-    const PetscInt v = s->asked[i];
-
-    answer[i] = (Answer){{0}, s->number[v], s->start[v + 1] - s->start[v]};
-    PetscCall(PetscArraycpy(answer[i].x, s->x + 3 * v, 3));
+  PetscCall(PetscMalloc1(s->nkept + 1, &s->start));
+  s->start[0] = 0;
+  for (PetscInt v = 0; v < s->nkept; v++) {
+    s->number[v] = nuser[v] > 0 ? before++ : -1;
+    s->start[v + 1] = s->start[v] + nuser[v];
   }
-  PetscCall(SbRouteReply(&s->vert, sizeof(Answer), answer, result));
-  PetscCall(PetscFree(s->x));
+  // ranks that use them
+  PetscCall(PetscMalloc1(s->start[s->nkept], &s->user));
+  PetscCall(PetscMalloc1(im->nvert, &mine));
+  for (PetscInt v = 0; v < im->nvert; v++) mine[v] = s->rank;
+  PetscCall(PetscSFGatherBegin(s->vert, MPI_INT, mine, s->user));
+  PetscCall(PetscSFGatherEnd(s->vert, MPI_INT, mine, s->user));
+  PetscCall(PetscFree(mine));
   // vertex arrays of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
+  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = s->used[v] + 1;
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
-  PetscCall(PetscMalloc1(im->nvert, &s->shared));
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    PetscCall(PetscArraycpy(im->x + 3 * v, result[v].x, 3));
-    im->vert_number[v] = s->used[v] + 1;
-    s->part->orig[v] = result[v].number;
-    s->shared[v] = (PetscBool)(result[v].nuser > 1);
-  }
-  PetscCall(PetscFree2(answer, result));
+  PetscCall(PetscMalloc1(im->nvert, &s->nuser));
+  PetscCall(SbForestBroadcast(s->vert, 3, MPIU_REAL, s->x, im->x));
+  PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, s->number, s->part->orig));
+  PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, nuser, s->nuser));
+  PetscCall(PetscFree(s->x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,7 +191,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
 
     for (int k = 0; k < 3; k++) {
       v[k] = tets->vert[4 * (i / 4) + SbFaceVertex[i % 4][k]];
-      all = (PetscBool)(all && s->shared[v[k]]);
+      all = (PetscBool)(all && s->nuser[v[k]] > 1);
     }
     if (!all) continue;
     PetscCall(PetscSortInt(3, v));
@@ -222,7 +217,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
   const SbImport *im = s->im;
-  PetscInt *part, *got, *user, n, first, total, npair = 0, kept = 0, *parent;
+  PetscInt *part, *got, n, first, total, npair = 0, kept = 0, *parent;
   PetscInt64 *pair, *all;
   PetscMPIInt *dest;
   SbRoute route;
@@ -237,18 +232,13 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
   /* pairs of parts that share a vertex, each pair once */
-  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), NULL, part, &got));
+  PetscCall(PetscMalloc2(s->start[s->nkept], &got, s->start[s->nkept], &pair));
+  PetscCall(PetscSFGatherBegin(s->vert, MPIU_INT, part, got));
+  PetscCall(PetscSFGatherEnd(s->vert, MPIU_INT, part, got));
   PetscCall(PetscFree(part));
-  PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
   for (PetscInt v = 0; v < s->nkept; v++)
-    if (s->number[v] >= 0) user[s->start[v]] = -1; /* the vertex is used by a tet */
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) {
-    PetscInt *other = &user[s->start[s->asked[i]]];
-
-    if (*other >= 0) pair[npair++] = (PetscInt64)SbKeyOfPair(*other, got[i]);
-    *other = got[i];
-  }
-  PetscCall(PetscFree(got));
+    for (PetscInt k = s->start[v] + 1; k < s->start[v + 1]; k++)
+      pair[npair++] = (PetscInt64)SbKeyOfPair(got[k - 1], got[k]);
   PetscCall(PetscSortInt64(npair, pair));
   for (PetscInt i = 0; i < npair; i++)
     if (!kept || pair[i] != pair[kept - 1]) pair[kept++] = pair[i];
@@ -266,7 +256,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(PetscFree(all));
   PetscCall(SbRouteDestroy(&route));
   PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
-  PetscCall(PetscFree2(user, pair));
+  PetscCall(PetscFree2(got, pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -274,42 +264,36 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
-  SbRoute route;
-  uint64_t *mark, *got_mark;
-  PetscInt n = 0, *vert, *got;
-  PetscBool *there, *is;
+  PetscSF forest;
+  uint64_t *mark;
+  PetscInt n = 0, *vert, *number;
 
   PetscFunctionBeginUser;
   // vertices of all items
   for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
-  PetscCall(PetscMalloc3(n, &vert, n, &mark, n, &there));
+  PetscCall(PetscMalloc3(n, &vert, n, &mark, n, &number));
   n = 0;
   for (int d = 0; d < 3; d++)
     for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) vert[n++] = im->item[d].vert[i];
-  // home ranks reply whether a tet uses each vertex
-  PetscCall(send_home(s, n, sizeof(PetscInt), vert, &route, &got));
-  PetscCall(PetscMalloc1(route.nrecv, &is));
-  for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
-  PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
-  PetscCall(PetscFree(is));
+  // their numbers, from the home ranks: -1 if no tet uses them
+  PetscCall(SbForestCreate(s->comm, s->nkept, n, vert, &forest));
+  PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, s->number, number));
   // mark the vertices of items whose vertices are all used; then drop points and lines
   n = 0;
   for (int d = 0; d < 3; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
       PetscBool all = PETSC_TRUE;
 
-      for (int k = 0; k <= d; k++) all = (PetscBool)(all && there[n + k]);
+      for (int k = 0; k <= d; k++) all = (PetscBool)(all && number[n + k] >= 0);
       for (int k = 0; k <= d; k++) mark[n++] = all ? bits[im->item[d].tags[i]] : 0;
     }
     if (d < 2) im->item[d].n = 0;
   }
   // combine the marks of all ranks at the home ranks
-  PetscCall(SbRouteSend(&route, sizeof(uint64_t), NULL, mark, &got_mark));
-  for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
-  PetscCall(PetscFree(got));
-  PetscCall(PetscFree(got_mark));
-  PetscCall(PetscFree3(vert, mark, there));
-  PetscCall(SbRouteDestroy(&route));
+  PetscCall(PetscSFReduceBegin(forest, MPI_UINT64_T, mark, s->mask, MPI_BOR));
+  PetscCall(PetscSFReduceEnd(forest, MPI_UINT64_T, mark, s->mask, MPI_BOR));
+  PetscCall(PetscSFDestroy(&forest));
+  PetscCall(PetscFree3(vert, mark, number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -331,8 +315,7 @@ static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void
   for (PetscInt i = 0; i < there->nrecv; i++) {
     const PetscInt v = first_vertex(got, unit, i) - s->rows.first;
 
-    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++)
-      PetscCall(SbRouteAdd(&list, i, (PetscMPIInt)s->user[k]));
+    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) PetscCall(SbRouteAdd(&list, i, s->user[k]));
   }
   *from = list.item;
   PetscCall(SbRouteCreate(s->comm, list.n, list.rank, on));
@@ -528,11 +511,9 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(find_triangles(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
   // combine the set bits of shared vertices over all ranks; count vertices at their home ranks
-  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), NULL, m->vert, &bits));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= bits[i];
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) bits[i] = s->mask[s->asked[i]];
-  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), bits, m->vert));
-  PetscCall(PetscFree(bits));
+  PetscCall(PetscSFReduceBegin(s->vert, MPI_UINT64_T, m->vert, s->mask, MPI_BOR));
+  PetscCall(PetscSFReduceEnd(s->vert, MPI_UINT64_T, m->vert, s->mask, MPI_BOR));
+  PetscCall(SbForestBroadcast(s->vert, 1, MPI_UINT64_T, s->mask, m->vert));
   PetscCall(SbSetsCount(s->comm, s->nkept, tets->n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));
@@ -554,11 +535,10 @@ PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbB
   PetscCall(PetscFree(s.x));
   PetscCall(PetscFree(s.number));
   PetscCall(PetscFree(s.mask));
-  if (s.vert.scount) PetscCall(SbRouteDestroy(&s.vert));
+  PetscCall(PetscSFDestroy(&s.vert));
   PetscCall(PetscFree(s.used));
-  PetscCall(PetscFree(s.asked));
   PetscCall(PetscFree(s.start));
   PetscCall(PetscFree(s.user));
-  PetscCall(PetscFree(s.shared));
+  PetscCall(PetscFree(s.nuser));
   PetscFunctionReturn(ierr);
 }

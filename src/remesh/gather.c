@@ -63,7 +63,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   // vertices and their sets to rank 0
   if (!rank)
     PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
-  PetscCall(SbForestOnRank0(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+  PetscCall(SbForestCreate(mesh->comm, rank ? 0 : mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
   PetscCall(SbCornerPositions(s, run->U, now));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
@@ -71,7 +71,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(PetscFree(now));
   PetscCall(SbForestReduce(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(SbForestOnRank0(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
+  PetscCall(SbForestCreate(m->comm, rank ? 0 : mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
   // cells with their vertices, materials and sets
   if (!rank)
     PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
@@ -132,12 +132,14 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
   const SbMesh mesh = s->mesh;
   const PetscInt each = g->width * g->nfield * 3;
   PetscReal *value, *array;
+  PetscMPIInt rank;
   Vec vec[3];
   PetscSF sf;
 
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
   PetscCall(PetscMalloc1((size_t)each * (size_t)mesh->ncell, &value));
-  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, mesh->ncell, mesh->cell_orig, &sf));
+  PetscCall(SbForestCreate(mesh->comm, rank ? 0 : mesh->Ncell, mesh->ncell, mesh->cell_orig, &sf));
   PetscCall(SbForestBroadcast(sf, each, MPIU_REAL, g->value, value));
   PetscCall(PetscSFDestroy(&sf));
   (void)vectors_of(run, vec);
