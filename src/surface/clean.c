@@ -110,7 +110,7 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, SbKey edge[], PetscInt *ncut, 
   PetscCall(PetscCalloc2(t->ntri, &flat, t->ntri, &touched));
   *ncut = *nflat = 0;
   for (PetscInt i = 0; i < t->ntri; i++) {
-    (void)SbTriangleArea(t, i, &flat[i]);
+    (void)SbTriangleArea(t->x, t->tri + 3 * i, &flat[i]);
     *nflat += flat[i];
   }
   if (*nflat) SbTrianglesEdges(t, edge);
@@ -194,7 +194,7 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
     const PetscReal *x = t->x + 3 * t->tri[3 * i];
     PetscBool flat;
 
-    (void)SbTriangleArea(t, i, &flat);
+    (void)SbTriangleArea(t->x, t->tri + 3 * i, &flat);
     PetscCheck(
       !flat, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
       "%s: triangle %lld at (%.6g, %.6g, %.6g) m has no area (of %" PetscInt_FMT

@@ -117,7 +117,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   SbBoxClear(box);
   for (PetscInt v = 0; v < t->nvert; v++) SbBoxAdd(box, t->x + 3 * v);
   tolerance = given >= 0 ? given : WELD * SbBoxDiagonal(box);
-  edge = SbTrianglesMeanEdge(t);
+  edge = SbTrianglesMeanEdge(t->x, t->ntri, t->tri);
   PetscCheck(
     given < 0.5 * edge, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
     "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
@@ -159,7 +159,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   }
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
   t->volume = 0;
-  for (PetscInt i = 0; i < t->ntri; i++) t->volume += SbTetVolumeTo(t, i, t->x);
+  for (PetscInt i = 0; i < t->ntri; i++) t->volume += SbTetVolumeTo(t->x, t->tri + 3 * i, t->x);
   // neighbour across each edge; an edge of more than two triangles is an error
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
@@ -192,7 +192,7 @@ static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbT
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCheck(format && !format->sheets, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  PetscCheck(format && format->read != SbTrianglesRead_Poly, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh",
              f->where);
   ierr = make_surface(path, at, f, &s, &repairs);

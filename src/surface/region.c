@@ -207,8 +207,9 @@ static PetscErrorCode find_shells(Arrangement *s)
     }
     SbBoxMerge(p->box, box);
     p->surface = s->surface[i / 2];
-    p->volume += (i % 2 ? 1 : -1) * SbTetVolumeTo(t, i / 2, t->x + 3 * t->tri[3 * p->first]);
-    p->area += SbTriangleArea(t, i / 2, NULL);
+    p->volume +=
+      (i % 2 ? 1 : -1) * SbTetVolumeTo(t->x, t->tri + 3 * (i / 2), t->x + 3 * t->tri[3 * p->first]);
+    p->area += SbTriangleArea(t->x, t->tri + 3 * (i / 2), NULL);
     if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
   }
   // non-manifold surfaces

@@ -8,8 +8,7 @@
   Delaunay method and optimised by gmsh and, if available, Netgen.
 */
 #include "sbgmsh.h"
-#include "sbtet.h"
-#include "tet_backends.h"
+#include "surface_impl.h"
 
 /* Discrete entity of the surface, and the regions on its sides. */
 typedef struct {
@@ -204,8 +203,7 @@ static PetscErrorCode nearest_triangles(const SbSurface *s, SbItems *tri, const 
 
 PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets)
 {
-  SbTetJob mine = *job;
-  const SbGmshJob child = {job->where, "made tetrahedra", job->options.seconds, work, &mine};
+  const SbGmshJob child = {job->where, "made tetrahedra", job->options.seconds, work, (void *)job};
 
   PetscFunctionBeginUser;
   PetscCall(SbGmshRun(&child, tets));

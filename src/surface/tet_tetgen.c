@@ -17,8 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <fcntl.h>
-#include "sbtet.h"
-#include "tet_backends.h"
+#include "surface_impl.h"
 
 #define UNKNOWN (-2) /* region of a part that is not found yet */
 #define PATH_LENGTH (PETSC_MAX_PATH_LEN + 300)
@@ -51,7 +50,6 @@ static PetscErrorCode check_end(const char *folder, int status)
 /* The region of each tag set of tets, from the tets at facets; tags of facets become numbers of triangles. */
 static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, SbImport *im, PetscInt region[])
 {
-  const SbTriangles t = {.x = s->x, .tri = s->tri};
   SbItems *tri = &im->item[2];
 
   PetscFunctionBeginUser;
@@ -68,7 +66,7 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
     for (PetscInt k = 0; k < n; k++) {
       PetscInt *known = &region[im->item[3].tags[slots[k] / 4]];
       const PetscReal *x = im->x + 3 * im->item[3].vert[slots[k]]; /* in front of the triangle, or behind */
-      const PetscInt side = s->side[2 * f + (SbTetVolumeTo(&t, f, x) > 0)];
+      const PetscInt side = s->side[2 * f + (SbTetVolumeTo(s->x, s->tri + 3 * f, x) > 0)];
 
       PetscCheck(*known == UNKNOWN || *known == side, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "a part between facets lies in two regions");

@@ -7,8 +7,7 @@
   surface was kept, else within ten percent), groups are assigned to tets and triangles, and slivers are
   counted.
 */
-#include "sbtet.h"
-#include "tet_backends.h"
+#include "surface_impl.h"
 
 #define NEAR 1.5   /* largest ratio of target size and mean edge for which the surface is kept */
 #define EXACT 1e-9 /* tolerance of region volumes relative to those of the surface, if the surface is kept */
@@ -34,16 +33,14 @@ PetscErrorCode SbSurfaceDestroy(SbSurface *s)
 
 PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
 {
-  const SbTriangles t = {.nvert = s->nvert, .ntri = s->ntri, .x = s->x, .tri = s->tri};
-
   for (PetscInt r = 0; volume && r < s->nregion; r++) volume[r] = 0;
   for (PetscInt f = 0; volume && f < s->ntri; f++) {
-    const PetscReal cone = SbTetVolumeTo(&t, f, s->x);
+    const PetscReal cone = SbTetVolumeTo(s->x, s->tri + 3 * f, s->x);
 
     if (s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
     if (s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
   }
-  return SbTrianglesMeanEdge(&t);
+  return SbTrianglesMeanEdge(s->x, s->ntri, s->tri);
 }
 
 static const struct {

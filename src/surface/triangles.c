@@ -1,22 +1,22 @@
 /*
-  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name.
+  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name. Areas, edges,
+  volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
 
   For a gmsh file the surface is the boundary of its tets, or, without tets, its triangles.
 */
 #include <strings.h>
-#include "sbtet.h"
-#include "triangles.h"
+#include "surface_impl.h"
 
 const SbTriangleFormat *SbTrianglesFormat(const char *path)
 {
   static const SbTriangleFormat formats[] = {
-    {".stl", SbTrianglesRead_STL, PETSC_FALSE},
-    {".obj", SbTrianglesRead_OBJ, PETSC_FALSE},
-    {".off", SbTrianglesRead_OFF, PETSC_FALSE},
-    {".ply", SbTrianglesRead_PLY, PETSC_FALSE},
-    {".poly", SbTrianglesRead_Poly, PETSC_TRUE},
-    {".smesh", SbTrianglesRead_Poly, PETSC_TRUE},
-    {".msh", NULL, PETSC_FALSE},
+    {".stl", SbTrianglesRead_STL},
+    {".obj", SbTrianglesRead_OBJ},
+    {".off", SbTrianglesRead_OFF},
+    {".ply", SbTrianglesRead_PLY},
+    {".poly", SbTrianglesRead_Poly},
+    {".smesh", SbTrianglesRead_Poly},
+    {".msh", NULL},
   };
   const char *dot = strrchr(path, '.');
 
@@ -35,7 +35,7 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
 
   PetscFunctionBeginUser;
   f->path = path;
-  f->sheets = format->sheets;
+  f->sheets = (PetscBool)(format->read == SbTrianglesRead_Poly);
   if (format->read) {
     PetscCall(SbScanOpen(f->where, path, &im->scan));
     PetscCall((*format->read)(&im->scan, f));
@@ -72,4 +72,62 @@ PetscErrorCode SbTrianglesDestroy(SbTriangles *t)
   PetscCall(PetscFree(t->across));
   PetscCall(PetscMemzero(t, sizeof(*t)));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbTriangleArea(const PetscReal x[], const PetscInt v[3], PetscBool *flat)
+{
+  PetscReal e[3][3], n[3], longest2 = 0, twice;
+
+  for (int k = 0; k < 3; k++) {
+    SbSubtract(x + 3 * v[(k + 1) % 3], x + 3 * v[k], e[k]);
+    longest2 = PetscMax(longest2, SbDot3(e[k], e[k]));
+  }
+  SbCross(e[0], e[1], n);
+  twice = PetscSqrtReal(SbDot3(n, n));
+  if (flat) *flat = (PetscBool) !(twice > SB_TRIANGLE_FLAT * longest2);
+  return 0.5 * twice;
+}
+
+PetscReal SbTrianglesMeanEdge(const PetscReal x[], PetscInt ntri, const PetscInt tri[])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt f = 0; f < ntri; f++) {
+    PetscReal around = 0;
+
+    for (PetscInt s = 3 * f; s < 3 * f + 3; s++)
+      around += PetscSqrtReal(SbDistance2(x + 3 * tri[SbSlotNext(s)], x + 3 * tri[s]));
+    sum += around;
+  }
+  return ntri ? sum / (3 * (PetscReal)ntri) : 0;
+}
+
+void SbTrianglesEdges(const SbTriangles *t, SbKey edge[])
+{
+  for (PetscInt i = 0; i < 3 * t->ntri; i++)
+    edge[i] = (SbKey){SbKeyOfPair(t->tri[i], t->tri[SbSlotNext(i)]), i};
+  SbKeysSort(3 * t->ntri, edge);
+}
+
+PetscReal SbTetVolumeTo(const PetscReal x[], const PetscInt v[3], const PetscReal o[3])
+{
+  PetscReal a[3][3], n[3];
+
+  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k], o, a[k]);
+  SbCross(a[0], a[1], n);
+  return SbDot3(n, a[2]) / 6;
+}
+
+PetscReal SbTriangleSolidAngle(const PetscReal x[], const PetscInt v[3], const PetscReal o[3])
+{
+  PetscReal a[3][3], l[3], n[3], down;
+
+  for (int k = 0; k < 3; k++) {
+    SbSubtract(x + 3 * v[k], o, a[k]);
+    l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
+  }
+  SbCross(a[0], a[1], n);
+  down =
+    l[0] * l[1] * l[2] + SbDot3(a[0], a[1]) * l[2] + SbDot3(a[1], a[2]) * l[0] + SbDot3(a[2], a[0]) * l[1];
+  return 2 * atan2(SbDot3(n, a[2]), down);
 }

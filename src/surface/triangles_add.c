@@ -9,7 +9,7 @@
   edges of opposite directions.
 */
 #include <ctype.h>
-#include "triangles.h"
+#include "surface_impl.h"
 
 #define CORNERS_MAX 1000 /* corners of a non-convex polygon, at most: ear clipping is cubic in their number */
 #define LOOPS_MAX 100    /* polygons of one facet, at most */

@@ -6,7 +6,7 @@
   the list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an
   error.
 */
-#include "triangles.h"
+#include "surface_impl.h"
 
 enum { ELEMENTS_MAX = 16, PROPERTIES_MAX = 64 };
 

@@ -10,7 +10,7 @@
   polygons of one or two corners, which mark points and edges of a facet.
 */
 #include <strings.h>
-#include "triangles.h"
+#include "surface_impl.h"
 
 typedef struct {
   SbScan *s;

@@ -14,7 +14,7 @@
 #include <ctype.h>
 #include <stdlib.h>
 #include <strings.h>
-#include "triangles.h"
+#include "surface_impl.h"
 
 static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 {
