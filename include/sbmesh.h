@@ -127,8 +127,7 @@ typedef struct {
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
   MPI_Comm comm;
-  PetscSF cell_sf; /* from owned cells to their ghost copies, as these arrays number them; NULL on one rank */
-  PetscSF vert_sf; /* the same for vertices; NULL until somebody needs it */
+  PetscSF cell_sf, vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
   PetscInt nbody;
   SbBody *body; /* [nbody] borrowed: the model owns the bodies */
   PetscInt nset;
@@ -169,13 +168,6 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
                             SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 /*
-  SbMeshNeighbours - local cell across each face.
-
-  Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this
-  rank; PetscFree().
-*/
-PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
-/*
   SbMeshEdges - edges of the local cells, each once.
 
   Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13
@@ -189,10 +181,6 @@ PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const P
 /* Brings n numbers of each root to its leaves, or those of each leaf to its root. Collective. */
 PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
 PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf, void *root);
-/* Brings the n numbers of each owned cell to its ghost copies: value[ncell][n]. Collective. */
-PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
-/* The same for vertices, value[nvert][n]. */
-PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
 /* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not collective. */

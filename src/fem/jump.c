@@ -329,7 +329,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(5 * s->mesh->ncell, &k));
   PetscCall(PetscArraycpy(k, own, 5 * s->mesh->ncell_owned));
-  PetscCall(SbMeshBroadcastCells(s->mesh, 5, MPIU_REAL, k));
+  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 5, MPIU_REAL, k, k));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const Face *face = &j->face[i];

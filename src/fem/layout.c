@@ -16,6 +16,7 @@
   second sends complete cells to the ghosts, including faces whose other side is not on this rank.
 */
 #include "fem_impl.h"
+#include "sbtet.h"
 
 #define UNKNOWN (-1)
 
@@ -213,7 +214,7 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
                                                  mesh->vert_set[mesh->cell[4 * c + b]] & ~by_items);
   }
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) cell_set[i] = set[edges->edge[i]] & ~SB_ON_BOUNDARY;
-  PetscCall(SbMeshBroadcastCells(mesh, 6, MPI_UINT64_T, cell_set));
+  PetscCall(SbForestBroadcast(mesh->cell_sf, 6, MPI_UINT64_T, cell_set, cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
     const PetscInt node = s->edge_node[i], *v = mesh->cell + 4 * (i / 6);
 
@@ -304,7 +305,14 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++)
       if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
         prescribed |= SB_SET_BIT(k / mesh->nbody);
-    if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
+    if (s->faces) {
+      SbFaces faces;
+
+      PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
+      s->neighbour = faces.neighbour;
+      faces.neighbour = NULL;
+      PetscCall(SbFacesDestroy(&faces));
+    }
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
     if (quadratic) PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
     if (prescribed) PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
@@ -320,7 +328,7 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
 
         for (PetscInt i = 0; !round && number && i < per_cell[k] * mesh->ncell_owned; i++)
           if (number[i] != UNKNOWN) number[i] += s->gnode_start;
-        if (number) PetscCall(SbMeshBroadcastCells(mesh, per_cell[k], MPIU_INT, number));
+        if (number) PetscCall(SbForestBroadcast(mesh->cell_sf, per_cell[k], MPIU_INT, number, number));
       }
     }
     PetscCall(localise(s));

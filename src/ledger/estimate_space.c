@@ -119,7 +119,7 @@ static PetscErrorCode create_slots(SbRecovery r)
   for (PetscInt i = 0; i < r->nlayer * mesh->nvert; i++) material[i] = -1;
   for (PetscInt v = 0; v < mesh->nvert_owned; v++)
     PetscCall(PetscArraycpy(material + r->nlayer * v, found + start[v], count[v]));
-  PetscCall(SbMeshBroadcastVertices(mesh, r->nlayer, MPIU_INT, material));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, r->nlayer, MPIU_INT, material, material));
   PetscCall(PetscCalloc3(4 * (size_t)mesh->ncell, &r->slot, 4 * (size_t)mesh->ncell, &r->weight,
                          9 * (size_t)r->nlayer * mesh->nvert, &r->value));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
@@ -275,7 +275,7 @@ static PetscErrorCode fit_quadratic(SbRecovery r, SbPointStress stress[])
   PetscBLASInt order = NFIT, nine = 9, one = 1, info;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMeshBroadcastCells(mesh, sizeof(*stress) / sizeof(PetscReal), MPIU_REAL, stress));
+  PetscCall(SbForestBroadcast(mesh->cell_sf, sizeof(*stress) / sizeof(PetscReal), MPIU_REAL, stress, stress));
   for (PetscInt s = 0; s < n; s++) memset(r->fit[s].c, 0, sizeof(r->fit[s].c));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     struct Fit *fit = r->fit + r->slot[i];
@@ -294,8 +294,8 @@ static PetscErrorCode fit_quadratic(SbRecovery r, SbPointStress stress[])
     LAPACKpotrs_("L", &order, &nine, r->factor[s][0], &order, r->fit[s].c[0], &order, &info);
     LAPACKpotrs_("L", &order, &one, r->factor[s][1], &order, r->fit[s].c[9], &order, &info);
   }
-  PetscCall(
-    SbMeshBroadcastVertices(mesh, r->nlayer * (sizeof(*r->fit) / sizeof(PetscReal)), MPIU_REAL, r->fit));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, r->nlayer * (sizeof(*r->fit) / sizeof(PetscReal)), MPIU_REAL,
+                              r->fit, r->fit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -537,11 +537,11 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
 
   /* recovered stresses */
   if (est->stress) PetscCall(fit_quadratic(r, est->stress));
-  PetscCall(SbMeshBroadcastCells(mesh, 9, MPIU_REAL, est->P));
+  PetscCall(SbForestBroadcast(mesh->cell_sf, 9, MPIU_REAL, est->P, est->P));
   PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++)
     for (int k = 0; k < 9; k++) r->value[9 * r->slot[i] + k] += r->weight[i] * est->P[9 * (i / 4) + k];
-  PetscCall(SbMeshBroadcastVertices(mesh, 9 * r->nlayer, MPIU_REAL, r->value));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, 9 * r->nlayer, MPIU_REAL, r->value, r->value));
 
   /* sums over the cells of each body */
   PetscCall(PetscCalloc1(model->nbody, &sum));

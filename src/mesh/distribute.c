@@ -85,73 +85,56 @@ static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, Pet
 /* Vertices that several ranks have. */
 typedef struct {
   PetscInt vert, orig, n;
-  const PetscInt *rank; /* [n] ranks that have the vertex, ascending; stride 2 in Border.pair */
+  const PetscMPIInt *rank; /* [n] ranks that have the vertex, ascending */
   PetscReal along;
 } Shared;
 typedef struct {
   PetscInt n;
-  Shared *vert;   /* [n] */
-  PetscInt *pair; /* pairs {original number, rank} of all shared vertices, ascending */
+  Shared *vert; /* [n] */
+  PetscMPIInt *rank;
 } Border;
 
 /* Shared vertices of this rank with the ranks that have them, from the directory. */
 static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
 {
   const PetscInt n = local->nvert_cells;
-  PetscInt *orig, *got, *start, *holder, (*pair)[2], block, first;
-  PetscMPIInt *dest, rank, size;
-  SbRouteList list = {0};
-  SbRoute there, back;
+  const PetscSFNode *home;
+  PetscInt nroot = PETSC_DECIDE, nlist = 0, *orig, *start, *begin, *end;
+  PetscMPIInt *holder;
+  PetscSFNode *list;
+  PetscSF forest, lists;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  block = Nvert / size + 1;
-  first = rank * block;
-  PetscCall(PetscMalloc2(n, &orig, n, &dest));
-  for (PetscInt v = 0; v < n; v++) {
-    orig[v] = local->vertex[v].orig;
-    dest[v] = (PetscMPIInt)(orig[v] / block);
-  }
-  PetscCall(SbRouteCreate(comm, n, dest, &there));
-  PetscCall(SbRouteSend(&there, sizeof(PetscInt), NULL, orig, &got));
-  PetscCall(PetscFree2(orig, dest));
-  /* ranks that have each vertex of this rank's block, ascending */
-  for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
-  PetscCall(SbBucketByKey(there.nrecv, got, block, &start, &holder));
-  PetscCall(PetscMalloc1(there.nrecv, &pair));
-  for (PetscInt i = 0; i < there.nrecv; i++) {
-    pair[i][0] = first + got[holder[i]];
-    pair[i][1] = SbRouteSource(&there, holder[i]);
-  }
-  PetscCall(SbRouteDestroy(&there));
-  PetscCall(PetscFree(got));
-  PetscCall(PetscFree(holder));
-  /* each of these ranks gets the whole list */
-  for (PetscInt v = 0; v < block; v++) {
-    if (start[v + 1] - start[v] < 2) continue;
-    for (PetscInt i = start[v]; i < start[v + 1]; i++)
-      for (PetscInt j = start[v]; j < start[v + 1]; j++)
-        PetscCall(SbRouteAdd(&list, j, (PetscMPIInt)pair[i][1]));
-  }
-  PetscCall(PetscFree(start));
-  PetscCall(SbRouteCreate(comm, list.n, list.rank, &back));
-  PetscCall(SbRouteSend(&back, sizeof(*pair), list.item, pair, &border->pair));
-  PetscCall(PetscFree(pair));
-  PetscCall(PetscFree(list.item));
-  PetscCall(PetscFree(list.rank));
-  /* received from blocks of ascending ranks, so original numbers ascend */
+  PetscCall(PetscMalloc3(n, &orig, n, &begin, n, &end));
+  for (PetscInt v = 0; v < n; v++) orig[v] = local->vertex[v].orig;
+  PetscCall(PetscSplitOwnership(comm, &nroot, &Nvert));
+  PetscCall(SbForestCreate(comm, nroot, n, orig, &forest));
+  PetscCall(SbForestRanks(forest, &start, &holder));
+  /* each of the ranks that have a vertex gets the whole list of them */
+  PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, start, begin));
+  PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, start + 1, end));
   border->n = 0;
-  PetscCall(PetscMalloc1(back.nrecv / 2, &border->vert)); /* at least two ranks have each */
-  for (PetscInt i = 0, v = 0; i < back.nrecv; i++) {
-    if (i && border->pair[2 * i] == border->pair[2 * i - 2]) {
-      border->vert[border->n - 1].n++;
-      continue;
-    }
-    while (local->vertex[v].orig != border->pair[2 * i]) v++;
-    border->vert[border->n++] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
+  for (PetscInt v = 0; v < n; v++) {
+    border->n += end[v] > begin[v] + 1;
+    nlist += end[v] > begin[v] + 1 ? end[v] - begin[v] : 0;
   }
-  PetscCall(SbRouteDestroy(&back));
+  PetscCall(PetscMalloc2(border->n, &border->vert, nlist, &border->rank));
+  PetscCall(PetscMalloc1(nlist, &list));
+  PetscCall(PetscSFGetGraph(forest, NULL, NULL, NULL, &home));
+  border->n = nlist = 0;
+  for (PetscInt v = 0; v < n; v++) {
+    if (end[v] == begin[v] + 1) continue;
+    border->vert[border->n++] = (Shared){v, orig[v], end[v] - begin[v], border->rank + nlist, 0};
+    for (PetscInt k = begin[v]; k < end[v]; k++) list[nlist++] = (PetscSFNode){home[v].rank, k};
+  }
+  PetscCall(PetscSFCreate(comm, &lists));
+  PetscCall(PetscSFSetGraph(lists, start[nroot], nlist, NULL, PETSC_COPY_VALUES, list, PETSC_OWN_POINTER));
+  PetscCall(SbForestBroadcast(lists, 1, MPI_INT, holder, border->rank));
+  PetscCall(PetscSFDestroy(&lists));
+  PetscCall(PetscSFDestroy(&forest));
+  PetscCall(PetscFree3(orig, begin, end));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(holder));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,7 +144,7 @@ static int compare_ranks(const void *a, const void *b)
 
   if (p->n != q->n) return p->n < q->n ? -1 : 1;
   for (PetscInt i = 0; i < p->n; i++)
-    if (p->rank[2 * i] != q->rank[2 * i]) return p->rank[2 * i] < q->rank[2 * i] ? -1 : 1;
+    if (p->rank[i] != q->rank[i]) return p->rank[i] < q->rank[i] ? -1 : 1;
   return 0;
 }
 
@@ -195,7 +178,7 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
       const Shared *s = shared[v] < 0 ? NULL : border->vert + shared[v];
 
       for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
-        const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : local->owner[v];
+        const PetscMPIInt r = all ? s->rank[k] : local->owner[v];
 
         if (mark[r] != c) PetscCall(SbRouteAdd(list, c, r));
         mark[r] = c;
@@ -281,12 +264,10 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     axis = SbBoxLongest(box);
     for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
     qsort(s, (size_t)n, sizeof(Shared), compare_shared);
-    for (PetscInt k = 0; k < n; k++)
-      local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
+    for (PetscInt k = 0; k < n; k++) local->owner[s[k].vert] = s[k].rank[(PetscInt64)k * s[k].n / n];
   }
   PetscCall(list_copies(local, &border, all, rank, size, &copies));
-  PetscCall(PetscFree(border.vert));
-  PetscCall(PetscFree(border.pair));
+  PetscCall(PetscFree2(border.vert, border.rank));
   PetscCall(SbRouteCreate(comm, copies.n, copies.rank, &route));
   PetscCall(send_cells(local, PETSC_TRUE, &route, copies.item, copies.rank, &ghost));
   PetscCall(SbRouteDestroy(&route));

@@ -97,6 +97,10 @@ PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answe
 /* Rank that sent the received record i. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
+/* forest.c: ranks that have leaves of each root, user[start[k]] to user[start[k + 1] - 1] ascending;
+   the caller frees both. Collective. */
+PetscErrorCode SbForestRanks(PetscSF forest, PetscInt **start, PetscMPIInt **user);
+
 /* merge.c, partition.c, distribute.c, order.c, number.c */
 
 /* Data sent with a vertex and with a cell. */

@@ -84,12 +84,11 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
 {
   PetscInt *local, *compact, *back, *cell, *order, *ghost, *orig, *global;
   PetscInt n = 0, mine[2], sum[2] = {0, 0};
-  PetscMPIInt rank, size;
+  PetscMPIInt rank;
   PetscSF sf;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
-  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
   PetscCall(PetscMalloc4(p->nvert, &local, p->nvert, &ghost, p->nvert, &orig, p->nvert, &global));
   // local numbers of owned vertices
   PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
@@ -144,10 +143,8 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   PetscCall(fill_cells(p, local, mesh));
   PetscCall(PetscFree4(local, ghost, orig, global));
   PetscCall(SbLocalMeshDestroy(p));
-  if (size > 1) {
-    PetscCall(create_forest(mesh->comm, mesh->Ncell, mesh->ncell_owned, mesh->ncell, mesh->cell_orig,
-                            &mesh->cell_sf));
-    PetscCall(create_forest(mesh->comm, mesh->Nvert, n, mesh->nvert, mesh->gvert, &mesh->vert_sf));
-  }
+  PetscCall(
+    create_forest(mesh->comm, mesh->Ncell, mesh->ncell_owned, mesh->ncell, mesh->cell_orig, &mesh->cell_sf));
+  PetscCall(create_forest(mesh->comm, mesh->Nvert, n, mesh->nvert, mesh->gvert, &mesh->vert_sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

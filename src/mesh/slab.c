@@ -71,11 +71,11 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 {
   SbImport *im = s->im;
   const PetscInt *nuser;
-  PetscMPIInt *mine;
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
   PetscCall(SbForestCreate(s->comm, s->nkept, im->nvert, s->used, &s->vert));
+  PetscCall(SbForestRanks(s->vert, &s->start, &s->user));
   PetscCall(PetscSFComputeDegreeBegin(s->vert, &nuser));
   PetscCall(PetscSFComputeDegreeEnd(s->vert, &nuser));
   // original numbers of used vertices
@@ -84,19 +84,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   before -= n;
   im->nunused = s->nkept - n;
   PetscCall(PetscMalloc1(s->nkept, &s->number));
-  PetscCall(PetscMalloc1(s->nkept + 1, &s->start));
-  s->start[0] = 0;
-  for (PetscInt v = 0; v < s->nkept; v++) {
-    s->number[v] = nuser[v] > 0 ? before++ : -1;
-    s->start[v + 1] = s->start[v] + nuser[v];
-  }
-  // ranks that use them
-  PetscCall(PetscMalloc1(s->start[s->nkept], &s->user));
-  PetscCall(PetscMalloc1(im->nvert, &mine));
-  for (PetscInt v = 0; v < im->nvert; v++) mine[v] = s->rank;
-  PetscCall(PetscSFGatherBegin(s->vert, MPI_INT, mine, s->user));
-  PetscCall(PetscSFGatherEnd(s->vert, MPI_INT, mine, s->user));
-  PetscCall(PetscFree(mine));
+  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = nuser[v] > 0 ? before++ : -1;
   // vertex arrays of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = s->used[v] + 1;
@@ -297,129 +285,90 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Sends records of `unit` bytes, whose first entry is a vertex, by its home rank to all ranks that use the
-  vertex.
-
-  Output: `there`, the route to the home ranks; `on`, the route to the users, with from[on.nsend], the
-  position of each record at the home rank; in[on.nrecv], received records. The caller frees from and in.
-*/
-static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *there,
-                                    SbRoute *on, PetscInt **from, void *in)
-{
-  char *got;
-  SbRouteList list = {0};
-
-  PetscFunctionBeginUser;
-  PetscCall(send_home(s, n, unit, record, there, &got));
-  for (PetscInt i = 0; i < there->nrecv; i++) {
-    const PetscInt v = first_vertex(got, unit, i) - s->rows.first;
-
-    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) PetscCall(SbRouteAdd(&list, i, s->user[k]));
-  }
-  *from = list.item;
-  PetscCall(SbRouteCreate(s->comm, list.n, list.rank, on));
-  PetscCall(SbRouteSend(on, unit, *from, got, in));
-  PetscCall(PetscFree(list.rank));
-  PetscCall(PetscFree(got));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Ends the exchange of send_to_users(): anywhere[there->nsend], whether some rank has found the record. */
-static PetscErrorCode end_search(SbRoute *there, SbRoute *on, PetscInt *from, const PetscBool found[],
-                                 PetscBool anywhere[])
-{
-  PetscBool *answered, *any;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(on->nsend, &answered));
-  PetscCall(PetscCalloc1(there->nrecv, &any));
-  PetscCall(SbRouteReply(on, sizeof(PetscBool), found, answered));
-  for (PetscInt i = 0; i < on->nsend; i++) any[from[i]] = (PetscBool)(any[from[i]] || answered[i]);
-  PetscCall(SbRouteReply(there, sizeof(PetscBool), any, anywhere));
-  PetscCall(PetscFree(answered));
-  PetscCall(PetscFree(any));
-  PetscCall(PetscFree(from));
-  PetscCall(SbRouteDestroy(on));
-  PetscCall(SbRouteDestroy(there));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* A triangle of a group, or an edge with its node off the middle. */
 typedef struct {
-  PetscInt vert[3], tags; /* vertices ascending; tag set */
-} Triangle;
+  PetscInt vert[3], tags; /* vertices ascending; tag set, -1: an edge */
+  SbMiddle middle;
+} Item;
 
-/* Sends each group triangle to the ranks that use its lowest vertex; the rank whose tets have it keeps it. */
-static PetscErrorCode find_triangles(Slab *s)
-{
-  const SbItems *item = &s->im->item[2];
-  const PetscInt n = item->n;
-  Triangle *mine, *in;
-  PetscInt *from = NULL, slots[2];
-  PetscBool *found, *anywhere;
-  SbRoute there, on;
-  SbImport *im = s->im;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &mine));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *v = item->vert + 3 * (size_t)i;
-
-    mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
-    PetscCall(PetscSortInt(3, mine[i].vert));
-  }
-  PetscCall(send_to_users(s, n, sizeof(*mine), mine, &there, &on, &from, &in));
-  PetscCall(PetscFree(mine));
-  PetscCall(PetscMalloc2(on.nrecv, &found, n, &anywhere));
-  // keep the received triangles that are faces of this rank's tets
-  im->item[2].n = 0;
-  for (PetscInt i = 0; i < on.nrecv; i++) {
-    PetscInt v[3];
-    PetscBool here = PETSC_TRUE;
-
-    for (int k = 0; k < 3; k++) {
-      PetscCall(PetscFindInt(in[i].vert[k], im->nvert, s->used, &v[k]));
-      here = (PetscBool)(here && v[k] >= 0);
-    }
-    found[i] = (PetscBool)(here && SbFacesFind(&s->part->faces, v, slots));
-    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
-  }
-  PetscCall(end_search(&there, &on, from, found, anywhere));
-  for (PetscInt i = 0; i < n; i++) im->nlost += !anywhere[i];
-  PetscCall(PetscFree2(found, anywhere));
-  PetscCall(PetscFree(in));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sends each curved edge to the ranks that use its lower vertex; the ranks whose tets have it keep it. */
-static PetscErrorCode find_edges(Slab *s)
+/* Sends group triangles and curved edges to the home ranks of their lowest vertices, and from there to all ranks
+   that use these; the ranks whose tets have them keep them. */
+static PetscErrorCode find_items(Slab *s)
 {
   SbImport *im = s->im;
+  SbItems *tri = &im->item[2];
+  const PetscInt ntri = tri->n, nmine = ntri + im->nmiddle.n;
   SbCaughtError caught = {0, ""};
-  SbMiddle *mine = im->middle, *in;
-  PetscReal largest = 0;
-  const PetscInt nmine = im->nmiddle.n;
-  PetscInt *from = NULL, total = nmine;
-  PetscBool *found, *anywhere;
+  SbRouteList list = {0};
   SbRoute there, on;
+  Item *mine, *got, *in;
+  PetscInt total = im->nmiddle.n, slots[2];
+  PetscBool *found, *answered, *any, *anywhere;
+  PetscReal largest = 0;
 
   PetscFunctionBeginUser;
   PetscCall(sum(s, 1, &total));
-  if (!total) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(send_to_users(s, nmine, sizeof(*in), mine, &there, &on, &from, &in));
-  for (PetscInt i = 0; i < on.nrecv; i++)
-    for (int k = 0; k < 2; k++)
-      PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* -1: not here */
-  im->middle = in;
-  im->nmiddle = (SbCount){on.nrecv, on.nrecv};
-  PetscCall(PetscMalloc2(on.nrecv, &found, nmine, &anywhere));
+  PetscCall(PetscMalloc1(nmine, &mine));
+  for (PetscInt i = 0; i < ntri; i++) {
+    const PetscInt *v = tri->vert + 3 * (size_t)i;
+
+    mine[i] = (Item){{v[0], v[1], v[2]}, tri->tags[i], {.node = -1}};
+    PetscCall(PetscSortInt(3, mine[i].vert));
+  }
+  for (PetscInt i = ntri; i < nmine; i++) {
+    const SbMiddle *m = &im->middle[i - ntri];
+
+    mine[i] = (Item){{m->end[0], m->end[1], 0}, -1, *m};
+  }
+  PetscCall(send_home(s, nmine, sizeof(*mine), mine, &there, &got));
+  for (PetscInt i = 0; i < there.nrecv; i++) {
+    const PetscInt v = got[i].vert[0] - s->rows.first;
+
+    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) PetscCall(SbRouteAdd(&list, i, s->user[k]));
+  }
+  PetscCall(SbRouteCreate(s->comm, list.n, list.rank, &on));
+  PetscCall(SbRouteSend(&on, sizeof(*got), list.item, got, &in));
+  // edges of this rank's tets; triangles take part without ends
+  PetscCall(PetscMalloc3(on.nrecv, &found, on.nsend, &answered, nmine, &anywhere));
+  PetscCall(PetscFree(im->middle));
+  PetscCall(PetscMalloc1(on.nrecv, &im->middle));
+  im->nmiddle = (SbCount){total ? on.nrecv : 0, on.nrecv};
+  for (PetscInt i = 0; i < on.nrecv; i++) {
+    const int n = in[i].tags < 0 ? 2 : 3;
+
+    for (int k = 0; k < n; k++)
+      PetscCall(PetscFindInt(in[i].vert[k], im->nvert, s->used, &in[i].vert[k])); /* below 0: not here */
+    im->middle[i] = in[i].middle;
+    for (int k = 0; k < 2; k++) im->middle[i].end[k] = n == 2 ? in[i].vert[k] : -1;
+  }
   SB_CATCH(&caught, SbImportMiddles(im, found, &largest));
-  PetscCall(end_search(&there, &on, from, found, anywhere));
-  // an edge in the file that no tet has is an error
-  for (PetscInt i = 0; i < nmine && !caught.code; i++)
-    if (!anywhere[i]) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i]));
-  PetscCall(PetscFree2(found, anywhere));
+  // triangles that are faces of this rank's tets
+  tri->n = 0;
+  for (PetscInt i = 0; i < on.nrecv; i++) {
+    const PetscInt *v = in[i].vert;
+
+    if (in[i].tags < 0) continue;
+    found[i] = (PetscBool)(v[0] >= 0 && v[1] >= 0 && v[2] >= 0 && SbFacesFind(&s->part->faces, v, slots));
+    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
+  }
+  // whether some rank has found each; an edge in the file that no tet has is an error
+  PetscCall(PetscCalloc1(there.nrecv, &any));
+  PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
+  for (PetscInt i = 0; i < on.nsend; i++) any[list.item[i]] |= answered[i];
+  PetscCall(SbRouteReply(&there, sizeof(PetscBool), any, anywhere));
+  for (PetscInt i = 0; i < nmine; i++) {
+    im->nlost += i < ntri && !anywhere[i];
+    if (i >= ntri && !anywhere[i] && !caught.code) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i].middle));
+  }
+  PetscCall(PetscFree3(found, answered, anywhere));
+  PetscCall(PetscFree(any));
   PetscCall(PetscFree(mine));
+  PetscCall(PetscFree(got));
+  PetscCall(PetscFree(in));
+  PetscCall(PetscFree(list.item));
+  PetscCall(PetscFree(list.rank));
+  PetscCall(SbRouteDestroy(&on));
+  PetscCall(SbRouteDestroy(&there));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
   SbImportNoteMiddles(im, total, largest);
@@ -471,7 +420,6 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(PetscFree(im->vert_number));
   im->nvert = n;
   PetscCall(ask_home_ranks(s));
-  PetscCall(find_edges(s));
   largest = SbImportLargest(im);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
   SB_CATCH(&caught, SbImportCheckCells(im, largest, &s->part->faces));
@@ -508,7 +456,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbSetsBits(im, nbody, body, b, nset, set, bits);
   PetscCall(mark_items(s, bits));
   PetscCall(PetscFree(bits));
-  PetscCall(find_triangles(s));
+  PetscCall(find_items(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
   // combine the set bits of shared vertices over all ranks; count vertices at their home ranks
   PetscCall(PetscSFReduceBegin(s->vert, MPI_UINT64_T, m->vert, s->mask, MPI_BOR));

@@ -122,8 +122,8 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
   PetscCall(PetscMalloc2(3 * (size_t)mesh->nvert, &x, mesh->nvert, &orig));
   PetscCall(PetscArraycpy(x, mesh->x, 3 * (size_t)mesh->nvert_owned));
   PetscCall(PetscArraycpy(orig, mesh->vert_orig, mesh->nvert_owned));
-  PetscCall(SbMeshBroadcastVertices(mesh, 3, MPIU_REAL, x));
-  PetscCall(SbMeshBroadcastVertices(mesh, 1, MPIU_INT, orig));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, 3, MPIU_REAL, x, x));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, 1, MPIU_INT, orig, orig));
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     CHECK(orig[v] == mesh->vert_orig[v], "Ghost vertex %" PetscInt_FMT " differs from its owner's", v);
     for (int i = 0; i < 3; i++)

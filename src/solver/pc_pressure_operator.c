@@ -327,7 +327,7 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCall(PetscMalloc1(nall, &number));
   for (PetscInt c = 0; c < n; c++) number[c] = first - n + c;
-  PetscCall(SbMeshBroadcastCells(s->mesh, 1, MPIU_INT, number));
+  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 1, MPIU_INT, number, number));
   PetscCall(VecCreateGhost(s->comm, n, PETSC_DECIDE, nall - n, number + n, &op->p));
   PetscCall(PetscFree(number));
   PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));

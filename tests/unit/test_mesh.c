@@ -64,7 +64,7 @@ static PetscErrorCode check_broadcast(SbMesh mesh)
     value[2 * c] = c < mesh->ncell_owned ? mesh->cell_orig[c] : -1;
     value[2 * c + 1] = c < mesh->ncell_owned ? -mesh->cell_orig[c] : 1;
   }
-  PetscCall(SbMeshBroadcastCells(mesh, 2, MPIU_INT, value));
+  PetscCall(SbForestBroadcast(mesh->cell_sf, 2, MPIU_INT, value, value));
   for (PetscInt c = 0; c < mesh->ncell; c++)
     wrong += value[2 * c] != mesh->cell_orig[c] || value[2 * c + 1] != -mesh->cell_orig[c];
   SB_CHECK(!wrong, "%d cells with the number of another one", (int)wrong);

@@ -1,20 +1,5 @@
-/*
-  cell_neighbours.c - mesh connectivity for elements with nodes at faces or edges; star forests for the
-  exchange of cell and face data.
-*/
+/* forest.c - edges of the cells; star forests, for the exchange of data between ranks. */
 #include "mesh_impl.h"
-
-PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour)
-{
-  SbFaces faces;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
-  *neighbour = faces.neighbour;
-  faces.neighbour = NULL;
-  PetscCall(SbFacesDestroy(&faces));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Counting sort: each edge is in the bucket of its lower vertex, where equal higher vertices are one edge. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
@@ -60,6 +45,29 @@ PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbForestRanks(PetscSF forest, PetscInt **start, PetscMPIInt **user)
+{
+  const PetscInt *degree;
+  PetscInt nroot, nleaf;
+  PetscMPIInt *mine, rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)forest), &rank));
+  PetscCall(PetscSFGetGraph(forest, &nroot, &nleaf, NULL, NULL));
+  PetscCall(PetscSFComputeDegreeBegin(forest, &degree));
+  PetscCall(PetscSFComputeDegreeEnd(forest, &degree));
+  PetscCall(PetscCalloc1(nroot + 1, start));
+  for (PetscInt v = 0; v < nroot; v++) (*start)[v + 1] = (*start)[v] + degree[v];
+  PetscCall(PetscMalloc1((*start)[nroot], user));
+  PetscCall(PetscMalloc1(nleaf, &mine));
+  for (PetscInt i = 0; i < nleaf; i++) mine[i] = rank;
+  PetscCall(PetscSFGatherBegin(forest, MPI_INT, mine, *user));
+  PetscCall(PetscSFGatherEnd(forest, MPI_INT, mine, *user));
+  PetscCall(PetscFree(mine));
+  for (PetscInt v = 0; v < nroot; v++) PetscCall(PetscSortMPIInt(degree[v], *user + (*start)[v]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* MPI type of n contiguous items of type `one`. */
 static PetscErrorCode create_type(PetscInt n, MPI_Datatype one, MPI_Datatype *type)
 {
@@ -93,19 +101,5 @@ PetscErrorCode SbForestBroadcast(PetscSF sf, PetscInt n, MPI_Datatype one, const
   PetscCall(PetscSFBcastBegin(sf, type, root, leaf, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(sf, type, root, leaf, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value)
-{
-  PetscFunctionBeginUser;
-  if (mesh->cell_sf) PetscCall(SbForestBroadcast(mesh->cell_sf, n, type, value, value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value)
-{
-  PetscFunctionBeginUser;
-  if (mesh->vert_sf) PetscCall(SbForestBroadcast(mesh->vert_sf, n, type, value, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
