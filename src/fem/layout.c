@@ -19,6 +19,7 @@
 #include "sbtet.h"
 
 #define UNKNOWN (-1)
+#define OWN (-2) /* this rank numbers it */
 
 /* The face of cell `other` that it shares with `cell`. */
 static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
@@ -29,161 +30,120 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
   return f;
 }
 
-/* Edges of the local cells, and numbers of nodes at vertices and edges. */
-typedef struct {
-  PetscInt n, *edge;     /* number of edges; [ncell][6] edges of each cell */
-  PetscBool *own;        /* [n] this rank numbers its node */
-  PetscInt *at, *vertex; /* [n], [nvert] number of its node, UNKNOWN: not yet */
-} Edges;
+/* Slots of a cell: node a and its support (2 a, 2 a + 1), a = 0..3, then the nodes at the edges. */
+#define SLOTS 14
 
-/* Finds the edges; every second one belongs to the rank of its lowest cell, others to that of the highest. */
-static PetscErrorCode find_edges(SbSpace s, Edges *edges)
+/* The slot in the tables of the space; NULL: it has no such nodes. */
+static PetscInt *table_entry(SbSpace s, PetscInt cell, PetscInt slot)
 {
-  SbMesh mesh = s->mesh;
-  PetscInt *first, *last;
+  if (slot >= 8) return s->edge_node ? &s->edge_node[6 * cell + slot - 8] : NULL;
+  if (slot % 2 == 0) return &s->cell_node[4 * cell + slot / 2];
+  return s->dirichlet_node ? &s->dirichlet_node[4 * cell + slot / 2] : NULL;
+}
+
+/* What has the node of each slot: vertex, face, support or edge, counted through; UNKNOWN: there is none. A
+   support is that of a face in one of the `prescribed` sets. */
+static PetscErrorCode find_items(SbSpace s, uint64_t prescribed, PetscInt item[], PetscInt *nitem)
+{
+  const SbMesh mesh = s->mesh;
+  const PetscInt nface = 4 * mesh->ncell;
+  PetscInt nedge = 0, *edge = NULL;
 
   PetscFunctionBeginUser;
-  if (s->edge_node) PetscCall(SbMeshEdges(mesh, &edges->n, &edges->edge));
-  PetscCall(PetscMalloc3(edges->n, &edges->own, edges->n, &edges->at, mesh->nvert, &edges->vertex));
-  PetscCall(PetscMalloc2(edges->n, &first, edges->n, &last));
-  for (PetscInt v = 0; v < mesh->nvert; v++) edges->vertex[v] = UNKNOWN;
-  for (PetscInt e = 0; e < edges->n; e++) {
-    edges->at[e] = last[e] = UNKNOWN;
+  if (s->edge_node) PetscCall(SbMeshEdges(mesh, &nedge, &edge));
+  for (PetscInt i = 0; i < SLOTS * mesh->ncell; i++) {
+    const PetscInt c = i / SLOTS, slot = i % SLOTS, face = 4 * c + slot / 2;
+    const SbElement e = SbSpaceCellElement(s, c);
+
+    item[i] = UNKNOWN;
+    if (slot >= 8) {
+      if (e->nodes_per[1]) item[i] = mesh->nvert + 2 * nface + edge[6 * c + slot - 8];
+    } else if (slot % 2) {
+      if (e->weak && (mesh->face_set[face] & SB_ON_BOUNDARY) && (mesh->face_set[face] & prescribed))
+        item[i] = mesh->nvert + nface + face;
+    } else if (e->nodes_per[0]) {
+      item[i] = mesh->cell[face];
+    } else {
+      const PetscInt other = e->nodes_per[2] ? s->neighbour[face] : -1;
+
+      item[i] = mesh->nvert + (other >= 0 && other < c ? 4 * other + face_towards(s, other, c) : face);
+    }
+  }
+  *nitem = mesh->nvert + 2 * nface + nedge;
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers the nodes: the owned ones, then the ghosts by global number behind them. */
+static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
+{
+  const SbMesh mesh = s->mesh;
+  const PetscInt nslot = SLOTS * mesh->ncell, nslot_owned = SLOTS * mesh->ncell_owned;
+  PetscInt *item, *number, *first, *last, *at, *ghost, nitem, nghost = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(nslot, &item, nslot, &number));
+  PetscCall(find_items(s, prescribed, item, &nitem));
+  PetscCall(PetscMalloc3(nitem, &first, nitem, &last, nitem, &at));
+  for (PetscInt e = 0; e < nitem; e++) {
     first[e] = PETSC_MAX_INT;
-    edges->own[e] = PETSC_FALSE;
+    last[e] = -1;
+    at[e] = e < mesh->nvert_owned ? OWN : UNKNOWN;
   }
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
-    const PetscInt e = edges->edge[i], orig = mesh->cell_orig[i / 6];
-
-    first[e] = PetscMin(first[e], orig);
-    last[e] = PetscMax(last[e], orig);
+  /* of faces and edges every second one belongs to the rank of its lowest cell, others to that of the
+     highest: all ranks agree */
+  for (PetscInt i = 0; i < nslot; i++) {
+    if (item[i] < mesh->nvert) continue;
+    first[item[i]] = PetscMin(first[item[i]], mesh->cell_orig[i / SLOTS]);
+    last[item[i]] = PetscMax(last[item[i]], mesh->cell_orig[i / SLOTS]);
   }
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell_owned; i++) {
-    const PetscInt e = edges->edge[i];
+  for (PetscInt i = 0; i < nslot_owned; i++) {
+    const PetscInt e = item[i], orig = mesh->cell_orig[i / SLOTS];
 
-    if (mesh->cell_orig[i / 6] == ((first[e] + last[e]) % 2 ? first[e] : last[e])) edges->own[e] = PETSC_TRUE;
+    if (e >= mesh->nvert && orig == ((first[e] + last[e]) % 2 ? first[e] : last[e])) at[e] = OWN;
   }
-  PetscCall(PetscFree2(first, last));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-/* The numbers of nodes, and how many per cell; those at edges and of supports may be NULL. */
-static const PetscInt per_cell[3] = {4, 6, 4};
-static PetscInt *numbers(SbSpace s, int table)
-{
-  return table == 0 ? s->cell_node : table == 1 ? s->edge_node : s->dirichlet_node;
-}
+  for (PetscInt i = 0; i < nslot_owned; i++)
+    if (item[i] != UNKNOWN && at[item[i]] == OWN) at[item[i]] = s->nnode_owned++;
+  PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
+  s->gnode_start -= s->nnode_owned;
+  for (PetscInt e = 0; e < nitem; e++)
+    if (at[e] >= 0) at[e] += s->gnode_start;
 
-/* Numbers the owned nodes from zero, a support node for faces in these sets; UNKNOWN elsewhere. */
-static void number_owned(SbSpace s, uint64_t prescribed, Edges *edges)
-{
-  SbMesh mesh = s->mesh;
-  PetscInt *node = s->cell_node, n = 0;
-
-  for (int k = 0; k < 3; k++)
-    for (PetscInt i = 0; numbers(s, k) && i < per_cell[k] * mesh->ncell; i++) numbers(s, k)[i] = UNKNOWN;
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    const PetscInt *per = SbSpaceCellElement(s, c)->nodes_per;
-
-    for (PetscInt a = 0; a < 4; a++) {
-      const PetscInt v = mesh->cell[4 * c + a];
-
-      if (per[3]) {
-        const uint64_t sets = mesh->face_set[4 * c + a];
-
-        node[4 * c + a] = n++;
-        if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & prescribed))
-          s->dirichlet_node[4 * c + a] = n++;
-      } else if (per[2]) {
-        const PetscInt other = s->neighbour[4 * c + a], orig = mesh->cell_orig[c],
-                       its = other < mesh->ncell_owned ? 0 : mesh->cell_orig[other];
-
-        /* of the faces between an owned cell and a ghost every second one: both ranks agree */
-        if (other >= 0 && other < c)
-          node[4 * c + a] = node[4 * other + face_towards(s, other, c)];
-        else if (other < mesh->ncell_owned || (orig < its) == ((orig + its) % 2 != 0))
-          node[4 * c + a] = n++;
-      } else if (v < mesh->nvert_owned) {
-        if (edges->vertex[v] == UNKNOWN) edges->vertex[v] = n++;
-        node[4 * c + a] = edges->vertex[v];
-      }
+  /* the first broadcast completes owned cells by numbers of other ranks, the second one the ghosts */
+  for (int round = 0; round < 2; round++) {
+    for (PetscInt i = 0; i < nslot_owned; i++) {
+      number[i] = item[i] == UNKNOWN ? UNKNOWN : at[item[i]];
+      PetscCheck(!round || item[i] == UNKNOWN || number[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+                 "No rank has numbered node %d of cell %d", (int)(i % SLOTS), (int)(i / SLOTS));
     }
-    for (PetscInt i = 6 * c; per[1] && i < 6 * (c + 1); i++) {
-      const PetscInt e = edges->edge[i];
-
-      if (edges->own[e] && edges->at[e] == UNKNOWN) edges->at[e] = n++;
-      s->edge_node[i] = edges->at[e];
-    }
+    PetscCall(SbForestBroadcast(mesh->cell_sf, SLOTS, MPIU_INT, number, number));
+    for (PetscInt i = 0; i < nslot; i++)
+      if (number[i] != UNKNOWN) at[item[i]] = number[i];
   }
-  s->nnode_owned = n;
-}
 
-/* After the first broadcast: owned cells get the numbers that their ghost neighbours have. */
-static PetscErrorCode complete_owned(SbSpace s, Edges *edges)
-{
-  SbMesh mesh = s->mesh;
-  PetscInt *node = s->cell_node;
+  /* the ghosts; local numbers in the place of global ones */
+  ghost = item;
+  for (PetscInt i = 0; i < nslot; i++) {
+    const PetscInt own = number[i] - s->gnode_start;
 
-  PetscFunctionBeginUser;
-  for (PetscInt i = 4 * mesh->ncell_owned; i < 4 * mesh->ncell; i++)
-    if (SbSpaceCellElement(s, i / 4)->nodes_per[0] && node[i] != UNKNOWN)
-      edges->vertex[mesh->cell[i]] = node[i];
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
-    const PetscInt other = s->neighbour ? s->neighbour[i] : -1;
-
-    if (node[i] != UNKNOWN) continue;
-    if (SbSpaceCellElement(s, i / 4)->nodes_per[0])
-      node[i] = edges->vertex[mesh->cell[i]];
-    else
-      node[i] = node[4 * other + face_towards(s, other, i / 4)];
-    PetscCheck(node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No rank has numbered node %d of cell %d",
-               (int)(i % 4), (int)(i / 4));
-  }
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++)
-    if (s->edge_node[i] != UNKNOWN) edges->at[edges->edge[i]] = s->edge_node[i];
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell_owned; i++) {
-    if (!SbSpaceCellElement(s, i / 6)->nodes_per[1]) continue;
-    s->edge_node[i] = edges->at[edges->edge[i]];
-    PetscCheck(s->edge_node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "No rank has numbered the node at edge %d of cell %d", (int)(i % 6), (int)(i / 6));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Finds the ghosts, by global number behind the owned nodes, and converts global numbers to local ones. */
-static PetscErrorCode localise(SbSpace s)
-{
-  PetscInt *ghost, nghost = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(14 * (size_t)s->mesh->ncell, &ghost));
-  for (int k = 0; k < 3; k++) {
-    const PetscInt *number = numbers(s, k);
-
-    for (PetscInt i = 0; number && i < per_cell[k] * s->mesh->ncell; i++) {
-      const PetscInt own = number[i] - s->gnode_start;
-
-      if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[nghost++] = number[i];
-    }
+    if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[nghost++] = number[i];
   }
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
   s->nnode = s->nnode_owned + nghost;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
   for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
-  for (int k = 0; k < 3; k++) {
-    PetscInt *number = numbers(s, k);
+  for (PetscInt i = 0; i < nslot; i++) {
+    PetscInt *node = table_entry(s, i / SLOTS, i % SLOTS), k;
 
-    for (PetscInt i = 0; number && i < per_cell[k] * s->mesh->ncell; i++) {
-      const PetscInt own = number[i] - s->gnode_start;
-      PetscInt at;
-
-      if (number[i] == UNKNOWN) continue;
-      PetscCall(PetscFindInt(number[i], nghost, ghost, &at));
-      number[i] = at < 0 ? own : s->nnode_owned + at;
-    }
+    if (!node) continue;
+    PetscCall(PetscFindInt(number[i], nghost, ghost, &k));
+    *node = number[i] == UNKNOWN ? UNKNOWN : k < 0 ? number[i] - s->gnode_start : s->nnode_owned + k;
   }
-  PetscCall(PetscFree(ghost));
+  PetscCall(PetscFree2(item, number));
+  PetscCall(PetscFree3(first, last, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,10 +151,10 @@ static PetscErrorCode localise(SbSpace s)
    contains an edge if it contains both vertices; other groups contain the edges of their triangles and tets,
    so that no edge through a thin body is in the group of its surface. Owners have all cells around their
    edges, and send the result to the ghosts. */
-static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
+static PetscErrorCode describe_edges(SbSpace s)
 {
   SbMesh mesh = s->mesh;
-  uint64_t *set, *cell_set, by_items = 0;
+  uint64_t *cell_set, by_items = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) by_items |= mesh->face_set[i] | mesh->cell_set[i / 4];
@@ -204,16 +164,18 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 
     if (shape != SB_SET_GROUP && shape != SB_SET_BODY && shape != SB_SET_BOUNDARY) by_items &= ~SB_SET_BIT(k);
   }
-  PetscCall(PetscCalloc2(edges->n, &set, 6 * (size_t)mesh->ncell, &cell_set));
+  PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
     const PetscInt c = i / 6, a = SbTetEdge[i % 6][0], b = SbTetEdge[i % 6][1];
     uint64_t items = mesh->cell_set[c];
 
+    if (s->edge_node[i] == UNKNOWN) continue;
     for (PetscInt f = 0; f < 4; f++) items |= f != a && f != b ? mesh->face_set[4 * c + f] : 0;
-    set[edges->edge[i]] |= (items & by_items) | (mesh->vert_set[mesh->cell[4 * c + a]] &
-                                                 mesh->vert_set[mesh->cell[4 * c + b]] & ~by_items);
+    s->node_set[s->edge_node[i]] |= (items & by_items) | (mesh->vert_set[mesh->cell[4 * c + a]] &
+                                                          mesh->vert_set[mesh->cell[4 * c + b]] & ~by_items);
   }
-  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) cell_set[i] = set[edges->edge[i]] & ~SB_ON_BOUNDARY;
+  for (PetscInt i = 0; i < 6 * mesh->ncell; i++)
+    cell_set[i] = s->edge_node[i] == UNKNOWN ? 0 : s->node_set[s->edge_node[i]] & ~SB_ON_BOUNDARY;
   PetscCall(SbForestBroadcast(mesh->cell_sf, 6, MPI_UINT64_T, cell_set, cell_set));
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
     const PetscInt node = s->edge_node[i], *v = mesh->cell + 4 * (i / 6);
@@ -228,17 +190,17 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
         0.5 * (mesh->x[3 * v[SbTetEdge[i % 6][0]] + k] + mesh->x[3 * v[SbTetEdge[i % 6][1]] + k]) +
         (mesh->edge_off ? mesh->edge_off[3 * i + k] : 0.);
   }
-  PetscCall(PetscFree2(set, cell_set));
+  PetscCall(PetscFree(cell_set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Position, body and sets of every node. */
-static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
+static PetscErrorCode describe_nodes(SbSpace s)
 {
   SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(3 * (size_t)s->nnode, &s->node_x, s->nnode, &s->node_body, s->nnode, &s->node_set,
+  PetscCall(PetscCalloc4(3 * (size_t)s->nnode, &s->node_x, s->nnode, &s->node_body, s->nnode, &s->node_set,
                          s->nnode, &s->node_orig));
   for (PetscInt i = 0; i < s->nnode; i++) s->node_orig[i] = PETSC_MAX_INT;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
@@ -261,7 +223,7 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
-  if (s->edge_node) PetscCall(describe_edges(s, edges));
+  if (s->edge_node) PetscCall(describe_edges(s));
   /* a support node has position and sets of the face's node: effects that prescribe the face act on it */
   for (PetscInt i = 0; s->dirichlet_node && i < 4 * mesh->ncell; i++) {
     const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
@@ -300,7 +262,6 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     s->node_orig = mesh->vert_orig;
   } else {
     uint64_t prescribed = 0; /* sets that an effect prescribes; none if no body has support nodes */
-    Edges edges = {0};
 
     for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++)
       if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
@@ -316,25 +277,8 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
     if (quadratic) PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
     if (prescribed) PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
-    PetscCall(find_edges(s, &edges));
-    number_owned(s, prescribed, &edges);
-    PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
-    PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
-    s->gnode_start -= s->nnode_owned;
-    for (int round = 0; round < 2; round++) {
-      if (round) PetscCall(complete_owned(s, &edges));
-      for (int k = 0; k < 3; k++) {
-        PetscInt *number = numbers(s, k);
-
-        for (PetscInt i = 0; !round && number && i < per_cell[k] * mesh->ncell_owned; i++)
-          if (number[i] != UNKNOWN) number[i] += s->gnode_start;
-        if (number) PetscCall(SbForestBroadcast(mesh->cell_sf, per_cell[k], MPIU_INT, number, number));
-      }
-    }
-    PetscCall(localise(s));
-    PetscCall(describe_nodes(s, &edges));
-    PetscCall(PetscFree(edges.edge));
-    PetscCall(PetscFree3(edges.own, edges.at, edges.vertex));
+    PetscCall(number_nodes(s, prescribed));
+    PetscCall(describe_nodes(s));
   }
   PetscCall(PetscCalloc1(s->nnode, &s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
