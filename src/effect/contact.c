@@ -9,6 +9,7 @@
   bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and
   faces, or be passed within a step: there it is `barrier`, unless the scene needs an option that it lacks.
 */
+#include "barrier_impl.h"
 #include "contact_node.h"
 
 static const SbOption rows[] = {
@@ -253,7 +254,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
-  .size = sizeof(Contact),
+  .size = sizeof(Barrier),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

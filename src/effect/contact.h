@@ -77,11 +77,9 @@ static inline PetscBool exact(const Contact *c)
 /* The obstacle's pose at time t. */
 void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
 /* Reads the obstacle's file, if it is a mesh, and adds to the effect's note. Collective. */
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c);
-/* Destroys what e->data, a Contact, owns. */
+PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space);
+/* Destroys what the Contact owns. */
 PetscErrorCode SbContactDestroy(SbEffect e);
 
 /* Operations of nodes against an obstacle. */
 extern const SbEffectOps SbContactNodeOps;
-/* Makes e an effect of the response `barrier`, which takes over its Contact. Not collective. */
-PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);

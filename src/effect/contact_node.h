@@ -1,11 +1,8 @@
 /*
-  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c, contact_facets.c and friction.c.
+  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c and friction.c.
 */
 #pragma once
 #include "contact.h"
-
-#define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
-#define KEPT 24        /* changes of facet after which a node keeps its plane until the end of the step */
 
 /* Friction state of a node. */
 typedef struct {
@@ -21,25 +18,28 @@ typedef struct {
   PetscReal pressing;      /* normal force of the solve before, N */
 } SbFrictionState;
 
+/* n . u = value, m, of a node with the displacement u. */
+typedef struct {
+  PetscReal n[3], value;
+} Plane;
+
 /* A node of the surface that this rank owns. */
 struct _p_Touch {
-  PetscInt node, cell, a;          /* local node, a cell that has it, as its node a */
-  PetscReal k;                     /* stiffness of the springs, N/m */
-  PetscBool on;                    /* active; with springs: at the end of the last step */
-  PetscBool was;                   /* active at the end of the last step, without rebound */
-  PetscBool idle;                  /* its spring does not act before the first solve of the step */
-  PetscReal gap0;                  /* gap when the step began, m; with `time_of_impact yes` or restitution */
-  int toggles, flips;              /* activations within the step; changes of facet while active */
-  PetscInt along;                  /* its constraint; -1: redundant, or inactive */
-  PetscReal surface[3];            /* normal of the obstacle at the last search */
-  PetscReal level;                 /* n . u on the plane of that facet, m */
-  PetscBool valley;                /* constrained on two facets during a solve (contact_facets.c) */
-  PetscBool undecided;             /* another solve is needed for that */
-  PetscReal other[3], other_value; /* the second one, as n and value */
-  PetscInt other_along;            /* as along */
-  PetscReal other_lambda;          /* N */
-  PetscReal n[3];                  /* normal of its constraint, outward from the obstacle */
-  PetscReal value;                 /* n . u that puts it on the obstacle, m */
+  PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
+  PetscReal k;            /* stiffness of the springs, N/m */
+  PetscBool on;           /* active; with springs: at the end of the last step */
+  PetscBool was;          /* active at the end of the last step, without rebound */
+  PetscBool idle;         /* its spring does not act before the first solve of the step */
+  PetscReal gap0;         /* gap when the step began, m; with `time_of_impact yes` or restitution */
+  int toggles, flips;     /* activations within the step; changes of facet while active */
+  PetscInt along;         /* its constraint; -1: redundant, or inactive */
+  Plane surface;          /* of the obstacle's facet at the last search, n outward */
+  Plane plane;            /* on which it is constrained */
+  PetscBool valley;       /* constrained on two facets during a solve  */
+  PetscBool undecided;    /* another solve is needed for that */
+  Plane other;            /* the second one */
+  PetscInt other_along;   /* as along */
+  PetscReal other_lambda; /* N */
   PetscReal rest;     /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
   PetscReal kept;     /* springs: the same at the end of the last step, m */
   PetscReal gap;      /* after the last solve, beyond `rest`, m */
@@ -53,14 +53,6 @@ struct _p_Touch {
   PetscReal now[3];     /* that of the last solve, m */
   PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
 };
-
-/* contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance
-   `gap` (m) from the facet with normal n. Flip: it was constrained to one facet; returns whether to another
-   one now. Valley: it was constrained to two. Not collective. */
-PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,
-                        PetscReal n[3], Touch *touch);
-void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], PetscReal gap,
-                     const PetscReal n[3], Touch *touch);
 
 /* Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last
    one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`

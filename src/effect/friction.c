@@ -60,13 +60,13 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
   for (int k = 0; k < 3; k++) s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
-  return across(touch->n, s);
+  return across(touch->plane.n, s);
 }
 
 /* Rotates the two tangents, the first one along v or its tangential part. */
 static void turn(Touch *touch, const PetscReal v[3])
 {
-  const PetscReal *n = touch->n;
+  const PetscReal *n = touch->plane.n;
   SbFrictionState *g = &touch->friction;
   PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
 
@@ -98,9 +98,9 @@ void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push
   PetscReal t[3], length, part;
 
   for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
-  length = across(touch->n, t);
+  length = across(touch->plane.n, t);
   part = g->slides && !careful(g) && length > 0 ? coefficient(f, g) / length : 0;
-  for (int k = 0; k < 3; k++) push[k] = touch->n[k] - part * t[k];
+  for (int k = 0; k < 3; k++) push[k] = touch->plane.n[k] - part * t[k];
 }
 
 PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *touch)
@@ -115,7 +115,7 @@ PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *to
     const PetscReal fixed[3] = {bits == 1, bits == 2, bits == 4};
     PetscReal v[3];
 
-    SbCross(touch->n, fixed, v);
+    SbCross(touch->plane.n, fixed, v);
     turn(touch, SbDot3(v, v) > 1e-12 ? v : g->tangent[0]);
   }
   for (int q = 0; q < 2; q++) {
