@@ -220,37 +220,33 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
-  PetscReal *push, *normal;
-  PetscInt *count;
+  PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  PetscCall(PetscMalloc3(3 * m->nvertex, &push, 3 * m->nvertex, &normal, m->nvertex, &count));
+  PetscCall(PetscMalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbBarrierPlace(b, u, 0., b->x));
     SbContactMeshNormals(m, b->x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
-    PetscCall(PetscArrayzero(push, 3 * m->nvertex));
-    PetscCall(PetscArrayzero(count, m->nvertex));
+    PetscCall(PetscArrayzero(push, 4 * m->nvertex));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->w, pair);
-      PetscReal gap, sum = 0., direction[3];
+      PetscReal gap, sum = 0.;
       SbDistance d;
 
       if (!counts(b, pair)) continue;
       gap = SbContactPairGap(m, pair, b->x, &d);
       if (gap >= 0.9 * goal) continue;
-      for (int k = 0; k < 3; k++) direction[k] = d.n[k];
-      if (!pair->side && d.d < tiny) {
-        /* distance zero: along the outward normal of the second side */
+      if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
-          direction[k] = 0.;
-          for (int v = SbContactPairSplit(pair); v < 4; v++) direction[k] += normal[3 * pair->v[v] + k];
+          d.n[k] = 0.;
+          for (int v = SbContactPairSplit(pair); v < 4; v++) d.n[k] += normal[3 * pair->v[v] + k];
         }
-        if (SbNormalise(direction) <= 0.) continue;
+        if (SbNormalise(d.n) <= 0.) continue;
       }
       for (int k = 0; k < 4; k++)
         if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);
@@ -260,25 +256,22 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
         const PetscInt v = pair->v[k];
 
         if (m->driven[v] || d.weight[k] == 0.) continue;
-        for (int j = 0; j < 3; j++) push[3 * v + j] += (goal - gap) * d.weight[k] / sum * direction[j];
-        count[v]++;
+        for (int j = 0; j < 3; j++) push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
+        push[4 * v + 3]++;
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
     if (!n) break;
     *moved = PETSC_TRUE;
     PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(3 * m->nvertex), MPIU_REAL, MPI_SUM, s->comm));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)m->nvertex, MPIU_INT, MPI_SUM, s->comm));
+      MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL, MPI_SUM, s->comm));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-      for (PetscInt j = m->start[v]; count[v] && j < m->start[v + 1]; j++) {
-        if (m->node[j] < 0) continue;
-        for (int i = 0; i < 3; i++)
-          if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[3 * v + i] / (PetscReal)count[v];
-      }
+      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
+        for (int i = 0; i < 3 && m->node[j] >= 0; i++)
+          if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
     }
   }
-  PetscCall(PetscFree3(push, normal, count));
+  PetscCall(PetscFree2(push, normal));
   b->known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -734,14 +727,12 @@ static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, siz
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
+  const PetscReal state[4] = {b->work, b->friction_loss, s->rank ? 0. : b->stiffer, s->rank ? 0. : b->scale};
 
   PetscFunctionBeginUser;
   *n = 1;
   PetscCall(PetscMalloc1(4, records));
-  (*records)[0] = b->work;
-  (*records)[1] = b->friction_loss;
-  (*records)[2] = s->rank ? 0. : b->stiffer;
-  (*records)[3] = s->rank ? 0. : b->scale;
+  PetscCall(PetscArraycpy(*records, state, 4));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

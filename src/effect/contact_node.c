@@ -35,7 +35,7 @@
   one with the smaller force. Elsewhere (convex edges, and with friction) normals are averaged over searches,
   after many kept.
 */
-#include "contact_node.h"
+#include "contact.h"
 
 #define STIFFEST 11.   /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
 #define TOGGLES 3      /* activations of a node within a step after which it stays active */
@@ -68,7 +68,6 @@ PetscErrorCode SbContactDestroy(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbObstacleDestroy(&c->obstacle));
-  PetscCall(SbPathDestroy(&c->path));
   PetscCall(PetscFree(c->touch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -271,7 +270,7 @@ static void move_to(PetscReal rest, Touch *touch)
 /* Activates a penetrating node. */
 static void enter(const Contact *c, Touch *touch)
 {
-  if (!touch->on && c->friction.mu > 0) SbFrictionEnter(&c->friction, touch, -touch->gap);
+  if (!touch->on && c->friction.mu > 0) SbFrictionEnter(c, touch, -touch->gap);
   touch->on = PETSC_TRUE;
   if (c->bounce.e > 0 && touch->approach > 0 && touch->rest == 0)
     move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
@@ -381,13 +380,13 @@ static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool acr
     SbConstraint row = {.node = touch->node, .value = touch->plane.value};
 
     if (across) {
-      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionConstrain(&c->friction, space, touch));
+      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionConstrain(c, space, touch));
       continue;
     }
     touch->along = touch->other_along = touch->friction.slide[0] = touch->friction.slide[1] = -1;
     if (!touch->on) continue;
     for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->plane.n[k];
-    if (c->friction.mu > 0) SbFrictionDirection(&c->friction, touch, row.push);
+    if (c->friction.mu > 0) SbFrictionDirection(c, touch, row.push);
     if (!exact(c)) {
       row.spring = PETSC_TRUE;
       row.stiffness = touch->stiff;
@@ -460,7 +459,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
       touch->now[k] = u[3 * touch->node + k];
       wrong[k] = pushed * touch->plane.n[k];
     }
-    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(&c->friction, space, touch, pushed);
+    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(c, space, touch, pushed);
     if (exact(c)) touch->lambda = touch->on ? pushed : 0;
     if (touch->valley)
       touch->other_lambda =
@@ -491,7 +490,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
       mine = PETSC_TRUE;
     /* stick and slip */
     if (c->friction.mu <= 0 || !touch->on || touch->along < 0) continue;
-    error = SbFrictionUpdate(&c->friction, touch, contact_force(c, touch));
+    error = SbFrictionUpdate(c, touch, contact_force(c, touch));
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   c->first = PETSC_FALSE;
@@ -638,8 +637,7 @@ static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *s
     place(space, touch->node, stage->u, x);
     if (!exact(c)) touch->on = (PetscBool)(normal_force(c, &pose, touch, x, n) > 0);
     if (c->friction.mu > 0) { /* history variables */
-      SbFrictionAccept(&c->friction, touch,
-                       (PetscBool)(touch->on && touch->along >= 0 && contact_force(c, touch) > 0));
+      SbFrictionAccept(c, touch, (PetscBool)(touch->on && touch->along >= 0 && contact_force(c, touch) > 0));
       rotate_stretch(&pose, touch);
     }
     touch->was = (PetscBool)(touch->on && touch->rest <= 0);

@@ -71,8 +71,8 @@ static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
       e->name, e->name, e->name);
     PetscCall(SbOptionReals(scope, "total", load->uniform));
   }
-  PetscCall(SbEffectFormulas(scope, load->ncorner == 4 ? "density" : "vector", 3,
-                             (PetscBool)(load->ncorner > 1), load->density, &e->steady));
+  PetscCall(SbEffectFormulas(e, scope, load->ncorner == 4 ? "density" : "vector", 3,
+                             (PetscBool)(load->ncorner > 1), load->density));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -89,7 +89,9 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item], cell = corner[0] / 4;
     const PetscBool curved = (PetscBool)(mesh->cell_set[cell] & SB_CURVED);
-    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3], normal[3];
+    const PetscReal part = /* of a vertex in the cell */
+      nc > 1 ? 1 : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
+    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3] = {{0}}, normal[3];
 
     if (curved) SbSpaceCellPositions(space, cell, nodes);
     for (int k = 0; k < 12; k++) x[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
@@ -105,11 +107,10 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
       /* volume or area of the simplex with the derivatives of the map at the point */
       if (curved) SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
       for (PetscInt c = 1; c < nc; c++) SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
-      if (nc > 1) SbCross(e[0], e[1], normal);
-      measure = nc == 4 ? PetscAbsReal(SbDot3(normal, e[2])) / 6
-                : nc == 3
-                  ? PetscSqrtReal(SbDot3(normal, normal)) / 2
-                  : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[*corner]];
+      SbCross(e[0], e[1], normal);
+      measure = nc == 4   ? PetscAbsReal(SbDot3(normal, e[2])) / 6
+                : nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2
+                          : part;
       for (int i = 0; i < 3; i++)
         q[i] = measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
       for (PetscInt a = 0; a < 3 * n; a++)
@@ -203,7 +204,6 @@ static PetscErrorCode destroy_deadload(SbEffect e)
   DeadLoad *load = (DeadLoad *)e->data;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
   PetscCall(PetscFree(load->corner));
   PetscCall(PetscFree(load->around));
   PetscCall(PetscFree(load->node));
