@@ -85,8 +85,9 @@ struct _p_SbContactPairs {
   PetscBool known;                    /* cleared by who changes `near` */
   const uint8_t *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
-  SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
-  PetscInt nsearch;
+  SbContactPair *pair;    /* [n] all that have nodes of this rank, in no order */
+  PetscInt nsearch, most; /* searches; number of pairs at which they end, and whether the last one did */
+  PetscBool full;
 };
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs);

@@ -172,8 +172,10 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  SbEffectOn on;         /* empty for a type without the option */
-  SbFormula time;        /* factor on a load; NULL for a type without the option */
+  SbEffectOn on; /* empty for a type without the option */
+  PetscInt nformula;
+  SbFormula formula[5];  /* [nformula] of all its options; owned */
+  SbFormula time;        /* one of them: factor on a load; NULL for a type without the option */
   PetscLogEvent event;   /* SbEff_<type>, around every operation from `setup` to `contact_points` */
   PetscBool linear;      /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
   PetscBool steady;      /* no formula uses t: a static run multiplies the effect by the load factor */
@@ -222,6 +224,3 @@ PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
 */
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
 PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
-/* Marks the sets that the effect prescribes in all directions (SbSet.prescribed): for every effect before
-   SbSpaceCreate(). Names without a set are left to set-up. Not collective. */
-void SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[]);

@@ -147,6 +147,7 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   p->self = self;
   p->others = others;
   p->reach = reach;
+  p->most = PETSC_MAX_INT;
   p->margin = PetscMax(2. * reach, MARGIN * m->mean_edge);
   PetscCall(PetscMalloc2(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter));
 
@@ -155,7 +156,7 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   for (int k = 0; k < 6; k++) {
     struct SbContactFeatures *f = &p->features[k];
 
-    PetscCall(PetscMalloc1(count[k / 2], &f->item));
+    PetscCall(PetscMalloc2(count[k / 2], &f->item, count[k / 2], &f->box));
     for (PetscInt i = 0; i < count[k / 2]; i++) {
       PetscInt own;
       const PetscInt *v = vertices_of(m, k / 2, i, &own);
@@ -164,7 +165,6 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
       for (int a = 0; a < corners[k / 2]; a++) mine = (PetscBool)(mine || m->mine[v[a]]);
       if (mine == (PetscBool)(k % 2 == 0)) f->item[f->n++] = i;
     }
-    PetscCall(PetscMalloc1(f->n, &f->box));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -177,8 +177,7 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
     struct SbContactFeatures *f = &(*pairs)->features[k];
 
     PetscCall(SbBoxTreeDestroy(&f->tree));
-    PetscCall(PetscFree(f->item));
-    PetscCall(PetscFree(f->box));
+    PetscCall(PetscFree2(f->item, f->box));
   }
   PetscCall(PetscFree((*pairs)->features));
   PetscCall(PetscFree2((*pairs)->box, (*pairs)->shorter));
@@ -227,9 +226,7 @@ static PetscErrorCode update_features(SbContactPairs p, int k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SbContactPairsFind(); full: there are more than `most`, some are missing. */
-static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const PetscReal x1[], PetscInt most,
-                                 PetscBool *full)
+PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
   /* this rank's features among themselves, and with those of others */
   static const int meeting[5][2] = {{2 * VERTEX, 2 * TRIANGLE},
@@ -241,7 +238,7 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
   PetscInt found[2 * CHUNK];
 
   PetscFunctionBeginUser;
-  *full = PETSC_FALSE;
+  p->full = PETSC_FALSE;
   if (p->known && still_within(p, x0, x1)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   p->known = PETSC_TRUE;
@@ -257,19 +254,19 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
   }
   for (int k = 0; k < 6; k++) PetscCall(update_features(p, k));
 
-  for (int q = 0; q < 5 && !*full; q++) {
+  for (int q = 0; q < 5 && !p->full; q++) {
     const struct SbContactFeatures *a = &p->features[meeting[q][0]], *b = &p->features[meeting[q][1]];
     SbBoxPairs walk;
     PetscInt n;
 
     SbBoxPairsBegin(&a->tree, &b->tree, 0., &walk);
-    while (!*full && (n = SbBoxPairsNext(&walk, CHUNK, found)) > 0) {
+    while (!p->full && (n = SbBoxPairsNext(&walk, CHUNK, found)) > 0) {
       for (PetscInt k = 0; k < n; k++) {
         const PetscInt i = a->item[found[2 * k]], j = b->item[found[2 * k + 1]];
 
         PetscCall(add_features(p, q < 3 ? SB_PAIR_VERTEX_TRIANGLE : SB_PAIR_EDGE_EDGE, i, j));
       }
-      *full = (PetscBool)(p->n > most);
+      p->full = (PetscBool)(p->n > p->most);
     }
   }
 
@@ -290,17 +287,8 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
     PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));
     p->pair[p->n++] = pair;
   }
-  if (*full) p->known = PETSC_FALSE;
+  if (p->full) p->known = PETSC_FALSE;
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
-{
-  PetscBool full;
-
-  PetscFunctionBeginUser;
-  PetscCall(find_pairs(p, x0, x1, PETSC_MAX_INT, &full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -353,19 +341,20 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
                                      PetscReal *part)
 {
   const SbContactMesh m = p->mesh;
-  const PetscInt most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
   PetscReal whole = 1., safe;
-  PetscBool full;
 
   PetscFunctionBeginUser;
   /* halve the motion until it has few enough pairs */
-  PetscCall(find_pairs(p, x0, x1, most, &full));
-  while (full) {
+  p->most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
+  PetscCall(SbContactPairsFind(p, x0, x1));
+  while (p->full) {
     whole *= 0.5;
     for (PetscInt k = 0; k < 3 * m->nvertex; k++) p->shorter[k] = x0[k] + 0.5 * (x1[k] - x0[k]);
     x1 = p->shorter;
-    PetscCall(find_pairs(p, x0, x1, whole > PETSC_SQRT_MACHINE_EPSILON ? most : PETSC_MAX_INT, &full));
+    if (whole <= PETSC_SQRT_MACHINE_EPSILON) p->most = PETSC_MAX_INT;
+    PetscCall(SbContactPairsFind(p, x0, x1));
   }
+  p->most = PETSC_MAX_INT;
 
   *part = 1.;
   for (PetscInt i = 0; i < p->n; i++) {

@@ -40,6 +40,63 @@
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST 1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
+#define PAIRS 200        /* most pairs of bodies with columns */
+#define TWO 4            /* columns of two bodies */
+#define ONE 2            /* and of one with itself, whose net force is zero */
+
+/* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of e. */
+static PetscErrorCode find_bodies(SbEffect e, SbMesh mesh)
+{
+  static const char *const two_names[TWO] = {"force_x", "force_y", "force_z", "contacts"};
+  static const char *const one_names[ONE] = {"normal_force", "contacts"};
+  Barrier *p = (Barrier *)e->data;
+  const PetscBool self = p->contact.self;
+  const PetscInt fixed = e->ncolumn;
+  PetscInt n = fixed;
+  PetscInt64 npair;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
+  for (PetscInt i = 0; i < mesh->nbody; i++) p->slot[i] = -1;
+  for (PetscInt v = 0; v < p->mesh->nbody_vertex; v++) p->slot[p->mesh->part[v]] = 0;
+  for (PetscInt i = 0; i < mesh->nbody; i++)
+    if (p->slot[i] == 0) p->slot[i] = p->nsurface++;
+  PetscCheck(p->nsurface > 1 || self, mesh->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
+             "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
+             e->name, e->name, e->name, e->name);
+  if (!p->contact.pairs) PetscFunctionReturn(PETSC_SUCCESS);
+  npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
+  PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
+             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
+             "-output_contacts yes",
+             e->name, p->nsurface, e->name, npair, PAIRS);
+  PetscCall(PetscMalloc3(n + TWO * (PetscInt)npair, &p->column, TWO * npair, &p->text,
+                         p->nsurface * p->nsurface, &p->place));
+  PetscCall(PetscArraycpy(p->column, e->column, n));
+  for (PetscInt a = 0; a < mesh->nbody; a++) {
+    for (PetscInt b = a; b < mesh->nbody; b++) {
+      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
+      p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
+      for (int k = 0; k < (a == b ? ONE : TWO); k++, n++) {
+        char *name = p->text[n - fixed];
+
+        SbFormat(sizeof(p->text[0]), name, "%s_%s_%s", mesh->body[a].name, mesh->body[b].name,
+                 (a == b ? one_names : two_names)[k]);
+        for (PetscInt i = 0; i < n; i++)
+          PetscCheck(
+            strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+            "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
+            e->name, e->name, name);
+        p->column[n] = name;
+      }
+    }
+  }
+  e->column = p->column;
+  e->ncolumn = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 {
@@ -47,33 +104,23 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   const PetscInt nbody = s->mesh->nbody;
   PetscReal cube = PETSC_MAX_REAL;
   SbFacet *facet;
-  PetscInt n;
+  PetscInt n, nmove, nobstacle;
 
   PetscFunctionBeginUser;
-  if (b->contact->obstacle) PetscCall(SbContactSetUpObstacle(e, s, b->contact));
+  if (b->contact.obstacle) PetscCall(SbContactSetUpObstacle(e, s));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
-  PetscCall(SbContactMeshCreate(s, n, facet, b->contact->obstacle, &b->mesh));
+  PetscCall(SbContactMeshCreate(s, n, facet, b->contact.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
+  nmove = 3 * b->mesh->nvertex;
+  nobstacle = nmove - 3 * b->mesh->nbody_vertex;
   s->coupled = PETSC_TRUE;
-  if (!b->contact->obstacle) {
-    SbPairs *p = &b->columns;
-
-    PetscCall(PetscMalloc1(nbody, &p->slot));
-    for (PetscInt i = 0; i < nbody; i++) p->slot[i] = -1;
-    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) p->slot[b->mesh->part[v]] = 0;
-    for (PetscInt i = 0; i < nbody; i++)
-      if (p->slot[i] == 0) p->slot[i] = p->nsurface++;
-    PetscCheck(
-      p->nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
-      "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
-      "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
-      e->name, e->name, e->name, e->name);
-    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, b->contact->self, p));
-  }
+  if (!b->contact.obstacle) PetscCall(find_bodies(e, s->mesh));
 
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc2(nbody + 1, &b->w, nbody + 1, &b->k));
+  PetscCall(PetscMalloc7(2 * nbody + 2, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
+                         3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
+  b->k = b->w + nbody + 1;
   b->w[nbody] = b->k[nbody] = e->width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->w[i] = b->width > 0.
@@ -87,11 +134,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
              "most half of that",
              e->name, (double)b->width, (double)b->mesh->shortest);
   PetscCall(
-    SbContactPairsCreate(b->mesh, b->contact->self, (PetscBool)!b->contact->obstacle, b->w[0], &b->pairs));
-  PetscCall(PetscMalloc3(3 * b->mesh->nvertex, &b->x, 3 * b->mesh->nvertex, &b->start, 3 * b->mesh->nvertex,
-                         &b->other));
-  PetscCall(PetscMalloc3(3 * s->nnode_owned, &b->u, 3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->from,
-                         3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->to));
+    SbContactPairsCreate(b->mesh, b->contact.self, (PetscBool)!b->contact.obstacle, b->w[0], &b->pairs));
   b->least = PETSC_MAX_REAL;
   b->shortest = b->stiffer = b->scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -102,9 +145,9 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
   const SbContactMesh m = b->mesh;
 
-  if (!b->contact->obstacle) return;
-  SbContactPose(b->contact, t, &b->pose[0]);
-  SbContactPose(b->contact, t + dt, &b->pose[1]);
+  if (!b->contact.obstacle) return;
+  SbContactPose(&b->contact, t, &b->pose[0]);
+  SbContactPose(&b->contact, t + dt, &b->pose[1]);
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
     SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
@@ -177,37 +220,33 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
-  PetscReal *push, *normal;
-  PetscInt *count;
+  PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  PetscCall(PetscMalloc3(3 * m->nvertex, &push, 3 * m->nvertex, &normal, m->nvertex, &count));
+  PetscCall(PetscMalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbBarrierPlace(b, u, 0., b->x));
     SbContactMeshNormals(m, b->x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
-    PetscCall(PetscArrayzero(push, 3 * m->nvertex));
-    PetscCall(PetscArrayzero(count, m->nvertex));
+    PetscCall(PetscArrayzero(push, 4 * m->nvertex));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->w, pair);
-      PetscReal gap, sum = 0., direction[3];
+      PetscReal gap, sum = 0.;
       SbDistance d;
 
       if (!counts(b, pair)) continue;
       gap = SbContactPairGap(m, pair, b->x, &d);
       if (gap >= 0.9 * goal) continue;
-      for (int k = 0; k < 3; k++) direction[k] = d.n[k];
-      if (!pair->side && d.d < tiny) {
-        /* distance zero: along the outward normal of the second side */
+      if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
-          direction[k] = 0.;
-          for (int v = SbContactPairSplit(pair); v < 4; v++) direction[k] += normal[3 * pair->v[v] + k];
+          d.n[k] = 0.;
+          for (int v = SbContactPairSplit(pair); v < 4; v++) d.n[k] += normal[3 * pair->v[v] + k];
         }
-        if (SbNormalise(direction) <= 0.) continue;
+        if (SbNormalise(d.n) <= 0.) continue;
       }
       for (int k = 0; k < 4; k++)
         if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);
@@ -217,75 +256,46 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
         const PetscInt v = pair->v[k];
 
         if (m->driven[v] || d.weight[k] == 0.) continue;
-        for (int j = 0; j < 3; j++) push[3 * v + j] += (goal - gap) * d.weight[k] / sum * direction[j];
-        count[v]++;
+        for (int j = 0; j < 3; j++) push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
+        push[4 * v + 3]++;
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
     if (!n) break;
     *moved = PETSC_TRUE;
     PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(3 * m->nvertex), MPIU_REAL, MPI_SUM, s->comm));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)m->nvertex, MPIU_INT, MPI_SUM, s->comm));
+      MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL, MPI_SUM, s->comm));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-      for (PetscInt j = m->start[v]; count[v] && j < m->start[v + 1]; j++) {
-        if (m->node[j] < 0) continue;
-        for (int i = 0; i < 3; i++)
-          if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[3 * v + i] / (PetscReal)count[v];
-      }
+      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
+        for (int i = 0; i < 3 && m->node[j] >= 0; i++)
+          if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
     }
   }
-  PetscCall(PetscFree3(push, normal, count));
+  PetscCall(PetscFree2(push, normal));
   b->known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces
-   at the start or the end, and of friction. Forces rotate with the obstacle, so the barrier's are integrated
-   along the arc: moment times angle. */
-static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *slip_work)
-{
-  const SbContactMesh m = b->mesh;
-
-  *gaps = *slip_work = 0.;
-  for (PetscInt i = 0; b->contact->obstacle && i < b->nactive + b->friction.n; i++) {
-    const PetscBool friction = (PetscBool)(i >= b->nactive);
-    Term t;
-
-    SbBarrierTerm(b, i, &t);
-    if (!t.counts) continue;
-    for (PetscInt k = 0; k < t.n; k++) {
-      const PetscInt v = 3 * (t.v[k] - m->nbody_vertex);
-      PetscReal way[3];
-
-      if (v < 0) continue;
-      if (friction)
-        SbSubtract(b->to + v, b->from + v, way);
-      else
-        SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[end], (end ? b->to : b->from) + v, way);
-      *(friction ? slip_work : gaps) += SbDot3(t.gradient + 3 * k, way);
-    }
-    /* friction: rotation of the obstacle beyond the displacement of its vertices */
-    if (friction) {
-      const FrictionPair *pair = &b->friction.pair[i - b->nactive];
-      PetscReal u[3];
-      const PetscReal slope = SbBarrierSlope(b, SbBarrierSlip(b, pair, u));
-
-      *slip_work -= pair->force * slope * SbDot3(u, pair->rotation);
-    }
-  }
-}
-
-/* Energy of the barrier at the current positions, J; this rank's. */
-static PetscReal gap_energy(const Barrier *b)
+/* Energy of the barrier at the current positions, J, and the work of its forces on the obstacle along the path
+   of this step, with the forces there, J; this rank's. They rotate with the obstacle: moment times angle. */
+static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 {
   PetscReal sum = 0.;
 
+  *along = 0.;
   for (PetscInt i = 0; i < b->nactive; i++) {
     Term t;
 
     SbBarrierTerm(b, i, &t);
-    if (t.counts) sum += t.energy;
+    if (!t.counts) continue;
+    sum += t.energy;
+    for (int k = 0; b->contact.obstacle && k < 4; k++) {
+      PetscReal way[3];
+
+      if (t.v[k] < b->mesh->nbody_vertex) continue;
+      SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[b->now > 0.], b->x + 3 * t.v[k], way);
+      *along += SbDot3(t.gradient + 3 * k, way);
+    }
   }
   return sum;
 }
@@ -345,10 +355,10 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   if (b->wider > 0.) { /* widens the barrier as far as its energy grows by at most `growth` */
     const PetscReal old = b->scale;
 
-    energy[0] = gap_energy(b);
+    energy[0] = gap_energy(b, &unused);
     set_scale(e, PetscMin(1., b->wider * old));
     PetscCall(SbBarrierUpdate(b, u0));
-    energy[1] = gap_energy(b);
+    energy[1] = gap_energy(b, &unused);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
     if (energy[1] - energy[0] > b->growth) set_scale(e, old);
     b->wider = 0.;
@@ -358,8 +368,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
-  b->energy = gap_energy(b);
-  obstacle_works(b, PETSC_FALSE, &b->obstacle_power, &unused);
+  b->energy = gap_energy(b, &b->obstacle_power);
 
   /* friction with the normal forces at the start */
   b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
@@ -379,7 +388,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   PetscBool last, more;
 
   PetscFunctionBeginUser;
-  if (b->contact->friction.mu <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->contact.friction.mu <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
   last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
   if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -436,44 +445,48 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal before, power, slip_work, lost = 0., pushed = 0., gained = 0., asked = 0.;
+  PetscReal power, gained = 0., asked = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
-  /* work of contact in the step */
-  before = b->energy;
-  b->energy = gap_energy(b);
-  obstacle_works(b, PETSC_TRUE, &power, &slip_work);
+  /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
+  e->work = b->energy + 0.5 * b->obstacle_power;
+  b->energy = gap_energy(b, &power);
+  e->work += 0.5 * power - b->energy;
   for (PetscInt i = 0; i < b->friction.n; i++) {
+    const FrictionPair *pair = &b->friction.pair[i];
     PetscReal u[3];
-    const PetscReal slip = SbBarrierSlip(b, &b->friction.pair[i], u);
+    const PetscReal slip = SbBarrierSlip(b, pair, u), force = pair->force * SbBarrierSlope(b, slip);
 
-    if (counts(b, &b->friction.pair[i].pair))
-      lost += b->friction.pair[i].force * PetscSqr(slip) * SbBarrierSlope(b, slip);
+    if (!counts(b, &pair->pair)) continue;
+    b->friction_loss += force * PetscSqr(slip);
+    for (int k = 0; k < 12; k++) {
+      const PetscInt v = pair->pair.v[k / 3], c = 3 * v + k % 3;
+
+      if (v < m->nbody_vertex) e->work -= force * u[k % 3] * pair->weight[k / 3] * (b->x[c] - b->start[c]);
+    }
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->at.v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
+    if (m->own[spring->at.v[0]]) e->work += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->nspring - b->nbounce) continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
-  e->work = before - b->energy + 0.5 * (b->obstacle_power + power) + slip_work - lost + pushed;
   b->work += e->work;
-  b->friction_loss += lost;
   b->parted = PETSC_FALSE;
   if (asked > 0.) b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
 
-  if (b->contact->friction.mu > 0.) PetscCall(SbBarrierLag(b));
+  if (b->contact.friction.mu > 0.) PetscCall(SbBarrierLag(b));
   b->most_lag = PetscMax(b->most_lag, b->lag);
 
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
   if (!b->verify || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactOverlapFind(b->mesh, b->contact->self, b->x, PETSC_FALSE, &b->overlap));
+  PetscCall(SbContactOverlapFind(b->mesh, b->contact.self, b->x, PETSC_FALSE, &b->overlap));
   PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT " edges go through triangles, one at (%g, %g, %g) m",
              e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
@@ -481,18 +494,245 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss so far. */
+static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                      PetscReal values[])
+{
+  /* of bodies, and of an obstacle */
+  enum { CONTACTS, PENETRATION, GAP, ENERGY, LOSS, LAG, UNGUARDED };
+  static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
+  Barrier *b = (Barrier *)e->data;
+  const int *at = places[b->contact.obstacle != NULL];
+  PetscReal least = PETSC_MAX_REAL;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  (void)r;
+  PetscCall(PetscArrayzero(values, e->ncolumn));
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierUpdate(b, stage->u));
+  for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
+  if (b->contact.obstacle) SbContactPose(&b->contact, stage->t, &pose);
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    PetscReal force[3] = {0.}, *columns;
+    PetscInt one, two;
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    if (!t.counts) continue;
+    values[at[CONTACTS]] += i < b->nactive || t.force > 0.;
+    if (i < b->nactive) values[at[ENERGY]] += t.energy;
+
+    /* force and torque of the obstacle on the bodies */
+    for (PetscInt k = 0; b->contact.obstacle && k < t.n; k++) {
+      PetscReal arm[3], moment[3];
+
+      if (t.v[k] >= b->mesh->nbody_vertex) continue;
+      for (int j = 0; j < 3; j++) arm[j] = b->x[3 * t.v[k] + j] - b->contact.path.point[j] - pose.d[j];
+      SbCross(arm, t.gradient + 3 * k, moment);
+      for (int j = 0; j < 3; j++) {
+        values[j] -= t.gradient[3 * k + j];
+        values[3 + j] -= moment[j];
+      }
+    }
+    if (b->contact.obstacle) continue;
+
+    /* forces between two bodies, or of one on itself, and their columns */
+    for (int k = 0; k < 3 * t.nfirst; k++) force[k % 3] -= t.gradient[k];
+    values[3] += t.force;
+    if (i >= b->nactive && i < b->nactive + b->friction.n) values[4] += PetscSqrtReal(SbDot3(force, force));
+    if (!b->column) continue;
+    one = b->mesh->part[t.v[0]];
+    two = b->mesh->part[t.v[t.n - 1]];
+    columns = values + b->place[b->nsurface * b->slot[PetscMin(one, two)] + b->slot[PetscMax(one, two)]];
+    columns[one == two ? 1 : 3] += t.force > 0.;
+    if (one == two) columns[0] += t.force;
+    for (int k = 0; k < 3 && one != two; k++) columns[k] += one > two ? force[k] : -force[k];
+  }
+  if (!b->contact.obstacle) values[5] = b->work;
+  values[at[LOSS]] = b->friction_loss;
+  if (s->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
+  values[at[LAG]] = b->lag;
+  values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
+  for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
+    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].at.depth + b->spring[i].start -
+                                                                  SbBarrierSpringPlace(b, &b->spring[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contact point of a term: its place on the body, the force there; the gap is left to the caller. */
+static SbContactPoint point_of(const Barrier *b, const Term *t)
+{
+  const PetscInt *part = b->mesh->part, nbody = b->mesh->space->mesh->nbody, first = part[t->v[0]],
+                 second = part[t->v[t->nfirst]];
+  const PetscBool turned = (PetscBool)(first == nbody);
+  SbContactPoint p = {
+    .id = {t->v[0], t->v[1], t->v[2]},
+    .body = {turned ? second : first, turned || second == nbody ? -1 : second},
+  };
+  PetscReal sum = 0.;
+
+  for (PetscInt k = turned ? t->nfirst : 0; k < (turned ? t->n : t->nfirst); k++) {
+    sum += PetscAbsReal(t->weight[k]);
+    for (int j = 0; j < 3; j++) {
+      p.x[j] += PetscAbsReal(t->weight[k]) * b->x[3 * t->v[k] + j];
+      p.force[j] -= t->gradient[3 * k + j];
+    }
+  }
+  for (int j = 0; j < 3; j++) {
+    p.x[j] /= sum;
+    p.normal[j] = turned ? -t->normal[j] : t->normal[j];
+  }
+  return p;
+}
+
+static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage, SbContactPoints *list)
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscBool *told;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(PetscCalloc1(nterm(b), &told));
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    const PetscInt spring = i - b->nactive - b->friction.n;
+    SbContactPoint p, other;
+    SbDistance d;
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    if (told[i] || !t.counts) continue;
+    p = point_of(b, &t);
+    if (spring >= 0) { /* separates an overlap, or rebounds */
+      p.id[0] = -1 - spring;
+      p.id[1] = t.v[0];
+      p.id[2] = t.v[t.n - 1];
+      p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
+      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
+    } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
+      p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].pair, b->x, &d);
+    else
+      p.gap = b->active[i].gap;
+
+    /* friction there */
+    for (PetscInt k = b->nactive; i < b->nactive && k < b->nactive + b->friction.n; k++) {
+      const SbContactPair *pair = &b->pairs->pair[b->active[i].pair],
+                          *with = &b->friction.pair[k - b->nactive].pair;
+      PetscBool same;
+
+      PetscCall(PetscArraycmp(pair->v, with->v, 4, &same));
+      if (!same || pair->kind != with->kind || pair->side != with->side) continue;
+      SbBarrierTerm(b, k, &t);
+      other = point_of(b, &t);
+      for (int j = 0; j < 3; j++) p.force[j] += other.force[j];
+      told[k] = PETSC_TRUE;
+      break;
+    }
+    PetscCall(SbReserve(list->n + 1, sizeof(p), &list->size, &list->point));
+    list->point[list->n++] = p;
+  }
+  PetscCall(PetscFree(told));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
+                                  PetscReal normal[])
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBarrierUpdate(b, stage->u));
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const PetscInt *vertex = b->pairs->pair[a->pair].v;
+
+    for (int k = 0; k < 4; k++) {
+      const PetscInt v = vertex[k];
+
+      if (v >= m->nbody_vertex || a->at.weight[k] == 0.) continue;
+      for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+        const PetscInt node = m->node[j];
+
+        if (node < 0 || node >= s->nnode_owned || a->gap >= gap[node]) continue;
+        gap[node] = a->gap;
+        for (int i3 = 0; i3 < 3; i3++)
+          normal[3 * node + i3] = (a->at.weight[k] > 0. ? 1. : -1.) * a->at.n[i3];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char text[])
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscReal value[2] = {b->least, b->shortest};
+  PetscInt most = b->most;
+  char note[96] = "";
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
+  if (b->contact.friction.mu > 0.)
+    (void)snprintf(note, sizeof(note), ", friction lagged behind normal forces by at most %.2g of itself",
+                   (double)b->most_lag);
+  if (most)
+    (void)snprintf(text, size,
+                   "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
+                   "shortest safe part of an iteration %.2g%s",
+                   most, (double)value[0], (double)b->w[0], (double)value[1], note);
+  else
+    (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size, char text[])
+{
+  const Barrier *b = (const Barrier *)e->data;
+  const PetscReal *x = b->x;
+  const Active *least = NULL;
+  struct {
+    double gap;
+    int rank;
+  } mine, first;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < b->nactive; i++)
+    if (!least || b->active[i].gap < least->gap) least = &b->active[i];
+  mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
+  mine.rank = s->rank;
+  PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
+  if (first.gap >= *gap) PetscFunctionReturn(PETSC_SUCCESS);
+  *gap = first.gap;
+  if (s->rank == first.rank) {
+    const SbContactPair *pair = &b->pairs->pair[least->pair];
+    const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
+    const char *name[2];
+
+    for (int k = 0; k < 2; k++)
+      name[k] = part[k] < s->mesh->nbody ? s->mesh->body[part[k]].name : "the obstacle";
+    PetscCall(PetscSNPrintf(text, size, "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m",
+                            e->name, name[0], name[1], first.gap, (double)x[3 * pair->v[0]],
+                            (double)x[3 * pair->v[0] + 1], (double)x[3 * pair->v[0] + 2]));
+  }
+  PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, first.rank, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Forces follow from the positions: only accumulated sums are saved. */
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
+  const PetscReal state[4] = {b->work, b->friction_loss, s->rank ? 0. : b->stiffer, s->rank ? 0. : b->scale};
 
   PetscFunctionBeginUser;
   *n = 1;
   PetscCall(PetscMalloc1(4, records));
-  (*records)[0] = b->work;
-  (*records)[1] = b->friction_loss;
-  (*records)[2] = s->rank ? 0. : b->stiffer;
-  (*records)[3] = s->rank ? 0. : b->scale;
+  PetscCall(PetscArraycpy(*records, state, 4));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -520,11 +760,9 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscFunctionBeginUser;
   PetscCall(SbContactMeshDestroy(&b->mesh));
   PetscCall(SbContactPairsDestroy(&b->pairs));
-  PetscCall(PetscFree2(b->w, b->k));
-  PetscCall(PetscFree3(b->x, b->start, b->other));
-  PetscCall(PetscFree3(b->u, b->from, b->to));
-  PetscCall(PetscFree(b->columns.slot));
-  PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
+  PetscCall(PetscFree7(b->w, b->x, b->start, b->other, b->u, b->from, b->to));
+  PetscCall(PetscFree(b->slot));
+  PetscCall(PetscFree3(b->column, b->text, b->place));
   PetscCall(PetscFree(b->active));
   PetscCall(PetscFree(b->friction.pair));
   PetscCall(PetscFree(b->next.pair));
@@ -532,9 +770,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->spring));
   PetscCall(PetscFree(b->overlap.point));
   PetscCall(PetscFree(b->overlap.near));
-  e->data = b->contact;
   PetscCall(SbContactDestroy(e));
-  PetscCall(PetscFree(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -548,26 +784,22 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
                              "contacts",       "penetration",  "penetration_mean", "normal_force",
                              "friction_force", "work",         "friction_loss",    "gap",
                              "energy",         "friction_lag", "unguarded"};
-  Contact *contact = (Contact *)e->data;
-  Barrier *b;
+  Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&b));
   b->effect = e;
-  b->contact = contact;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
   PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
-  e->data = b;
   e->ops = (SbEffectOps){.setup = setup_barrier,
                          .force = SbEffectForce_Barrier,
                          .touching = touching_barrier,
                          .begin_barrier = begin_barrier,
                          .safe = safe_barrier,
                          .lag = lag_barrier,
-                         .nearest = SbEffectNearest_Barrier,
+                         .nearest = nearest_barrier,
                          .meet = e->euler ? SbEffectMeet_Barrier : NULL,
                          .restitution = e->euler ? SbEffectRestitution_Barrier : NULL,
                          .scale_restitution = e->euler ? SbEffectScaleRestitution_Barrier : NULL,
@@ -578,15 +810,15 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
                          .accept = accept_barrier,
                          .save = save_barrier,
                          .load = load_barrier,
-                         .gap = SbEffectGap_Barrier,
-                         .contact_points = SbEffectContactPoints_Barrier,
-                         .history = SbEffectHistory_Barrier,
-                         .summary = SbEffectSummary_Barrier,
+                         .gap = gap_barrier,
+                         .contact_points = points_barrier,
+                         .history = history_barrier,
+                         .summary = summary_barrier,
                          .destroy = destroy_barrier};
   e->linear = PETSC_FALSE;
-  e->springs = (PetscBool)(contact->friction.mu > 0.);
+  e->springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->nstate = 4;
-  e->column = contact->obstacle ? obstacle : bodies;
-  e->ncolumn = contact->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
+  e->column = b->contact.obstacle ? obstacle : bodies;
+  e->ncolumn = b->contact.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -40,6 +40,7 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscBool same;
 
   PetscFunctionBeginUser;
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
   PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
   same = (PetscBool)(b->known && same && b->now == b->effect->progress);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
@@ -76,16 +77,6 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
   }
   for (int i = 0; i < 3; i++) u[i] -= normal * friction->n[i];
   return PetscSqrtReal(SbDot3(u, u));
-}
-
-/* Energy of friction, J, its gradient by the pair's vertices, N. */
-static PetscReal friction_energy(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12])
-{
-  PetscReal u[3];
-  const PetscReal y = SbBarrierSlip(b, friction, u), e = b->slip, slope = SbBarrierSlope(b, y);
-
-  for (int k = 0; k < 12; k++) gradient[k] = friction->force * slope * friction->weight[k / 3] * u[k % 3];
-  return friction->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
 }
 
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
@@ -162,8 +153,14 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->force = 0.;
     if (k < 0)
       t->force = normal_force(b, &b->active[i], &t->energy, t->gradient);
-    else
-      t->energy = friction_energy(b, &b->friction.pair[k], t->gradient);
+    else {
+      PetscReal u[3];
+      const PetscReal y = SbBarrierSlip(b, &b->friction.pair[k], u), w = b->slip,
+                      N = b->friction.pair[k].force;
+
+      for (int c = 0; c < 12; c++) t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
+      t->energy = N * (y < w ? y * y / w - y * y * y / (3. * w * w) + w / 3. : y);
+    }
   } else {
     const Spring *spring = &b->spring[k - b->friction.n];
 
@@ -199,7 +196,6 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
 
   PetscFunctionBeginUser;
   (void)s;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
   (void)add_gradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -212,7 +208,6 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 
   PetscFunctionBeginUser;
   (void)s;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, u));
   *energy += add_gradient(b, 1., f);
 
@@ -338,16 +333,16 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
 {
   PetscFunctionBeginUser;
   b->next.n = 0;
-  for (PetscInt i = 0; b->contact->friction.mu > 0. && i < b->nactive; i++) {
+  for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
     PetscReal energy, gradient[12];
     FrictionPair friction = {.pair = *pair};
 
-    friction.force = b->contact->friction.mu * normal_force(b, a, &energy, gradient);
+    friction.force = b->contact.friction.mu * normal_force(b, a, &energy, gradient);
     PetscCall(PetscArraycpy(friction.weight, a->at.weight, 4));
     PetscCall(PetscArraycpy(friction.n, a->at.n, 3));
-    if (b->contact->obstacle) find_rotation(b, end, a, &friction);
+    if (b->contact.obstacle) find_rotation(b, end, a, &friction);
     PetscCall(SbReserve(b->next.n + 1, sizeof(*b->next.pair), &b->next.size, &b->next.pair));
     b->next.pair[b->next.n++] = friction;
   }

@@ -5,17 +5,6 @@
 #include "contact.h"
 #include "sbbarrier.h"
 
-/* Columns of the history for each pair of bodies (barrier_output.c). */
-typedef struct {
-  PetscInt nsurface;             /* bodies whose surface takes part */
-  PetscInt *slot;                /* [nbody] number among these bodies, or -1 */
-  PetscInt *place;               /* [nsurface][nsurface] first column of a pair, the lower body first */
-  const char **column;           /* [ncolumn] all of the effect */
-  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
-} SbPairs;
-/* Appends the columns of pairs to those of e, by nsurface and slot[]. */
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, PetscBool self, SbPairs *pairs);
-
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {
   PetscInt pair;
@@ -47,8 +36,8 @@ typedef struct {
 } Spring;
 
 typedef struct {
-  SbEffect effect;  /* whose data this is */
-  Contact *contact; /* owned */
+  Contact contact; /* first, as options are read before the response is known */
+  SbEffect effect; /* whose data this is */
   SbContactMesh mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
@@ -81,9 +70,12 @@ typedef struct {
   PetscInt nspring, spring_size; /* those of overlap, the same on every rank, */
   PetscInt nbounce;              /* then those of restitution, of this rank's pairs */
   Spring *spring;
-  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
-  PetscInt most;             /* largest number of active pairs of the run */
-  SbPairs columns;
+  PetscReal least, shortest;     /* smallest gap and shortest safe part of the run */
+  PetscInt most;                 /* largest number of active pairs of the run */
+  PetscInt nsurface, *slot;      /* bodies that take part; [nbody] number among them, -1: it does not */
+  PetscInt *place;               /* [nsurface][nsurface] first column of a pair, the lower body first */
+  const char **column;           /* [ncolumn] all of the effect; NULL: none of pairs */
+  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
   PetscReal energy; /* barrier's energy at the start, then at the end of the step, J; this rank's, as below */
   PetscReal obstacle_power;      /* work along the obstacle's path in this step, forces of its start, J */
   PetscReal work, friction_loss; /* since the start, J */
@@ -103,6 +95,8 @@ static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
   return (PetscBool)b->mesh->own[pair->v[pair->v[0] < b->mesh->nbody_vertex ? 0 : 1]];
 }
 
+/* Makes e, with its Contact, an effect of the response `barrier`. Not collective. */
+PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);
 /* Positions at the local displacements u; pairs with gaps below the width, ordered by number. Collective. */
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
 /* Tangential slip u of a pair since the step began, m; its length. */
@@ -150,7 +144,7 @@ typedef struct {
 } Term;
 static inline PetscInt nterm(const Barrier *b)
 {
-  return b->nactive + b->friction.n + b->nspring;
+  return b->begun ? b->nactive + b->friction.n + b->nspring : 0;
 }
 void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
 
@@ -169,11 +163,3 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
                                          PetscReal *bound);
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks, PetscReal r[]);
-PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                       PetscReal values[]);
-PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
-                                             SbContactPoints *list);
-PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
-                                   PetscReal normal[]);
-PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);
-PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size, char text[]);

@@ -53,8 +53,8 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 
   PetscFunctionBeginUser;
   b->nspring = 0;
-  if (first && !b->contact->obstacle) PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(m, b->contact->self, b->x, inside, o));
+  if (first && !b->contact.obstacle) PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
+  PetscCall(SbContactOverlapFind(m, b->contact.self, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
     "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
@@ -63,10 +63,10 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   b->overlapping = (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * m->size));
 
   /* a body wholly inside the obstacle has no separation direction */
-  if (first && b->contact->obstacle && !b->overlapping) {
+  if (first && b->contact.obstacle && !b->overlapping) {
     SbPose pose;
 
-    SbContactPose(b->contact, 0., &pose);
+    SbContactPose(&b->contact, 0., &pose);
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       const char *name = s->mesh->body[m->part[v]].name;
       const PetscReal *x = b->x + 3 * v;
@@ -74,7 +74,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 
       SbPoseInvert(&pose, x, X);
       PetscCheck(
-        m->driven[v] || SbObstacleDistance(b->contact->obstacle, X, n) > -SAME * m->size, s->comm,
+        m->driven[v] || SbObstacleDistance(b->contact.obstacle, X, n) > -SAME * m->size, s->comm,
         PETSC_ERR_USER_INPUT,
         "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; move it by "
         "-body_%s_translate",
@@ -119,7 +119,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   }
   b->announced = PETSC_TRUE;
 
-  if (e->dynamic) SbOverlapBegin(&b->contact->overlap, dt);
+  if (e->dynamic) SbOverlapBegin(&b->contact.overlap, dt);
   for (PetscInt i = 0; i < o->n; i++) {
     const SbPenetration *p = &o->point[i];
     const PetscInt one = m->part[p->v[0]], two = m->part[p->v[p->n - 1]];
@@ -129,7 +129,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
-      spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
+      spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact.overlap.left))) : all);
     PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
     b->spring[b->nspring++] = spring;
   }
@@ -183,7 +183,7 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
   spring->start = SbBarrierSpringPlace(b, spring);
   for (PetscInt k = 0; k < spring->at.n; k++)
     spring->approach -= spring->at.weight[k] * SbDot3(spring->at.normal, b->other + 3 * spring->at.v[k]);
-  spring->approach = (spring->approach + spring->start) / b->contact->bounce.dt;
+  spring->approach = (spring->approach + spring->start) / b->contact.bounce.dt;
   return (PetscBool)(spring->approach > 0.);
 }
 
@@ -196,8 +196,8 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
 
   PetscFunctionBeginUser;
   b->nbounce = 0;
-  b->contact->bounce.left = 1.;
-  b->contact->bounce.dt = dt;
+  b->contact.bounce.left = 1.;
+  b->contact.bounce.dt = dt;
 
   /* free flight */
   PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
@@ -228,7 +228,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
       if (part[k] < s->mesh->nbody)
         mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
     spring.stiffness = RIGID * mass / PetscSqr(dt);
-    spring.goal = spring.start + SbRestitutionGap(&b->contact->bounce, 0., spring.approach);
+    spring.goal = spring.start + SbRestitutionGap(&b->contact.bounce, 0., spring.approach);
     PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
     b->spring[b->nspring++] = spring;
     b->nbounce++;
@@ -257,13 +257,13 @@ PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  b->contact->bounce.left = share;
+  b->contact.bounce.left = share;
   for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
     Spring *spring = &b->spring[i];
 
     /* a goal lowered below the spring's deflection would release it: keep it active for the next iteration */
     spring->held = (PetscBool)(SbBarrierSpringPlace(b, spring) < spring->goal);
-    spring->goal = spring->start + SbRestitutionGap(&b->contact->bounce, 0., spring->approach);
+    spring->goal = spring->start + SbRestitutionGap(&b->contact.bounce, 0., spring->approach);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -9,7 +9,7 @@
   bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and
   faces, or be passed within a step: there it is `barrier`, unless the scene needs an option that it lacks.
 */
-#include "contact_node.h"
+#include "barrier_impl.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
@@ -79,84 +79,62 @@ static const char *const names_of_responses[] = {"auto",      "projected", "mult
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* Criteria of the response. */
-typedef struct {
-  SbResponse response; /* option of the last effect */
-  PetscBool bodies;    /* some effect is contact between bodies */
-  PetscBool vertices;  /* all obstacles are half-spaces and bowls */
-  PetscBool others;    /* some obstacle has an option that `barrier` lacks */
-} Needs;
-
-/* Adds those of an effect. */
-static PetscErrorCode examine(const char *name, Needs *needs)
-{
-  SbScope scope;
-  PetscInt choice;
-  char text[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  SbScopeSet(&scope, "effect", "contact", name);
-  PetscCall(SbOptionChoice(&scope, "response", &choice));
-  needs->response = (SbResponse)choice;
-  PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
-  needs->bodies = (PetscBool)(needs->bodies || !text[0]);
-  needs->vertices = (PetscBool)(needs->vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
-  for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-    PetscBool given;
-
-    PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
-    needs->others = (PetscBool)(needs->others || given);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
+  PetscBool bodies = PETSC_FALSE;  /* some effect is contact between bodies */
+  PetscBool vertices = PETSC_TRUE; /* all obstacles are half-spaces and bowls */
+  PetscBool lacks = PETSC_FALSE;   /* some obstacle has an option that `barrier` lacks */
   PetscBool possible = PETSC_TRUE;
-  PetscInt n = 0, method;
-  char(*names)[SB_NAME_MAX] = NULL;
-  SbResponse other = AUTO;
+  PetscInt n = 0, choice;
+  char(*names)[SB_NAME_MAX] = NULL, text[PETSC_MAX_PATH_LEN];
+  SbResponse other = AUTO; /* option of this effect, or of the last one that has it */
   SbScope scope;
-  Needs needs = {.vertices = PETSC_TRUE};
 
   PetscFunctionBeginUser;
-  PetscCall(examine(e->name, &needs));
-  *response = needs.response;
-  PetscCheck(
-    !needs.bodies || *response == AUTO || *response == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave it out, or give "
-    "-effect_%s_obstacle",
-    e->name, names_of_responses[*response], e->name);
-  if (*response != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = -1; i < n; i++) { /* this effect first */
+    const char *name = i < 0 ? e->name : names[i];
 
-  /* the integrator, where the program has one */
-  if (SbOptionExists(&SbRunScope, "time")) {
-    PetscCall(SbOptionChoice(&SbRunScope, "time", &method));
-    possible = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
-  }
+    SbScopeSet(&scope, "effect", "", name);
+    PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
+    if (strcmp(text[0] ? text : name, "contact")) continue;
+    SbScopeSet(&scope, "effect", "contact", name);
+    PetscCall(SbOptionChoice(&scope, "response", &choice));
+    if (choice != AUTO) other = (SbResponse)choice;
+    PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
+    bodies = (PetscBool)(bodies || !text[0]);
+    vertices = (PetscBool)(vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
+    for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+      PetscBool given;
 
-  /* the other effects */
-  if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
-  for (PetscInt i = 0; i < n; i++) {
-    char type[SB_NAME_MAX];
-
-    SbScopeSet(&scope, "effect", "", names[i]);
-    PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
-    if (strcmp(type[0] ? type : names[i], "contact")) continue;
-    PetscCall(examine(names[i], &needs));
-    if (needs.response != AUTO) other = needs.response;
+      PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
+      lacks = (PetscBool)(lacks || given);
+    }
+    if (i >= 0) continue;
+    *response = other;
+    PetscCheck(!bodies || other == AUTO || other == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave it out, or "
+               "give -effect_%s_obstacle",
+               e->name, names_of_responses[other], e->name);
+    if (other != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+    if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   }
   PetscCall(PetscFree(names));
 
-  *why = needs.bodies     ? "bodies meet each other"
-         : other != AUTO  ? "the same as another effect"
-         : !possible      ? "-time"
-         : needs.others   ? "an option that barrier lacks"
-         : needs.vertices ? "half-spaces and bowls only"
-                          : "edges and corners may touch";
-  if (other == AUTO) other = !possible || needs.others || needs.vertices ? PROJECTED : BARRIER;
-  *response = needs.bodies || other == BARRIER ? BARRIER : PROJECTED;
+  /* the integrator, where the program has one */
+  if (SbOptionExists(&SbRunScope, "time")) {
+    PetscCall(SbOptionChoice(&SbRunScope, "time", &choice));
+    possible = (PetscBool)(choice == 0 || choice == 6); /* euler_implicit, static */
+  }
+
+  *why = bodies          ? "bodies meet each other"
+         : other != AUTO ? "the same as another effect"
+         : !possible     ? "-time"
+         : lacks         ? "an option that barrier lacks"
+         : vertices      ? "half-spaces and bowls only"
+                         : "edges and corners may touch";
+  if (other == AUTO) other = !possible || lacks || vertices ? PROJECTED : BARRIER;
+  *response = bodies || other == BARRIER ? BARRIER : PROJECTED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,7 +145,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   Contact *c = (Contact *)e->data;
   const char *why = NULL;
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
-  PetscBool given, steady;
+  PetscBool given;
   PetscReal steps;
   PetscInt choice;
 
@@ -186,7 +164,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
       PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
       PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
     }
-    PetscCall(SbPathRead(scope, PETSC_FALSE, &c->path, &steady));
+    PetscCall(SbPathRead(e, scope, PETSC_FALSE, &c->path));
   } else {
     for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
       PetscCall(SbOptionGiven(scope, exact_only[k], &given));
@@ -215,7 +193,6 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
              "start and stop in turn",
              e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
-  c->friction.exact = exact(c);
   PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
   c->cut = (PetscBool)(choice == 1);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
@@ -253,7 +230,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
-  .size = sizeof(Contact),
+  .size = sizeof(Barrier),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

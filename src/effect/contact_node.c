@@ -25,20 +25,34 @@
   Penetration at the start of a step is resolved gradually: its depth falls to 1/e in `separation_steps`
   steps. With springs that is the depth beyond their deflection. A static run resolves it at once.
 
-  Restitution: its law and energy are in src/model/restitution.c. Edges of an obstacle's mesh:
-  contact_facets.c.
+  Restitution: its law and energy are in src/model/restitution.c.
+
+  Where facets of an obstacle's mesh meet a node may alternate between them with every update of the active
+  set. At a concave edge ("valley") both act: constrained on one of them it penetrates the other one. So it is
+  constrained on both for a solve, which gives both forces. If neither is tensile, their resultant is the
+  normal in equilibrium, and the node is constrained along it until the end of the step; else the tensile one
+  is released. On two facets it slides along the edge, possibly behind a third one, which then replaces the
+  one with the smaller force. Elsewhere (convex edges, and with friction) normals are averaged over searches,
+  after many kept.
 */
-#include "contact_node.h"
+#include "contact.h"
 
-#define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
-#define TOGGLES 3    /* activations of a node within a step after which it stays active */
-#define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
-#define EARLY 1e-6   /* of the path of a rebounding node: near misses count as impacts */
-#define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
-#define SETTLED 1e-4 /* tolerance of spring forces, over the largest contact force */
+#define STIFFEST 11.   /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
+#define TOGGLES 3      /* activations of a node within a step after which it stays active */
+#define PULLING 1e-6   /* tension at which a node is released, over the largest contact force */
+#define EARLY 1e-6     /* of the path of a rebounding node: near misses count as impacts */
+#define INSTANT 1e-3   /* fraction of a step for the difference quotient of the obstacle's velocity */
+#define SETTLED 1e-4   /* tolerance of spring forces, over the largest contact force */
+#define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
+#define VALLEY 2       /* flips of an active node between facets in a step that allow two constraints */
+#define AVERAGED 4     /* flips after which normals are averaged */
+#define GIVEN_UP 16    /* flips after which it is not constrained on two any more */
+#define JUMP 1e-6      /* 1 - cosine: a flip */
+#define KEPT 24        /* flips after which a node keeps its plane until the end of the step */
 
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c)
+PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space)
 {
+  const Contact *c = (const Contact *)e->data;
   char option[3 * SB_NAME_MAX], note[192] = "";
 
   PetscFunctionBeginUser;
@@ -54,7 +68,6 @@ PetscErrorCode SbContactDestroy(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbObstacleDestroy(&c->obstacle));
-  PetscCall(SbPathDestroy(&c->path));
   PetscCall(PetscFree(c->touch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -104,7 +117,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscInt n, *slot;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSetUpObstacle(e, space, c));
+  PetscCall(SbContactSetUpObstacle(e, space));
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
@@ -162,32 +175,94 @@ static PetscReal contact_force(const Contact *c, const Touch *touch)
   return exact(c) ? touch->lambda : spring(touch, touch->gap);
 }
 
-/* Gap of the node at x less the gap it is constrained to, with the normal n and right-hand side of n . u. */
+/* Updates the planes of an active node after a solve, which constrained it to one facet; it is at the distance
+   `gap` (m) from the plane of `facet`, whose normal may be averaged with earlier ones. Returns whether the node
+   is on another facet now, too. */
+static PetscBool flip(const Contact *c, PetscReal gap, Plane *facet, Touch *touch)
+{
+  const PetscBool flips = (PetscBool)(SbDot3(facet->n, touch->surface.n) < 1 - JUMP);
+  const Plane last = touch->surface;
+  PetscReal *n = facet->n;
+
+  touch->surface = *facet;
+  if (flips) touch->flips++;
+  if (flips && touch->along >= 0 && c->friction.mu <= 0 && c->bounce.e <= 0 && touch->flips > VALLEY &&
+      touch->flips <= GIVEN_UP && gap - touch->rest < -TOLERANCE * c->size) {
+    touch->valley = touch->undecided = PETSC_TRUE;
+    touch->plane = *facet;
+    touch->other = last;
+    return PETSC_TRUE;
+  }
+  if (touch->flips <= AVERAGED) return PETSC_FALSE;
+  if (!flips && PetscAbsReal(gap - touch->rest) > TOLERANCE * c->size) touch->flips++; /* looks are bounded */
+  for (int i = 0; i < 3; i++)
+    n[i] = touch->plane.n[i] + (n[i] - touch->plane.n[i]) / (touch->flips - AVERAGED + 1);
+  (void)SbNormalise(n);
+  return PETSC_FALSE;
+}
+
+/* The same of a node that was constrained to two, its displacement being u. */
+static void leave_valley(const Contact *c, SbSpace space, const PetscReal u[3], PetscReal gap,
+                         const Plane *facet, Touch *touch)
+{
+  const PetscReal force = touch->lambda, other = touch->other_lambda;
+  Plane *plane = &touch->plane;
+
+  touch->undecided = PETSC_TRUE;
+  touch->surface = *facet;
+  if (touch->other_along < 0 || other < 0 || force < 0) { /* one of them is left */
+    touch->valley = PETSC_FALSE;
+    touch->flips++;
+    if (touch->other_along >= 0 && other > force) {
+      *plane = touch->other;
+      touch->lambda = other;
+    }
+  } else if (PetscAbsReal(gap - touch->rest) > TOLERANCE * c->size) {
+    touch->flips++; /* and on a third one, or not yet where both meet */
+    if (SbDot3(facet->n, touch->other.n) > 1 - JUMP || SbDot3(facet->n, plane->n) > 1 - JUMP) return;
+    if (force > other) touch->other = *plane;
+    *plane = *facet;
+    if (touch->flips > GIVEN_UP) touch->valley = PETSC_FALSE;
+  } else if (space->rough)
+    touch->undecided = PETSC_FALSE; /* a loose solve gives no accurate forces */
+  else {
+    Plane sum;
+
+    for (int i = 0; i < 3; i++) sum.n[i] = force * plane->n[i] + other * touch->other.n[i];
+    touch->lambda = SbNormalise(sum.n);
+    sum.value = SbDot3(sum.n, u);
+    if (touch->lambda > 0) *plane = sum;
+    touch->valley = PETSC_FALSE;
+    touch->flips = KEPT + 1;
+  }
+}
+
+/* Gap of the node at x less the gap it is constrained to; updates the plane of that. */
 static PetscReal search(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
-  const PetscReal *X = space->node_x + 3 * touch->node;
-  PetscReal n[3], at[3], gap;
+  PetscReal u[3], at[3], gap;
+  Plane facet;
 
   touch->undecided = PETSC_FALSE;
-  if (touch->on && touch->flips > KEPT) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
-  gap = gap_at(c, &c->to, x, n);
-  if (touch->on && touch->valley) {
-    SbContactValley(c, space, x, gap, n, touch);
-    return gap - touch->rest;
+  SbSubtract(x, space->node_x + 3 * touch->node, u);
+  if (touch->on && touch->flips > KEPT) return SbDot3(touch->plane.n, u) - touch->plane.value;
+  gap = gap_at(c, &c->to, x, facet.n);
+  for (int i = 0; i < 3; i++) at[i] = u[i] - gap * facet.n[i]; /* from the rest position to the surface */
+  facet.value = SbDot3(facet.n, at) + touch->rest;
+  if (touch->on && touch->valley)
+    leave_valley(c, space, u, gap, &facet, touch);
+  else if (!c->facets || !touch->on || !flip(c, gap, &facet, touch)) {
+    facet.value = SbDot3(facet.n, at) + touch->rest;
+    touch->plane = facet;
   }
-  for (int i = 0; i < 3; i++) at[i] = x[i] - gap * n[i] - X[i]; /* from the rest position to the surface */
-  if (!c->facets || !touch->on || !SbContactFlip(c, X, x, gap, n, touch)) {
-    for (int i = 0; i < 3; i++) touch->n[i] = n[i];
-    touch->value = SbDot3(n, at) + touch->rest;
-  }
-  for (int i = 0; i < 3 && !touch->on; i++) touch->surface[i] = n[i];
+  if (!touch->on) touch->surface = facet;
   return gap - touch->rest;
 }
 
 /* Changes the gap that the node is constrained to. */
 static void move_to(PetscReal rest, Touch *touch)
 {
-  touch->value += rest - touch->rest;
+  touch->plane.value += rest - touch->rest;
   touch->gap -= rest - touch->rest;
   touch->rest = rest;
 }
@@ -195,7 +270,7 @@ static void move_to(PetscReal rest, Touch *touch)
 /* Activates a penetrating node. */
 static void enter(const Contact *c, Touch *touch)
 {
-  if (!touch->on && c->friction.mu > 0) SbFrictionEnter(&c->friction, touch, -touch->gap);
+  if (!touch->on && c->friction.mu > 0) SbFrictionEnter(c, touch, -touch->gap);
   touch->on = PETSC_TRUE;
   if (c->bounce.e > 0 && touch->approach > 0 && touch->rest == 0)
     move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
@@ -302,16 +377,16 @@ static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool acr
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    SbConstraint row = {.node = touch->node, .value = touch->value};
+    SbConstraint row = {.node = touch->node, .value = touch->plane.value};
 
     if (across) {
-      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionConstrain(&c->friction, space, touch));
+      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionConstrain(c, space, touch));
       continue;
     }
     touch->along = touch->other_along = touch->friction.slide[0] = touch->friction.slide[1] = -1;
     if (!touch->on) continue;
-    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->n[k];
-    if (c->friction.mu > 0) SbFrictionDirection(&c->friction, touch, row.push);
+    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->plane.n[k];
+    if (c->friction.mu > 0) SbFrictionDirection(c, touch, row.push);
     if (!exact(c)) {
       row.spring = PETSC_TRUE;
       row.stiffness = touch->stiff;
@@ -319,8 +394,8 @@ static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool acr
     }
     PetscCall(SbSpaceAddConstraint(space, &row, &touch->along));
     if (!touch->valley) continue;
-    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->other[k];
-    row.value = touch->other_value;
+    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->other.n[k];
+    row.value = touch->other.value;
     PetscCall(SbSpaceAddConstraint(space, &row, &touch->other_along));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -382,9 +457,9 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
 
     for (int k = 0; k < 3; k++) {
       touch->now[k] = u[3 * touch->node + k];
-      wrong[k] = pushed * touch->n[k];
+      wrong[k] = pushed * touch->plane.n[k];
     }
-    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(&c->friction, space, touch, pushed);
+    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(c, space, touch, pushed);
     if (exact(c)) touch->lambda = touch->on ? pushed : 0;
     if (touch->valley)
       touch->other_lambda =
@@ -396,7 +471,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
       const PetscReal force =
         touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : contact_force(c, touch);
 
-      for (int k = 0; k < 3; k++) wrong[k] -= force * touch->n[k];
+      for (int k = 0; k < 3; k++) wrong[k] -= force * touch->plane.n[k];
       touch->wrong = PetscSqrtReal(SbDot3(wrong, wrong));
     }
   }
@@ -415,7 +490,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
       mine = PETSC_TRUE;
     /* stick and slip */
     if (c->friction.mu <= 0 || !touch->on || touch->along < 0) continue;
-    error = SbFrictionUpdate(&c->friction, touch, contact_force(c, touch));
+    error = SbFrictionUpdate(c, touch, contact_force(c, touch));
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   c->first = PETSC_FALSE;
@@ -483,7 +558,7 @@ static PetscErrorCode target_contact(SbEffect e, SbSpace space, const SbStage *s
     SbPoseApply(&before, X, from);
     SbPoseApply(&now, X, to);
     for (int k = 0; k < 3; k++) v[k] = (to[k] - from[k]) / (INSTANT * stage->dt);
-    SbSpaceGetConstraint(space, touch->along)->velocity = SbDot3(touch->n, v);
+    SbSpaceGetConstraint(space, touch->along)->velocity = SbDot3(touch->plane.n, v);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -494,7 +569,7 @@ static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch 
                               PetscReal n[3])
 {
   if (c->held) {
-    for (int k = 0; k < 3; k++) n[k] = touch->n[k];
+    for (int k = 0; k < 3; k++) n[k] = touch->plane.n[k];
     return touch->on && touch->along >= 0 ? contact_force(c, touch) : 0;
   }
   return spring(touch, gap_at(c, pose, x, n) - touch->rest);
@@ -562,8 +637,7 @@ static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *s
     place(space, touch->node, stage->u, x);
     if (!exact(c)) touch->on = (PetscBool)(normal_force(c, &pose, touch, x, n) > 0);
     if (c->friction.mu > 0) { /* history variables */
-      SbFrictionAccept(&c->friction, touch,
-                       (PetscBool)(touch->on && touch->along >= 0 && contact_force(c, touch) > 0));
+      SbFrictionAccept(c, touch, (PetscBool)(touch->on && touch->along >= 0 && contact_force(c, touch) > 0));
       rotate_stretch(&pose, touch);
     }
     touch->was = (PetscBool)(touch->on && touch->rest <= 0);
@@ -620,7 +694,7 @@ static PetscErrorCode points_contact(SbEffect e, SbSpace space, const SbStage *s
     place(space, touch->node, stage->u, p.x);
     if (!force_on(c, &pose, space, touch, p.x, p.force)) continue;
     p.gap = gap_at(c, &pose, p.x, p.normal);
-    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* the normal of the constraint */
+    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->plane.n, 3)); /* the normal of the constraint */
     PetscCall(SbReserve(list->n + 1, sizeof(p), &list->size, &list->point));
     list->point[list->n++] = p;
   }
@@ -681,10 +755,10 @@ static PetscErrorCode save_contact(SbEffect e, SbSpace space, PetscInt *n, Petsc
     r[3] = touch->rest;
     r[4] = touch->kept;
     r[5] = touch->lambda;
-    r[6] = touch->value;
+    r[6] = touch->plane.value;
     r[7] = touch->gap;
-    PetscCall(PetscArraycpy(r + 8, touch->n, 3));
-    PetscCall(PetscArraycpy(r + 11, touch->surface, 3));
+    PetscCall(PetscArraycpy(r + 8, touch->plane.n, 3));
+    PetscCall(PetscArraycpy(r + 11, touch->surface.n, 3));
     r[14] = touch->friction.slid;
     r[15] = touch->friction.crowded;
     r[16] = touch->friction.turning;
@@ -733,10 +807,10 @@ static PetscErrorCode load_contact(SbEffect e, SbSpace space, PetscReal t, const
     touch->rest = r[3];
     touch->kept = r[4];
     touch->lambda = r[5];
-    touch->value = r[6];
+    touch->plane.value = r[6];
     touch->gap = r[7];
-    PetscCall(PetscArraycpy(touch->n, r + 8, 3));
-    PetscCall(PetscArraycpy(touch->surface, r + 11, 3));
+    PetscCall(PetscArraycpy(touch->plane.n, r + 8, 3));
+    PetscCall(PetscArraycpy(touch->surface.n, r + 11, 3));
     touch->friction.slid = touch->friction.slides = (PetscBool)(r[14] != 0);
     touch->friction.crowded = (PetscBool)(r[15] != 0);
     touch->friction.turning = r[16];

@@ -1,6 +1,7 @@
 /*
-  deadload.c - the effects `body_force`, a force per rest volume, and `traction`, a force per rest area; of
-  fixed direction (dead loads), given as three formulas of time and rest position.
+  deadload.c - the effects `body_force`, a force per rest volume, `traction`, a force per rest area, and
+  `point_force`, shared equally by the vertices of the named sets; of fixed direction (dead loads), given as
+  three formulas of time and, but for vertices, of rest position.
 
   f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X its map. A
   total force of a traction is uniform over the rest area of its facets, and adds up with the formulas. Every
@@ -10,14 +11,23 @@
   (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud,
   "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order convergence of linear elements
   needs degree 2; the rest lowers the constant at no cost, because a steady load is integrated once.
+
+  Point force: the displacement of vertex v is the mean over the cells c around it, weighted by their volumes
+  w_c, and its part of the force goes the same way back: node a of cell c has w_c phi_a(v) / sum w of it. With
+  P1 and P2 that is the force on the node at v; with CR and DG, where phi_a(v) is 1 or -2, total force and
+  moment are those of the force on the vertices, since mean and elements reproduce linear functions. A force
+  on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h); use a
+  traction where the area matters.
 */
 #include "effect_impl.h"
+#include "sbgeometry.h"
 
 typedef struct {
-  SbFormula density[3];    /* N/m^3 or Pa */
+  SbFormula density[3];    /* N/m^3 or Pa; of points the total force, N */
   PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
-  PetscInt ncorner, nitem; /* 4 for tets, 3 for facets */
+  PetscInt ncorner, nitem; /* 4 for tets, 3 for facets, 1 for a vertex of a cell */
   PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscReal *around; /* [nvert] of points: six times the volume of the tets around, times their number */
   PetscInt n, *node; /* [n] owned nodes of these cells */
   PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
   PetscReal t;       /* s */
@@ -39,49 +49,52 @@ static const SbOption traction_rows[] = {
   {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the traction, a formula of the time t"},
 };
 
-static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
-{
-  DeadLoad *load = (DeadLoad *)e->data;
+static const SbOption point_force_rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose vertices share the force equally"},
+  {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
+};
 
-  PetscFunctionBeginUser;
-  load->ncorner = 4;
-  PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, load->density, &e->steady));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
+static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
 {
   DeadLoad *load = (DeadLoad *)e->data;
   PetscBool vector, total;
 
   PetscFunctionBeginUser;
-  load->ncorner = 3;
-  PetscCall(SbOptionGiven(scope, "vector", &vector));
-  PetscCall(SbOptionGiven(scope, "total", &total));
-  PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
-             e->name, e->name, e->name);
-  PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, load->density, &e->steady));
-  PetscCall(SbOptionReals(scope, "total", load->uniform));
+  load->ncorner = !strcmp(e->type, "body_force") ? 4 : !strcmp(e->type, "traction") ? 3 : 1;
+  if (load->ncorner == 3) {
+    PetscCall(SbOptionGiven(scope, "vector", &vector));
+    PetscCall(SbOptionGiven(scope, "total", &total));
+    PetscCheck(
+      vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+      "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
+      e->name, e->name, e->name);
+    PetscCall(SbOptionReals(scope, "total", load->uniform));
+  }
+  PetscCall(SbEffectFormulas(e, scope, load->ncorner == 4 ? "density" : "vector", 3,
+                             (PetscBool)(load->ncorner > 1), load->density));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* value = the load at time t. */
 static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
 {
+  const SbMesh mesh = space->mesh;
   const PetscInt nc = load->ncorner;
-  const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : &SbRuleFacet;
+  const SbPointRule vertex = {.n = 1, .L = {{1}}, .weight = {1}};
+  const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : nc == 3 ? &SbRuleFacet : &vertex;
 
   load->t = t;
   for (PetscInt i = 0; i < 3 * space->nnode; i++) load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item], cell = corner[0] / 4;
-    const PetscBool curved = (PetscBool)(space->mesh->cell_set[cell] & SB_CURVED);
-    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3], normal[3];
+    const PetscBool curved = (PetscBool)(mesh->cell_set[cell] & SB_CURVED);
+    const PetscReal part = /* of a vertex in the cell */
+      nc > 1 ? 1 : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
+    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3] = {{0}}, normal[3];
 
     if (curved) SbSpaceCellPositions(space, cell, nodes);
-    for (int k = 0; k < 12; k++)
-      x[k / 3][k % 3] = space->mesh->x[3 * space->mesh->cell[4 * cell + k / 3] + k % 3];
+    for (int k = 0; k < 12; k++) x[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
     for (int k = 0; k < rule->n; k++) {
       PetscReal L[4] = {0}, phi[SB_CELL_NODES], p[3] = {0}, q[3], measure;
       PetscInt n;
@@ -95,7 +108,9 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
       if (curved) SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
       for (PetscInt c = 1; c < nc; c++) SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
       SbCross(e[0], e[1], normal);
-      measure = nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2 : PetscAbsReal(SbDot3(normal, e[2])) / 6;
+      measure = nc == 4   ? PetscAbsReal(SbDot3(normal, e[2])) / 6
+                : nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2
+                          : part;
       for (int i = 0; i < 3; i++)
         q[i] = measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
       for (PetscInt a = 0; a < 3 * n; a++)
@@ -107,27 +122,44 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
 static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 {
   DeadLoad *load = (DeadLoad *)e->data;
+  const SbMesh mesh = space->mesh;
   const PetscInt nc = load->ncorner;
   PetscBool steady = PETSC_TRUE, *touched;
-  PetscReal area = 0;
-  PetscInt *cells = NULL;
+  PetscReal total = 0; /* area of the facets, or number of the vertices */
+  PetscInt n, size = 0, *items = NULL;
   SbFacet *facets = NULL;
 
   PetscFunctionBeginUser;
-  if (nc == 4)
-    PetscCall(SbEffectItems(space, &e->on, SB_ON_CELLS, &load->nitem, &cells));
+  if (nc == 3)
+    PetscCall(SbEffectFacets(space, &e->on, &n, &facets));
   else
-    PetscCall(SbEffectFacets(space, &e->on, &load->nitem, &facets));
-  PetscCall(PetscMalloc1(nc * load->nitem, &load->corner));
-  for (PetscInt i = 0; i < load->nitem; i++) {
-    for (PetscInt a = 0; a < nc; a++)
-      load->corner[nc * i + a] = nc == 4 ? 4 * cells[i] + a : 4 * facets[i].cell + facets[i].corner[a];
-    if (nc == 3 && facets[i].cell < space->mesh->ncell_owned) area += facets[i].area;
+    PetscCall(SbEffectItems(space, &e->on, nc == 4 ? SB_ON_CELLS : SB_ON_VERTICES, &n, &items));
+  if (nc == 1) {
+    PetscCall(PetscCalloc1(mesh->nvert, &load->around));
+    for (PetscInt i = 0; i < n; i++) total += items[i] < mesh->nvert_owned;
+    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+      PetscInt at;
+
+      PetscCall(PetscFindInt(mesh->cell[i], n, items, &at));
+      if (at < 0) continue;
+      PetscCall(SbReserve(load->nitem + 1, sizeof(*load->corner), &size, &load->corner));
+      load->corner[load->nitem++] = i;
+      load->around[mesh->cell[i]] += SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4));
+    }
+  } else {
+    load->nitem = n;
+    PetscCall(PetscMalloc1(nc * n, &load->corner));
+    for (PetscInt i = 0; i < n; i++) {
+      for (PetscInt a = 0; a < nc; a++)
+        load->corner[nc * i + a] = nc == 4 ? 4 * items[i] + a : 4 * facets[i].cell + facets[i].corner[a];
+      if (nc == 3 && facets[i].cell < mesh->ncell_owned) total += facets[i].area;
+    }
   }
-  PetscCall(PetscFree(cells));
+  PetscCall(PetscFree(items));
   PetscCall(PetscFree(facets));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3 && nc == 3; i++) load->uniform[i] /= area;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, space->comm));
+  for (int i = 0; i < 3 && nc == 3; i++) load->uniform[i] /= total;
+  for (PetscInt v = 0; v < mesh->nvert && nc == 1; v++) load->around[v] *= total;
 
   /* the owned nodes of these cells: a load on few costs little in a large mesh */
   PetscCall(PetscCalloc1(space->nnode, &touched));
@@ -172,8 +204,8 @@ static PetscErrorCode destroy_deadload(SbEffect e)
   DeadLoad *load = (DeadLoad *)e->data;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
   PetscCall(PetscFree(load->corner));
+  PetscCall(PetscFree(load->around));
   PetscCall(PetscFree(load->node));
   PetscCall(PetscFree(load->value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -184,7 +216,7 @@ const SbEffectType SbEffectBodyForce = {
   .size = sizeof(DeadLoad),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(body_force_rows),
   .row = body_force_rows,
-  .ops = {.setfromoptions = options_body_force,
+  .ops = {.setfromoptions = options_deadload,
           .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},
@@ -195,7 +227,18 @@ const SbEffectType SbEffectTraction = {
   .size = sizeof(DeadLoad),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(traction_rows),
   .row = traction_rows,
-  .ops = {.setfromoptions = options_traction,
+  .ops = {.setfromoptions = options_deadload,
+          .setup = setup_deadload,
+          .force = force_deadload,
+          .destroy = destroy_deadload},
+};
+
+const SbEffectType SbEffectPointForce = {
+  .name = "point_force",
+  .size = sizeof(DeadLoad),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(point_force_rows),
+  .row = point_force_rows,
+  .ops = {.setfromoptions = options_deadload,
           .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},

@@ -81,7 +81,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
       SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option);
       PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
     } else if (!strcmp(is->row[i].key, "time"))
-      PetscCall(SbEffectFormulas(&scope, "time", 1, PETSC_FALSE, &e->time, &e->steady));
+      PetscCall(SbEffectFormulas(e, &scope, "time", 1, PETSC_FALSE, &e->time));
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
 
   /* time in which it acts, for loads and supports */
@@ -123,28 +123,22 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionBeginUser;
   if (!*effect) PetscFunctionReturn(PETSC_SUCCESS);
   if ((*effect)->ops.destroy) PetscCall((*(*effect)->ops.destroy)(*effect));
-  PetscCall(SbFormulaDestroy(&(*effect)->time));
+  for (PetscInt i = 0; i < (*effect)->nformula; i++) PetscCall(SbFormulaDestroy(&(*effect)->formula[i]));
   PetscCall(PetscFree((*effect)->on.name));
   PetscCall(PetscFree((*effect)->data));
   PetscCall(PetscFree(*effect));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
-{
-  for (PetscInt i = 0; e->prescribed && i < e->on.n; i++) {
-    for (PetscInt k = 0; k < nset; k++)
-      if (!strcmp(set[k].name, e->on.name[i])) set[k].prescribed = PETSC_TRUE;
-  }
-}
-
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
-                                SbFormula formulas[], PetscBool *steady)
+PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
+                                PetscBool position, SbFormula formulas[])
 {
   PetscFunctionBeginUser;
-  PetscCall(SbOptionFormulas(scope, key, formulas));
+  e->nformula += n;
+  PetscCall(SbOptionFormulas(scope, key, e->formula + e->nformula - n));
   for (PetscInt i = 0; i < n; i++) {
-    if (SbFormulaUsesTime(formulas[i])) *steady = PETSC_FALSE;
+    formulas[i] = e->formula[e->nformula - n + i];
+    if (SbFormulaUsesTime(formulas[i])) e->steady = PETSC_FALSE;
     if (SbFormulaUsesPosition(formulas[i]) && !position) {
       char option[3 * SB_NAME_MAX];
 
@@ -156,22 +150,14 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path, PetscBool *steady)
+PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, SbPath *path)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFormulas(scope, "displacement", 3, position, path->displacement, steady));
-  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &path->angle, steady));
+  PetscCall(SbEffectFormulas(e, scope, "displacement", 3, position, path->displacement));
+  PetscCall(SbEffectFormulas(e, scope, "angle", 1, PETSC_FALSE, &path->angle));
   PetscCall(SbOptionReals(scope, "axis", path->axis));
   PetscCall(SbOptionReals(scope, "axis_point", path->point));
   PetscCheck(SbNormalise(path->axis) > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_axis: 0,0,0 is no direction", scope->instance);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPathDestroy(SbPath *path)
-{
-  PetscFunctionBeginUser;
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&path->displacement[i]));
-  PetscCall(SbFormulaDestroy(&path->angle));
+             "-effect_%s_axis: 0,0,0 is no direction", e->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

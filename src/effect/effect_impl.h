@@ -4,32 +4,17 @@
 #pragma once
 #include "sbeffect.h"
 
-/*
-  SbEffectFormulas - reads the formulas of an option and says whether they change with time.
+/* Reads the n formulas of an option; e owns them, and is no longer steady where one uses t. position: whether
+   they may use x, y, z; an error (PETSC_ERR_USER_INPUT) if they do and may not. Not collective. */
+PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
+                                PetscBool position, SbFormula formulas[]);
 
-  Not collective.
-
-  Input:
-    scope, key - as for SbOptionFormulas(); the row of the key says how many formulas there are (n)
-    n          - how many the caller expects, 1..3
-    position   - whether the formulas may use x, y, z
-  Output:
-    formulas[n] - the caller destroys each
-    steady      - cleared when a formula uses t, untouched otherwise
-
-  Errors: PETSC_ERR_USER_INPUT when a formula uses x, y or z and may not.
-*/
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
-                                SbFormula formulas[], PetscBool *steady);
-
-/* A path given by the options displacement, angle, axis and axis_point. Read: position, whether displacements
-   may use x, y, z; steady as for SbEffectFormulas(). Not collective. */
+/* A path given by the options displacement, angle, axis and axis_point; formulas as above. */
 typedef struct {
-  SbFormula displacement[3], angle; /* m, degrees; owned */
+  SbFormula displacement[3], angle; /* m, degrees */
   PetscReal axis[3], point[3];      /* unit vector; m */
 } SbPath;
-PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path, PetscBool *steady);
-PetscErrorCode SbPathDestroy(SbPath *path);
+PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, SbPath *path);
 
 /*
   Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the

@@ -11,7 +11,7 @@
   A node in the corner of two obstacles cannot stick to both by exact constraints: they would be redundant.
   Such a pair sticks by springs while in contact.
 */
-#include "contact_node.h"
+#include "contact.h"
 
 #define SETTLED 1e-4 /* tolerance of friction, relative to the largest */
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; else the step is halved */
@@ -31,9 +31,9 @@ void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 }
 
 /* Whether a pair sticks by springs. */
-static inline PetscBool springs(const SbFriction *f, const SbFrictionState *g)
+static inline PetscBool springs(const Contact *c, const SbFrictionState *g)
 {
-  return (PetscBool)(!f->exact || g->crowded);
+  return (PetscBool)(!exact(c) || g->crowded);
 }
 
 /* Whether a pair that alternates has secant springs of the last solve (Kacanov's method), slow but robust. */
@@ -42,9 +42,9 @@ static inline PetscBool careful(const SbFrictionState *g)
   return (PetscBool)(g->flips > FLIPS);
 }
 
-static PetscReal coefficient(const SbFriction *f, const SbFrictionState *g)
+static PetscReal coefficient(const Contact *c, const SbFrictionState *g)
 {
-  return g->slid ? f->mu_kinetic : f->mu;
+  return g->slid ? c->friction.mu_kinetic : c->friction.mu;
 }
 
 /* Tangential part of a vector; returns its length. */
@@ -60,13 +60,13 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
   for (int k = 0; k < 3; k++) s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
-  return across(touch->n, s);
+  return across(touch->plane.n, s);
 }
 
 /* Rotates the two tangents, the first one along v or its tangential part. */
 static void turn(Touch *touch, const PetscReal v[3])
 {
-  const PetscReal *n = touch->n;
+  const PetscReal *n = touch->plane.n;
   SbFrictionState *g = &touch->friction;
   PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
 
@@ -80,11 +80,11 @@ static void turn(Touch *touch, const PetscReal v[3])
   SbCross(n, g->tangent[0], g->tangent[1]);
 }
 
-void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth)
+void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth)
 {
   SbFrictionState *g = &touch->friction;
   PetscReal s[3];
-  const PetscReal length = slip(touch, s), most = coefficient(f, g) * PetscMax(0, depth);
+  const PetscReal length = slip(touch, s), most = coefficient(c, g) * PetscMax(0, depth);
 
   g->slides = (PetscBool)(length > most);
   if (!g->slides) return;
@@ -92,18 +92,18 @@ void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth)
   turn(touch, s);
 }
 
-void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3])
+void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3])
 {
   const SbFrictionState *g = &touch->friction;
   PetscReal t[3], length, part;
 
   for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
-  length = across(touch->n, t);
-  part = g->slides && !careful(g) && length > 0 ? coefficient(f, g) / length : 0;
-  for (int k = 0; k < 3; k++) push[k] = touch->n[k] - part * t[k];
+  length = across(touch->plane.n, t);
+  part = g->slides && !careful(g) && length > 0 ? coefficient(c, g) / length : 0;
+  for (int k = 0; k < 3; k++) push[k] = touch->plane.n[k] - part * t[k];
 }
 
-PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *touch)
+PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -115,7 +115,7 @@ PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *to
     const PetscReal fixed[3] = {bits == 1, bits == 2, bits == 4};
     PetscReal v[3];
 
-    SbCross(touch->n, fixed, v);
+    SbCross(touch->plane.n, fixed, v);
     turn(touch, SbDot3(v, v) > 1e-12 ? v : g->tangent[0]);
   }
   for (int q = 0; q < 2; q++) {
@@ -123,7 +123,7 @@ PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *to
     SbConstraint row = {.node = touch->node, .value = SbDot3(t, touch->start) - SbDot3(t, g->stretch)};
 
     for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = t[k];
-    if (!g->slides && !springs(f, g) && !careful(g)) {
+    if (!g->slides && !springs(c, g) && !careful(g)) {
       PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
       if (g->slide[q] >= 0) continue;
       g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
@@ -135,12 +135,12 @@ PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *to
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N)
+void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N)
 {
   SbFrictionState *g = &touch->friction;
 
   for (int k = 0; k < 3; k++)
-    g->force[k] = g->slides && !careful(g) ? -coefficient(f, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
+    g->force[k] = g->slides && !careful(g) ? -coefficient(c, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
   for (int q = 0; q < 2; q++) {
     const PetscReal force = SbSpaceGetConstraint(space, g->slide[q])->force;
 
@@ -149,10 +149,10 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal 
 }
 
 /* The same by springs for a pair that alternates (SbFrictionUpdate()); N is the mean of both solves. */
-static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *touch)
+static PetscReal update_by_secant(const Contact *c, PetscReal before, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
-  const PetscReal mu = coefficient(f, g), most = mu * PetscMax(0, g->pressing);
+  const PetscReal mu = coefficient(c, g), most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
   const PetscReal length = slip(touch, s), part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
 
@@ -167,20 +167,20 @@ static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *
 /* Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s
    and a stiffness k, the trial force is T + k s, or k s with springs. It slides where that is longer than mu
    N, with T = mu N along it; the derivative of that direction is the stiffness across it. */
-static PetscReal update(const SbFriction *f, Touch *touch)
+static PetscReal update(const Contact *c, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
-  const PetscReal most = coefficient(f, g) * PetscMax(0, g->pressing);
+  const PetscReal most = coefficient(c, g) * PetscMax(0, g->pressing);
   const PetscBool slid = g->slides;
   PetscReal s[3], trial[3], wrong[3] = {0}, size;
 
   slip(touch, s);
-  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(f, g) ? 0 : g->force[k]);
+  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(c, g) ? 0 : g->force[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
   /* slid backwards: sticks */
   g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
   if (g->slides) {
-    const PetscReal over = springs(f, g) ? size : PetscMax(size - most, STIFF * size);
+    const PetscReal over = springs(c, g) ? size : PetscMax(size - most, STIFF * size);
 
     if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size) g->flips++;
     for (int k = 0; k < 3; k++) wrong[k] = g->force[k] + most / size * trial[k];
@@ -193,7 +193,7 @@ static PetscReal update(const SbFriction *f, Touch *touch)
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-PetscReal SbFrictionUpdate(const SbFriction *f, Touch *touch, PetscReal N)
+PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N)
 {
   SbFrictionState *g = &touch->friction;
   const PetscReal before = g->pressing;
@@ -201,7 +201,7 @@ PetscReal SbFrictionUpdate(const SbFriction *f, Touch *touch, PetscReal N)
 
   g->pressing = N;
   if (g->slide[0] < 0) return 0;
-  error = careful(g) ? update_by_secant(f, before, touch) : update(f, touch);
+  error = careful(g) ? update_by_secant(c, before, touch) : update(c, touch);
   if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
     g->flips = 2 * FLIPS;
     g->turning = touch->k;
@@ -216,7 +216,7 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
   if (f->error > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
 }
 
-void SbFrictionAccept(const SbFriction *f, Touch *touch, PetscBool presses)
+void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -226,7 +226,7 @@ void SbFrictionAccept(const SbFriction *f, Touch *touch, PetscBool presses)
     return;
   }
   g->slid = g->slides;
-  for (int k = 0; k < 3; k++) g->stretch[k] = springs(f, g) ? -g->force[k] / touch->k : 0;
+  for (int k = 0; k < 3; k++) g->stretch[k] = springs(c, g) ? -g->force[k] / touch->k : 0;
 }
 
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t)

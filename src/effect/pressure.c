@@ -70,7 +70,7 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   Pressure *p = (Pressure *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFormulas(scope, "value", 1, PETSC_FALSE, &p->value, &e->steady));
+  PetscCall(SbEffectFormulas(e, scope, "value", 1, PETSC_FALSE, &p->value));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
   e->linear = (PetscBool)!p->follower;
   if (p->follower) PetscFunctionReturn(PETSC_SUCCESS);
@@ -365,7 +365,6 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   Pressure *p = (Pressure *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFormulaDestroy(&p->value));
   PetscCall(PetscFree(p->facet));
   PetscCall(PetscFree(p->rim));
   PetscCall(PetscFree(p->whole));

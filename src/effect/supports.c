@@ -28,7 +28,6 @@ typedef struct {
   PetscInt n, nowned; /* nodes with unknowns that it prescribes */
   PetscInt *node;     /* [n] local, ascending, owned ones first */
   uint8_t *bits;      /* [n] bit c: component c is prescribed by this effect */
-  PetscInt *row;      /* [n] index into space->fixed_node; NULL before the first prescribe_support() */
 } Support;
 
 static const SbOption fixed_rows[] = {
@@ -76,7 +75,7 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
     move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
     "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one formula)",
     e->name, e->name, e->name);
-  PetscCall(SbPathRead(scope, PETSC_TRUE, &d->path, &e->steady));
+  PetscCall(SbPathRead(e, scope, PETSC_TRUE, &d->path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,24 +107,16 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 
 static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
 {
-  Support *d = (Support *)e->data;
+  const Support *d = (const Support *)e->data;
   const PetscReal theta = d->path.angle ? SbFormulaEval(d->path.angle, t, NULL) * PETSC_PI / 180 : 0,
                   half = PetscSinReal(theta / 2);
 
   PetscFunctionBeginUser;
-  /* rows exist only after every effect was set up */
-  if (!d->row) {
-    PetscCall(PetscMalloc1(d->n, &d->row));
-    for (PetscInt i = 0; i < d->n; i++) {
-      PetscCall(PetscFindInt(d->node[i], space->nfixed, space->fixed_node, &d->row[i]));
-      PetscCheck(d->row[i] >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-                 "Node %" PetscInt_FMT " is not marked as prescribed", d->node[i]);
-    }
-  }
-  for (PetscInt i = 0; i < d->n; i++) {
+  for (PetscInt i = 0, row = 0; i < d->n; i++) {
     const PetscReal *X = &space->node_x[3 * d->node[i]];
     PetscReal r[3], kr[3], kkr[3];
 
+    while (space->fixed_node[row] != d->node[i]) row++; /* both ascend, and it is among them */
     SbSubtract(X, d->path.point, r);
     SbCross(d->path.axis, r, kr);
     SbCross(d->path.axis, kr, kkr);
@@ -135,7 +126,7 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
       if (d->path.angle)
         u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] +
             SbFormulaEval(d->path.displacement[c], t, X);
-      if (d->bits[i] & (1 << c)) space->fixed_value[3 * d->row[i] + c] = u;
+      if (d->bits[i] & (1 << c)) space->fixed_value[3 * row + c] = u;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -197,10 +188,8 @@ static PetscErrorCode destroy_support(SbEffect e)
   Support *d = (Support *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPathDestroy(&d->path));
   PetscCall(PetscFree(d->node));
   PetscCall(PetscFree(d->bits));
-  PetscCall(PetscFree(d->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

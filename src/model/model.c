@@ -114,16 +114,19 @@ PetscErrorCode SbModelSetUp(SbModel m)
     if (m->body[b].in_memory && m->body[b].in_memory->mass > 0.) PetscCall(match_mass(m, b));
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
-  /* skip supports that do not act at this time */
+  /* skip supports that do not act at this time; the sets that others prescribe in all directions */
   for (PetscInt e = 0; e < m->neffect; e++) {
     SbEffect effect = m->effect[e];
 
-    if (!effect->ops.prescribe || SbEffectActsAfter(effect, m->t_begin)) continue;
-    effect->ops.setup = NULL;
-    effect->ops.prescribe = NULL;
-    effect->prescribed = PETSC_FALSE;
+    if (effect->ops.prescribe && !SbEffectActsAfter(effect, m->t_begin)) {
+      effect->ops.setup = NULL;
+      effect->ops.prescribe = NULL;
+      continue;
+    }
+    for (PetscInt k = 0; effect->prescribed && k < m->nset * effect->on.n; k++)
+      if (!strcmp(m->set[k % m->nset].name, effect->on.name[k / m->nset]))
+        m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
-  for (PetscInt e = 0; e < m->neffect; e++) SbEffectMarkPrescribed(m->effect[e], m->nset, m->set);
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
