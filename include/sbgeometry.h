@@ -137,8 +137,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const Pe
 */
 PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 
-/* Replaces a symmetric matrix A[n][n] by its positive semi-definite part; n <= SB_CLAMP_MAX. */
-#define SB_CLAMP_MAX 12
+/* Replaces a symmetric matrix A[n][n] by its positive semi-definite part; n <= 12. */
 void SbSymmetricProjectPSD(int n, PetscReal A[]);
 
 /*
