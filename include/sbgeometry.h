@@ -178,7 +178,6 @@ typedef struct {
   PetscReal (*group)[6][4]; /* [start[nlevel] + 1] corners of the four boxes or groups in it, m; last: hull */
   PetscReal hull[6];        /* of all, m */
   PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
-  PetscInt built;           /* number of rebuilds */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
@@ -186,22 +185,9 @@ PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
 PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 
 /*
-  The boxes that meet a given one, each once:
-
-      for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &i);) ...
-*/
-typedef struct {
-  const SbBoxTree *tree; /* borrowed */
-  PetscReal box[6];
-  int depth;
-  PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group; -1: box */
-} SbBoxQuery;
-void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query);
-PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i);
-
-/*
-  The boxes nearer to a box (or a point, as a box without extent) than sqrt(limit2), near ones first on the
-  whole. The caller lowers `limit2` as it measures what is in them, until nothing nearer is left:
+  The boxes not farther from a box (or a point, as a box without extent) than sqrt(limit2), near ones first on
+  the whole; 0: those that meet it. The caller lowers `limit2` as it measures what is in them, until nothing
+  nearer is left:
 
       for (SbBoxNearestBegin(&tree, box, limit2, &nearest); SbBoxNearestNext(&nearest, &i);) {
         const PetscReal d2 = ...;
