@@ -13,8 +13,8 @@
 #include "sbkernel.h"
 #include "sbsolver.h"
 
-#define PRESSURE_OPERATOR "SbPressureOperator"
-#define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define S0 1.5             /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
 
 static void clear_fixed(SbSpace s, PetscReal x[])
 {
@@ -204,17 +204,6 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
-{
-  void (*mark)(void) = NULL;
-
-  PetscFunctionBeginUser;
-  *op = NULL;
-  PetscCall(PetscObjectQueryFunction((PetscObject)K, PRESSURE_OPERATOR, &mark));
-  if (mark) PetscCall(MatShellGetContext(K, op));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The matrices of all levels without the volumetric part, which goes to op->volume. */
 static PetscErrorCode assemble(Mat K, const SbStage *stage)
 {
@@ -258,7 +247,7 @@ static PetscErrorCode finish(Mat K)
   PetscCall(SbLevelsShareSprings(op->levels));
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
-  /* C, its inverse and S of the cells, from the moduli of the last assembly */
+  /* C, its inverse, S and weight of the cells, from the moduli of the last assembly */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -270,10 +259,13 @@ static PetscErrorCode finish(Mat K)
 
         for (int k = 0; k < 3 * region->nnode; k++)
           square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
-        op->norm[c] = PetscSqrtReal(square);
         op->Cinv[c] = modulus / V;
         op->C[c] = modulus > 0. ? V / modulus : 1.;
         op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
+        op->weight[c] = 1.;
+        if (modulus > 0.)
+          op->weight[c] =
+            PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
       }
     }
   }
@@ -288,10 +280,9 @@ static PetscErrorCode MatDestroy_Pressure(Mat K)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
-  PetscCall(PetscObjectComposeFunction((PetscObject)K, PRESSURE_OPERATOR, NULL));
   PetscCall(SbLevelsDestroy(&op->levels));
   PetscCall(PetscFree(op->memory));
-  PetscCall(PetscFree4(op->C, op->Cinv, op->S, op->norm));
+  PetscCall(PetscFree4(op->C, op->Cinv, op->S, op->weight));
   PetscCall(VecDestroy(&op->u));
   PetscCall(VecDestroy(&op->y));
   PetscCall(VecDestroy(&op->p));
@@ -320,7 +311,7 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
   op->volume.modulus = op->volume.b + op->volume.stride * s->nbatch;
   op->volume.shear = op->volume.modulus + s->nbatch;
-  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
+  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->weight));
   PetscCall(SbSpaceCreateVec(s, &op->u));
   PetscCall(SbSpaceCreateVec(s, &op->y));
   /* one value per cell, with ghosts */
@@ -340,7 +331,6 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(MatSetOption(*K, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*K, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*K));
-  PetscCall(PetscObjectComposeFunction((PetscObject)*K, PRESSURE_OPERATOR, MatMult_Pressure));
   op->assembly = (SbAssembly){op->levels->A[0], assemble, add_spring, finish};
   PetscCall(SbMatrixSetAssembly(*K, &op->assembly));
   PetscFunctionReturn(PETSC_SUCCESS);
