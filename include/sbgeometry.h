@@ -20,22 +20,17 @@ static inline void SbBoxClear(PetscReal box[6])
 }
 
 /* NaN is ignored, so that ranks agree also after a diverged solve. */
-static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
+static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
 {
   for (int k = 0; k < 3; k++) {
-    if (low[k] < box[k]) box[k] = low[k];
-    if (high[k] > box[3 + k]) box[3 + k] = high[k];
+    if (other[k] < box[k]) box[k] = other[k];
+    if (other[3 + k] > box[3 + k]) box[3 + k] = other[3 + k];
   }
 }
 
 static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
 {
-  SbBoxJoin(box, x, x);
-}
-
-static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
-{
-  SbBoxJoin(box, other, other + 3);
+  SbBoxMerge(box, (const PetscReal[6]){x[0], x[1], x[2], x[0], x[1], x[2]});
 }
 
 /* Length of the diagonal of a box that is not empty. */

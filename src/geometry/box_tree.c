@@ -156,8 +156,7 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   PetscInt ngroup;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(tree, sizeof(*tree)));
-  tree->n = n;
+  *tree = (SbBoxTree){.n = n};
   SbBoxClear(tree->hull);
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   // number of groups per level: a quarter of the level below, down to one
@@ -170,10 +169,8 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
     PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel] + 1, &tree->group));
   for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
   // initialise unused children as empty boxes
-  for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++) {
-    for (int k = 0; k < 6; k++)
-      for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
-  }
+  for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++)
+    for (int k = 0; k < 24; k++) tree->group[g][k / 4][k % 4] = k < 12 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
   PetscCall(build(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

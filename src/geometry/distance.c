@@ -314,20 +314,17 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
   for (int a = 0; g && a < 4; a++)
     for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * d[a / 2][k];
   for (int a = 0; H && a < 4; a++) {
+    const PetscReal *e = a / 2 ? v : u, *f = a / 2 ? u : v;
+
     for (int b = 0; b < 4; b++) {
       const PetscReal sign = a % 2 == b % 2 ? 1 : -1;
 
       for (int p = 0; p < 3; p++) {
         for (int q = 0; q < 3; q++) {
-          PetscReal dd;
+          const PetscReal dd = a / 2 != b / 2 ? 2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv
+                                              : (p == q) * (a / 2 ? uu : vv) - f[p] * f[q];
 
-          if (a / 2 != b / 2) {
-            const PetscReal *e = a / 2 ? v : u, *f = a / 2 ? u : v;
-
-            dd = 2 * (2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv);
-          } else
-            dd = 2 * ((p == q) * (a / 2 ? uu : vv) - (a / 2 ? u[p] * u[q] : v[p] * v[q]));
-          H[12 * (3 * a + p) + 3 * b + q] = sign * dd;
+          H[12 * (3 * a + p) + 3 * b + q] = sign * (2 * dd);
         }
       }
     }
