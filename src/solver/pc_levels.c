@@ -234,8 +234,8 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     /* diagonal of the face terms and the mass matrix, without the cells */
     PetscCall(VecGetArray(v->r[0], &d));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[s->node_body[i]],
-                      inertia = v->shift_a + v->shift_v * s->alpha[s->node_body[i]];
+      const PetscReal stiffness = v->stage.shift_k + v->stage.shift_v * s->beta[s->node_body[i]],
+                      inertia = v->stage.shift_a + v->stage.shift_v * s->alpha[s->node_body[i]];
 
       d[3 * i] = stiffness * p->face_term[0][p->diagonal[i]] + inertia * s->node_mass[i];
     }
@@ -249,9 +249,10 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
       const PetscReal w = v->weight[i];
 
       if (i >= s->nnode_owned || j < 0) continue;
-      v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
-                         2. * w * (1. - w) * (v->shift_k + v->shift_v * s->beta[s->node_body[i]]) *
-                           p->face_term[at < 0][at < 0 ? ~at : at]);
+      v->jump[i] =
+        1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
+              2. * w * (1. - w) * (v->stage.shift_k + v->stage.shift_v * s->beta[s->node_body[i]]) *
+                p->face_term[at < 0][at < 0 ? ~at : at]);
     }
     PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   }

@@ -15,7 +15,7 @@ struct _p_SbLevels {
   SbSpace at[3]; /* at[0] = space; the others are owned */
   Mat A[3];      /* matrices of the levels: BAIJ; the last one AIJ */
   SbElement *element[3];
-  PetscReal shift_a, shift_v, shift_k; /* shifts of the last assembly */
+  SbStage stage;     /* of the last assembly: its shifts */
   PetscInt *mean;    /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
   PetscInt *across;  /* [nnode] node on the other side of the face, -1: none */
   PetscReal *weight; /* [nnode] own weight in the mean of the two sides */
@@ -52,8 +52,8 @@ struct _p_SbPressureOperator {
   PetscReal *Cinv;   /* [ncell_owned] Pa/m^3; 0 for such cells */
   PetscReal *S;      /* [ncell_owned] C + S0 V / (2 mu), m^3/Pa: approximates C + B A^-1 B^T */
   PetscReal *weight; /* [ncell_owned] of the cells' rows in the norm of GMRES, N/m^3 */
-  Vec u, y;          /* ghosted work vectors */
-  Vec p;             /* pressures of cells with ghosts, Pa */
+  PetscReal *p;      /* [ncell] pressures of the cells, Pa */
+  Vec u;             /* work vector with ghosts */
   Vec a, b;          /* vectors for A that borrow their arrays */
 };
 /* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts. Collective. */
