@@ -163,12 +163,8 @@ void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap,
 
 /* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix; start with {0}. */
 typedef struct {
-  PetscInt v[2];  /* the lower number first */
-  PetscReal H[9]; /* row-major, N/m */
-} SbContactBlock;
-typedef struct {
   PetscInt n, size;
-  SbContactBlock *block; /* [n] */
+  SbBlock *block;        /* [n] the lower number first */
   PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
 void SbContactBlocksClear(SbContactBlocks *blocks);

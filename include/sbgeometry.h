@@ -20,22 +20,17 @@ static inline void SbBoxClear(PetscReal box[6])
 }
 
 /* NaN is ignored, so that ranks agree also after a diverged solve. */
-static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
+static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
 {
   for (int k = 0; k < 3; k++) {
-    if (low[k] < box[k]) box[k] = low[k];
-    if (high[k] > box[3 + k]) box[3 + k] = high[k];
+    if (other[k] < box[k]) box[k] = other[k];
+    if (other[3 + k] > box[3 + k]) box[3 + k] = other[3 + k];
   }
 }
 
 static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
 {
-  SbBoxJoin(box, x, x);
-}
-
-static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
-{
-  SbBoxJoin(box, other, other + 3);
+  SbBoxMerge(box, (const PetscReal[6]){x[0], x[1], x[2], x[0], x[1], x[2]});
 }
 
 /* Length of the diagonal of a box that is not empty. */
@@ -137,8 +132,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const Pe
 */
 PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 
-/* Replaces a symmetric matrix A[n][n] by its positive semi-definite part; n <= SB_CLAMP_MAX. */
-#define SB_CLAMP_MAX 12
+/* Replaces a symmetric matrix A[n][n] by its positive semi-definite part; n <= 12. */
 void SbSymmetricProjectPSD(int n, PetscReal A[]);
 
 /*
@@ -179,7 +173,6 @@ typedef struct {
   PetscReal (*group)[6][4]; /* [start[nlevel] + 1] corners of the four boxes or groups in it, m; last: hull */
   PetscReal hull[6];        /* of all, m */
   PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
-  PetscInt built;           /* number of rebuilds */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
@@ -187,22 +180,9 @@ PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
 PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 
 /*
-  The boxes that meet a given one, each once:
-
-      for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &i);) ...
-*/
-typedef struct {
-  const SbBoxTree *tree; /* borrowed */
-  PetscReal box[6];
-  int depth;
-  PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group; -1: box */
-} SbBoxQuery;
-void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query);
-PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i);
-
-/*
-  The boxes nearer to a box (or a point, as a box without extent) than sqrt(limit2), near ones first on the
-  whole. The caller lowers `limit2` as it measures what is in them, until nothing nearer is left:
+  The boxes not farther from a box (or a point, as a box without extent) than sqrt(limit2), near ones first on
+  the whole; 0: those that meet it. The caller lowers `limit2` as it measures what is in them, until nothing
+  nearer is left:
 
       for (SbBoxNearestBegin(&tree, box, limit2, &nearest); SbBoxNearestNext(&nearest, &i);) {
         const PetscReal d2 = ...;

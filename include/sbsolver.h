@@ -104,10 +104,6 @@ PetscErrorCode SbPCCoarseCreate(SbSpace space, PC pc);
 /* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed: false for
    other preconditioners and failures, or when that is done already. Collective. */
 PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed);
-/* Aggregates of all ranks, those that this rank solves for (all of them when it factors for all), set-ups so
-   far, whether the diagonal is the fine level. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
-                                  PetscBool *simple);
 
 /*
   SbPCPMultigridCreate - makes pc p-multigrid for CG: Gauss-Seidel on P2, P1 on the vertices below it.
@@ -162,16 +158,16 @@ PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, Pets
 
 /* tangent and contact blocks */
 
-/* 3x3 blocks, rows of owned nodes, columns of any nodes, best in row order; start with {0}, released with
-   SbBlocksFree(). Duplicates are summed. */
+typedef struct {
+  PetscInt v[2];  /* row and column */
+  PetscReal H[9]; /* row-major, N/m */
+} SbBlock;
+/* Rows of owned nodes, by local numbers, columns of any nodes, by global ones, best in row order; start with
+   {0}, PetscFree() the blocks. Duplicates are summed. */
 typedef struct {
   PetscInt n, size;
-  PetscInt (*node)[2];   /* [n] owned local node, global node */
-  PetscReal (*block)[9]; /* [n] row-major, N/m */
+  SbBlock *block; /* [n] */
 } SbBlocks;
-/* Reserves memory for `more` further blocks. */
-PetscErrorCode SbBlocksReserve(SbBlocks *blocks, PetscInt more);
-PetscErrorCode SbBlocksFree(SbBlocks *blocks);
 typedef struct _p_SbContactSystem *SbContactSystem;
 /* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: those of contact_system.c. */
 PetscErrorCode SbContactSystemCreate(SbSpace space, PetscInt choice, SbContactSystem *system);

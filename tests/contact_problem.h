@@ -80,8 +80,9 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(s->nnode_owned, &own));
   for (PetscInt k = 0; k < p->blocks.n; k++)
-    if (p->blocks.node[k][1] == s->gnode_start + p->blocks.node[k][0])
-      own[p->blocks.node[k][0]] += p->blocks.block[k][0] + p->blocks.block[k][4] + p->blocks.block[k][8];
+    if (p->blocks.block[k].v[1] == s->gnode_start + p->blocks.block[k].v[0])
+      own[p->blocks.block[k].v[0]] +=
+        p->blocks.block[k].H[0] + p->blocks.block[k].H[4] + p->blocks.block[k].H[8];
   PetscCall(VecDuplicate(p->F, &D));
   PetscCall(MatGetDiagonal(p->K, D));
   PetscCall(VecGetArrayRead(D, &d));
@@ -94,7 +95,7 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
   PetscCall(VecDestroy(&D));
   PetscCall(PetscFree(own));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  for (PetscInt k = 0; k < 9 * p->blocks.n; k++) p->blocks.block[k / 9][k % 9] *= ratio * sum[1] / sum[0];
+  for (PetscInt k = 0; k < 9 * p->blocks.n; k++) p->blocks.block[k / 9].H[k % 9] *= ratio * sum[1] / sum[0];
   p->scale = ratio;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -118,8 +119,8 @@ static inline PetscErrorCode contact_problem_residual(ContactProblem *p, PetscRe
   PetscCall(VecGetArrayRead(all, &y));
   PetscCall(VecGetArray(R, &r));
   for (PetscInt k = 0; k < 9 * p->blocks.n; k++)
-    r[3 * p->blocks.node[k / 9][0] + k % 9 / 3] -=
-      p->blocks.block[k / 9][k % 9] * y[3 * p->blocks.node[k / 9][1] + k % 3];
+    r[3 * p->blocks.block[k / 9].v[0] + k % 9 / 3] -=
+      p->blocks.block[k / 9].H[k % 9] * y[3 * p->blocks.block[k / 9].v[1] + k % 3];
   PetscCall(VecRestoreArray(R, &r));
   PetscCall(VecRestoreArrayRead(all, &y));
   PetscCall(VecNorm(R, NORM_2, relative));
@@ -134,7 +135,7 @@ static inline PetscErrorCode contact_problem_residual(ContactProblem *p, PetscRe
 static inline PetscErrorCode contact_problem_close(ContactProblem *p)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbBlocksFree(&p->blocks));
+  PetscCall(PetscFree(p->blocks.block));
   PetscCall(MatDestroy(&p->K));
   PetscCall(VecDestroy(&p->F));
   PetscCall(VecDestroy(&p->Y));

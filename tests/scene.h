@@ -103,6 +103,26 @@ static inline PetscErrorCode test_scene_solve(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What PCView() prints, on all ranks. Collective. */
+static inline PetscErrorCode test_pc_view(PC pc, size_t size, char text[])
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)pc);
+  PetscViewer viewer;
+  char *all = NULL;
+  size_t length;
+  FILE *file = open_memstream(&all, &length);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscViewerASCIIOpenWithFILE(comm, file, &viewer));
+  PetscCall(PCView(pc, viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  (void)fclose(file);
+  PetscCall(PetscStrncpy(text, all, size));
+  free(all);
+  PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static inline PetscErrorCode test_scene_close(TestScene *scene)
 {
   PetscFunctionBeginUser;

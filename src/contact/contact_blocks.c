@@ -54,7 +54,7 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, co
   at = find_slot(b, low, high);
   if (b->slot[at] < 0) {
     b->slot[at] = b->n;
-    b->block[b->n++] = (SbContactBlock){.v = {low, high}};
+    b->block[b->n++] = (SbBlock){.v = {low, high}};
   }
   to = b->block[b->slot[at]].H;
   for (int p = 0; p < 3; p++)
@@ -127,7 +127,7 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
 
     for (PetscInt h = begin[i]; h < begin[i + 1]; h++)
       most += start[vertex[holder[h]] + 1] - start[vertex[holder[h]]];
-    if (most) PetscCall(SbBlocksReserve(to, most));
+    if (most) PetscCall(SbReserve(to->n + most, sizeof(*to->block), &to->size, &to->block));
     for (PetscInt h = begin[i]; h < begin[i + 1]; h++) {
       const PetscInt j = holder[h], v = vertex[j];
 
@@ -135,14 +135,11 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
         const PetscInt g = T[k].column;
         PetscReal *sum;
 
-        if (at[g] < row || at[g] >= to->n || to->node[at[g]][1] != g) {
+        if (at[g] < row || at[g] >= to->n || to->block[at[g]].v[1] != g) {
           at[g] = to->n;
-          to->node[to->n][0] = i;
-          to->node[to->n][1] = g;
-          for (int e = 0; e < 9; e++) to->block[to->n][e] = 0.;
-          to->n++;
+          to->block[to->n++] = (SbBlock){.v = {i, g}};
         }
-        sum = to->block[at[g]];
+        sum = to->block[at[g]].H;
         for (int e = 0; e < 9; e++) sum[e] += (m->fixed[j] >> (e / 3) & 1 ? 0. : m->weight[j]) * T[k].H[e];
       }
     }

@@ -54,7 +54,7 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
                                       PetscInt **hits)
 {
   PetscInt nmine = 0, size = 0, *mine = NULL, hit;
-  SbBoxQuery query;
+  SbBoxNearest query;
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
@@ -64,7 +64,7 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
 
     SbBoxClear(around);
     for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
-    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) {
+    for (SbBoxNearestBegin(&tree, around, 0, &query); SbBoxNearestNext(&query, &hit);) {
       if (!goes_through(m, self, x, e, hit)) continue;
       PetscCall(SbReserve(nmine + 2, sizeof(*mine), &size, &mine));
       mine[nmine++] = e;

@@ -71,14 +71,14 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
 {
   PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
   PetscInt t, exit = -1;
-  SbBoxQuery query;
+  SbBoxNearest query;
 
   PetscFunctionBeginUser;
   SbBoxClear(box);
   SbBoxAdd(box, p);
   for (int i = 0; i < 3; i++) goal[i] = p[i] + FAR * depth * point->normal[i];
   SbBoxAdd(box, goal);
-  for (SbBoxQueryBegin(tree, box, &query); SbBoxQueryNext(&query, &t);) {
+  for (SbBoxNearestBegin(tree, box, 0, &query); SbBoxNearestNext(&query, &t);) {
     const PetscInt *v = m->triangle + 3 * t;
     const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
     PetscReal weight[3], length;

@@ -141,7 +141,6 @@ static PetscErrorCode build(SbBoxTree *tree, const PetscReal (*box)[6])
   for (PetscInt i = 0; i < tree->n; i++) tree->order[i] = item[i].box;
   PetscCall(PetscFree(item));
   tree->size = fill(tree, box);
-  tree->built++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,8 +156,7 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   PetscInt ngroup;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(tree, sizeof(*tree)));
-  tree->n = n;
+  *tree = (SbBoxTree){.n = n};
   SbBoxClear(tree->hull);
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   // number of groups per level: a quarter of the level below, down to one
@@ -171,10 +169,8 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
     PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel] + 1, &tree->group));
   for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
   // initialise unused children as empty boxes
-  for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++) {
-    for (int k = 0; k < 6; k++)
-      for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
-  }
+  for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++)
+    for (int k = 0; k < 24; k++) tree->group[g][k / 4][k % 4] = k < 12 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
   PetscCall(build(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -208,38 +204,6 @@ static inline void grow(PetscReal (*group)[4], int l, PetscReal grown, PetscReal
   }
 }
 
-void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query)
-{
-  query->tree = tree;
-  for (int k = 0; k < 6; k++) query->box[k] = box[k];
-  query->depth = tree->n > 0;
-  query->stack[0][0] = tree->nlevel - 1;
-  query->stack[0][1] = 0;
-}
-
-PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
-{
-  const SbBoxTree *tree = query->tree;
-
-  // return a box; push the overlapping children of a group
-  while (query->depth) {
-    const PetscInt level = query->stack[--query->depth][0], g = query->stack[query->depth][1];
-    unsigned mask;
-
-    if (level < 0) {
-      *i = tree->order[g];
-      return PETSC_TRUE;
-    }
-    mask = meeting((const PetscReal(*)[4])tree->group[tree->start[level] + g], query->box);
-    for (int l = 3; l >= 0; l--) {
-      if (!(mask >> l & 1)) continue;
-      query->stack[query->depth][0] = level - 1;
-      query->stack[query->depth++][1] = 4 * g + l;
-    }
-  }
-  return PETSC_FALSE;
-}
-
 void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal limit2, SbBoxNearest *nearest)
 {
   nearest->tree = tree;
@@ -267,13 +231,12 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
       return PETSC_TRUE;
     }
     group = (const PetscReal(*)[4])tree->group[tree->start[top.level] + top.index];
-    // squared distances to the children; infinite for empty ones
+    // squared distances to the children; infinite for empty ones, NaN for those with NaN
     for (int k = 0; k < 3; k++) {
       for (int l = 0; l < 4; l++) {
         const PetscReal above = group[k][l] - nearest->box[3 + k], below = nearest->box[k] - group[3 + k][l];
-        const PetscReal off = above > below ? above : below;
 
-        d2[l] += off > 0 ? off * off : 0;
+        d2[l] += !(above <= 0) ? above * above : !(below <= 0) ? below * below : 0;
       }
     }
     // push the children within the limit, the nearest last, to be visited first

@@ -25,6 +25,7 @@
   5.
 */
 #include "sbgeometry.h"
+#include <petscblaslapack.h>
 
 #define ALONG 1e-4     /* sine between edges below which the lines' closest points are inaccurate */
 #define PARALLEL 1e-12 /* the same, below which lines count as parallel */
@@ -203,56 +204,17 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
 
 void SbSymmetricProjectPSD(int n, PetscReal A[])
 {
-  PetscReal V[SB_CLAMP_MAX * SB_CLAMP_MAX], D[SB_CLAMP_MAX * SB_CLAMP_MAX], size = 0;
-  PetscBool negative = PETSC_FALSE;
+  PetscReal V[12 * 12], lambda[12], work[34 * 12]; /* of LAPACK: (block size + 2) n */
+  PetscBLASInt m = n, nwork = 34 * 12, info;
 
-  // Jacobi's eigenvalue algorithm: each rotation zeroes one off-diagonal entry
-  for (int i = 0; i < n; i++) {
-    for (int j = 0; j < n; j++) {
-      V[n * i + j] = i == j;
-      D[n * i + j] = A[n * i + j];
-      size = PetscMax(size, PetscAbsReal(A[n * i + j]));
-    }
-  }
-  for (int sweep = 0; sweep < 30; sweep++) {
-    PetscReal most = 0;
-
-    for (int p = 0; p < n; p++) {
-      for (int q = p + 1; q < n; q++) {
-        const PetscReal off = D[n * p + q];
-        PetscReal theta, tau, c, s;
-
-        most = PetscMax(most, PetscAbsReal(off));
-        if (!(PetscAbsReal(off) > PETSC_MACHINE_EPSILON * size)) continue;
-        theta = 0.5 * (D[n * q + q] - D[n * p + p]) / off;
-        tau = (theta < 0 ? -1 : 1) / (PetscAbsReal(theta) + PetscSqrtReal(1 + theta * theta));
-        c = 1 / PetscSqrtReal(1 + tau * tau);
-        s = tau * c;
-        for (int k = 0; k < n; k++) {
-          const PetscReal a = D[n * k + p], b = D[n * k + q], v = V[n * k + p], w = V[n * k + q];
-
-          D[n * k + p] = c * a - s * b;
-          D[n * k + q] = s * a + c * b;
-          V[n * k + p] = c * v - s * w;
-          V[n * k + q] = s * v + c * w;
-        }
-        for (int k = 0; k < n; k++) {
-          const PetscReal a = D[n * p + k], b = D[n * q + k];
-
-          D[n * p + k] = c * a - s * b;
-          D[n * q + k] = s * a + c * b;
-        }
-      }
-    }
-    if (!(most > PETSC_MACHINE_EPSILON * size)) break;
-  }
-  for (int k = 0; k < n; k++) negative = (PetscBool)(negative || D[n * k + k] < 0);
-  if (!negative) return;
+  for (int k = 0; k < n * n; k++) V[k] = A[k];
+  LAPACKsyev_("V", "U", &m, V, &m, lambda, work, &nwork, &info);
+  if (info || lambda[0] >= 0) return;
   for (int i = 0; i < n; i++) {
     for (int j = 0; j <= i; j++) {
       PetscReal sum = 0;
 
-      for (int k = 0; k < n; k++) sum += PetscMax(D[n * k + k], 0) * V[n * i + k] * V[n * j + k];
+      for (int k = 0; k < n; k++) sum += PetscMax(lambda[k], 0) * V[n * k + i] * V[n * k + j];
       A[n * i + j] = A[n * j + i] = sum;
     }
   }
@@ -352,20 +314,17 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
   for (int a = 0; g && a < 4; a++)
     for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * d[a / 2][k];
   for (int a = 0; H && a < 4; a++) {
+    const PetscReal *e = a / 2 ? v : u, *f = a / 2 ? u : v;
+
     for (int b = 0; b < 4; b++) {
       const PetscReal sign = a % 2 == b % 2 ? 1 : -1;
 
       for (int p = 0; p < 3; p++) {
         for (int q = 0; q < 3; q++) {
-          PetscReal dd;
+          const PetscReal dd = a / 2 != b / 2 ? 2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv
+                                              : (p == q) * (a / 2 ? uu : vv) - f[p] * f[q];
 
-          if (a / 2 != b / 2) {
-            const PetscReal *e = a / 2 ? v : u, *f = a / 2 ? u : v;
-
-            dd = 2 * (2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv);
-          } else
-            dd = 2 * ((p == q) * (a / 2 ? uu : vv) - (a / 2 ? u[p] * u[q] : v[p] * v[q]));
-          H[12 * (3 * a + p) + 3 * b + q] = sign * dd;
+          H[12 * (3 * a + p) + 3 * b + q] = sign * (2 * dd);
         }
       }
     }

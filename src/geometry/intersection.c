@@ -79,12 +79,10 @@ static int orient_plane(const int axis[2], const PetscReal a[3], const PetscReal
 /* Whether c, collinear with a and b, is between them. */
 static PetscBool between(const int axis[2], const PetscReal a[3], const PetscReal b[3], const PetscReal c[3])
 {
-  for (int k = 0; k < 2; k++) {
-    const int x = axis[k];
+  const int x = axis[0], y = axis[1];
 
-    if (c[x] < PetscMin(a[x], b[x]) || c[x] > PetscMax(a[x], b[x])) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
+  return (PetscBool)(c[x] >= PetscMin(a[x], b[x]) && c[x] <= PetscMax(a[x], b[x]) &&
+                     c[y] >= PetscMin(a[y], b[y]) && c[y] <= PetscMax(a[y], b[y]));
 }
 
 static PetscBool segments_meet(const int axis[2], const PetscReal a[3], const PetscReal b[3],
@@ -93,11 +91,9 @@ static PetscBool segments_meet(const int axis[2], const PetscReal a[3], const Pe
   const int abc = orient_plane(axis, a, b, c), abd = orient_plane(axis, a, b, d);
   const int cda = orient_plane(axis, c, d, a), cdb = orient_plane(axis, c, d, b);
 
-  if (abc * abd < 0 && cda * cdb < 0) return PETSC_TRUE;
-  if (!abc && between(axis, a, b, c)) return PETSC_TRUE;
-  if (!abd && between(axis, a, b, d)) return PETSC_TRUE;
-  if (!cda && between(axis, c, d, a)) return PETSC_TRUE;
-  return (PetscBool)(!cdb && between(axis, c, d, b));
+  return (PetscBool)((abc * abd < 0 && cda * cdb < 0) || (!abc && between(axis, a, b, c)) ||
+                     (!abd && between(axis, a, b, d)) || (!cda && between(axis, c, d, a)) ||
+                     (!cdb && between(axis, c, d, b)));
 }
 
 /* Whether a segment and a triangle in one plane intersect. */

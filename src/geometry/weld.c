@@ -18,11 +18,11 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
   grown = tolerance + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * largest;
   for (PetscInt v = 0, w; v < n; v++) {
     PetscReal around[6];
-    SbBoxQuery query;
+    SbBoxNearest query;
 
     map[v] = v;
     for (int k = 0; k < 6; k++) around[k] = box[v][k] + (k < 3 ? -grown : grown);
-    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &w);) {
+    for (SbBoxNearestBegin(&tree, around, 0, &query); SbBoxNearestNext(&query, &w);) {
       if (w >= v || SbDistance2(box[v], box[w]) > tolerance * tolerance) continue;
       if (chains)
         (void)SbUnionJoin(map, v, w);

@@ -22,14 +22,11 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, Sb
   if (c->aggregated) PetscCall(SbAggregate(s, wanted, &c->nagg, c->agg));
   if (!vertices || !s->edge_node) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(2 * s->nnode + 1, &c->parent));
-  PetscCall(PetscCalloc1(s->nnode + 1, &c->vertex));
   for (PetscInt k = 0; k < 2 * s->nnode; k++) c->parent[k] = k / 2;
   for (PetscInt k = 0; k < 12 * s->mesh->ncell; k++) {
     const PetscInt edge = k / 2, i = s->edge_node[edge];
 
-    if (i < 0) continue;
-    c->parent[2 * i + k % 2] = s->cell_node[4 * (edge / 6) + SbTetEdge[edge % 6][k % 2]];
-    c->vertex[c->parent[2 * i + k % 2]] = 1;
+    if (i >= 0) c->parent[2 * i + k % 2] = s->cell_node[4 * (edge / 6) + SbTetEdge[edge % 6][k % 2]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -61,7 +58,6 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
   PetscCall(VecDestroy(&c->w));
   PetscCall(PetscFree(c->agg));
   PetscCall(PetscFree(c->parent));
-  PetscCall(PetscFree(c->vertex));
   PetscCall(PetscFree(*coarse));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,11 +81,12 @@ SB_INLINE void motion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3]
 
 static SbWay way_of(SbCoarse c, PetscInt i, const uint8_t contact[])
 {
-  const PetscInt *v = c->parent ? c->parent + 2 * i : NULL, n = c->space->nnode_owned;
+  const SbSpace s = c->space;
+  const PetscInt *v = c->parent ? c->parent + 2 * i : NULL, n = s->nnode_owned;
 
   if ((contact && contact[i]) || (c->aggregated && c->agg[i] < 0)) return SB_ITSELF;
   if (v && v[0] != v[1]) return !c->aggregated || (v[0] < n && v[1] < n) ? SB_MEAN : SB_ITSELF;
-  return c->aggregated && !(v && c->vertex[i]) ? SB_MEMBER : SB_ITSELF;
+  return c->aggregated && !(v && s->element[s->node_body[i]]->nodes_per[1]) ? SB_MEMBER : SB_ITSELF;
 }
 
 /* The units of own nodes, by their numbers over all ranks; the nodes' relative positions. */
@@ -106,53 +103,43 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   PetscCall(PetscCalloc3(4 * c->nagg, &c->centre, 36 * c->nagg, &c->null, c->nagg, &c->row_of));
   PetscCall(PetscCalloc2(c->nagg, &count, 3 * s->nnode, &number));
 
-  /* centre and radius of each aggregate, without its nodes in contact */
+  /* block rows of nodes that move by themselves, then of aggregates, whose centres are without nodes in contact */
+  c->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     c->way[i] = (uint8_t)way_of(c, i, contact);
+    c->unit[2 * i] = c->way[i] == SB_ITSELF && (!c->aggregated || c->agg[i] >= 0) ? c->n++ : -1;
+    c->unit[2 * i + 1] = -1;
     if (c->way[i] != SB_MEMBER) continue;
     for (int k = 0; k < 3; k++) c->centre[4 * c->agg[i] + k] += s->node_x[3 * i + k];
     count[c->agg[i]]++;
   }
-  for (PetscInt k = 0; k < 3 * c->nagg; k++)
-    c->centre[4 * (k / 3) + k % 3] /= (PetscReal)PetscMax(1, count[k / 3]);
-  for (PetscInt k = 0; k < 3 * n; k++) {
-    PetscInt a;
-
-    c->d[k] = 0.;
-    if (c->way[k / 3] != SB_MEMBER) continue;
-    a = c->agg[k / 3];
-    c->d[k] = s->node_x[k] - c->centre[4 * a + k % 3];
-    c->centre[4 * a + 3] += PetscSqr(c->d[k]) / (PetscReal)count[a];
-  }
-  for (PetscInt a = 0; a < c->nagg; a++)
-    c->centre[4 * a + 3] = count[a] > 1 ? PetscSqrtReal(c->centre[4 * a + 3]) : 0.;
-
-  /* block rows: of nodes that move by themselves, then of aggregates */
-  c->n = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscBool free = (PetscBool)((contact && contact[i]) || !c->aggregated || c->agg[i] >= 0);
-
-    c->unit[2 * i] = c->way[i] == SB_ITSELF && free ? c->n++ : -1;
-    c->unit[2 * i + 1] = -1;
-  }
   for (PetscInt a = 0; a < c->nagg; a++) {
+    for (int k = 0; k < 3; k++) c->centre[4 * a + k] /= (PetscReal)PetscMax(1, count[a]);
     c->row_of[a] = count[a] ? c->n : -1;
-    if (count[a]) c->n += 2;
+    c->n += count[a] ? 2 : 0;
   }
   PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
   PetscCall(PetscMalloc2(c->n, &c->weight, c->n + 1, &c->ia));
   for (PetscInt k = 0; k < c->n; k++) c->weight[k] = 1.;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt a = c->agg[i];
 
-    if (c->way[i] == SB_MEMBER) {
-      c->unit[2 * i] = c->row_of[a];
-      c->weight[c->row_of[a]] = c->weight[c->row_of[a] + 1] = 1. / (PetscReal)count[a];
-      for (int k = 0; k < 3; k++)
-        c->d[3 * i + k] = count[a] > 1 ? c->d[3 * i + k] / c->centre[4 * a + 3] : 0.;
-    }
+  /* their radii; positions over them */
+  for (PetscInt k = 0; k < 3 * n; k++) {
+    const PetscInt a = c->way[k / 3] == SB_MEMBER ? c->agg[k / 3] : -1;
+
+    c->d[k] = a < 0 ? 0. : s->node_x[k] - c->centre[4 * a + k % 3];
+    if (a >= 0) c->centre[4 * a + 3] += PetscSqr(c->d[k]) / (PetscReal)count[a];
+  }
+  for (PetscInt a = 0; a < c->nagg; a++) {
+    c->centre[4 * a + 3] = count[a] > 1 ? PetscSqrtReal(c->centre[4 * a + 3]) : 0.;
+    if (count[a]) c->weight[c->row_of[a]] = c->weight[c->row_of[a] + 1] = 1. / (PetscReal)count[a];
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal radius = c->way[i] == SB_MEMBER ? c->centre[4 * c->agg[i] + 3] : 0.;
+
+    for (int k = 0; k < 3; k++) c->d[3 * i + k] = radius > 0. ? c->d[3 * i + k] / radius : 0.;
+    if (c->way[i] == SB_MEMBER) c->unit[2 * i] = c->row_of[c->agg[i]];
     if (c->unit[2 * i] >= 0) c->unit[2 * i] += c->first;
     number[3 * i] = (PetscReal)c->unit[2 * i];
   }
@@ -203,7 +190,7 @@ static PetscErrorCode find_vanishing(SbCoarse c)
 }
 
 /* The units of the ghosts in the rows of A, from their owners; then units are renumbered, own ones first. */
-static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt ghost[])
+static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
 {
   const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
   PetscReal(*share)[6];
@@ -216,7 +203,7 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
     share[i][2] = (PetscReal)(64 * c->way[i] + c->moved[i]);
     for (int q = 0; q < 3; q++) share[i][3 + q] = c->d[3 * i + q];
   }
-  if (parallel) {
+  if (c->space->ghosted) {
     PetscCall(
       VecCreateGhostBlockWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, nghost, ghost, share[0], &all));
     PetscCall(VecGhostUpdateBegin(all, INSERT_VALUES, SCATTER_FORWARD));
@@ -307,33 +294,30 @@ static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const PetscInt ja[],
-                                  const uint8_t contact[])
+PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const SbContactRows *rows)
 {
   const SbSpace s = c->space;
   const PetscInt n = s->nnode_owned, *ghost = NULL;
-  PetscInt *own_ia = NULL, *own_ja = NULL, *column, nghost = 0;
-  PetscBool parallel;
+  PetscInt *ia = NULL, *ja = NULL, *column, nghost = 0;
   Mat far;
 
   PetscFunctionBeginUser;
   PetscCall(free_pattern(c));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  if (parallel) {
+  if (s->ghosted) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, NULL, &far, &ghost));
     PetscCall(MatGetLocalSize(far, NULL, &nghost));
   }
   c->nall = n + nghost / 3;
-  PetscCall(find_units(c, contact));
+  PetscCall(find_units(c, rows ? rows->contact : NULL));
   PetscCall(find_vanishing(c));
-  PetscCall(find_ghosts(c, parallel, ghost));
+  PetscCall(find_ghosts(c, ghost));
 
   /* the rows of A with columns of own nodes and ghosts */
-  if (!ia) {
-    PetscCall(SbSpaceGetGraph(s, &own_ia, &own_ja));
-    ia = own_ia;
-    ja = own_ja;
-  }
+  if (rows) {
+    ia = rows->ia;
+    ja = rows->ja;
+  } else
+    PetscCall(SbSpaceGetGraph(s, &ia, &ja));
   PetscCall(PetscMalloc1(ia[n], &column));
   for (PetscInt k = 0; k < ia[n]; k++) {
     column[k] = ja[k] - s->gnode_start;
@@ -345,18 +329,16 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   for (PetscInt i = 0; i < n; i++) c->widest = PetscMax(c->widest, 2 * (ia[i + 1] - ia[i]));
   PetscCall(find_pattern(c, ia, column));
   PetscCall(PetscFree(column));
-  PetscCall(PetscFree2(own_ia, own_ja));
+  if (!rows) PetscCall(PetscFree2(ia, ja));
   c->changed = PETSC_TRUE;
 
-  /* vectors */
-  c->wide = (PetscBool)(!c->aggregated && parallel);
-  if (c->wide)
-    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * c->n, PETSC_DECIDE, c->nother, c->other, &c->c));
-  else {
-    PetscCall(VecCreate(s->comm, &c->c));
-    PetscCall(VecSetSizes(c->c, 3 * c->n, PETSC_DECIDE));
-    PetscCall(VecSetType(c->c, VECSTANDARD));
-  }
+  /* vectors, with ghosts where nodes move by units of other ranks */
+  c->wide = (PetscBool)(!c->aggregated && s->ghosted);
+  if (s->ghosted)
+    PetscCall(
+      VecCreateGhostBlock(s->comm, 3, 3 * c->n, PETSC_DECIDE, c->wide ? c->nother : 0, c->other, &c->c));
+  else
+    PetscCall(VecCreateSeq(s->comm, 3 * c->n, &c->c));
   PetscCall(VecDuplicate(c->c, &c->y));
   if (c->s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatCreateVecs(A, &c->s, &c->t));
@@ -370,10 +352,10 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
   PetscReal norm2[2] = {0., 0.}; /* squared norm of c, weighted; of r on the units */
   const PetscScalar *r;
   PetscScalar *m;
-  Vec to = c->c;
+  Vec to;
 
   PetscFunctionBeginUser;
-  if (c->wide) PetscCall(VecGhostGetLocalForm(c->c, &to));
+  PetscCall(VecGhostGetLocalForm(c->c, &to));
   PetscCall(VecZeroEntries(to));
   PetscCall(VecGetArray(to, &m));
   PetscCall(VecGetArrayRead(R, &r));
@@ -394,11 +376,9 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
   for (PetscInt k = 0; k < 3 * c->n; k++) norm2[0] += PetscSqr(m[k]) * c->weight[k / 3];
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(VecRestoreArray(to, &m));
-  if (c->wide) {
-    PetscCall(VecGhostRestoreLocalForm(c->c, &to));
-    PetscCall(VecGhostUpdateBegin(c->c, ADD_VALUES, SCATTER_REVERSE));
-    PetscCall(VecGhostUpdateEnd(c->c, ADD_VALUES, SCATTER_REVERSE));
-  }
+  PetscCall(VecGhostRestoreLocalForm(c->c, &to));
+  PetscCall(VecGhostUpdateBegin(c->c, ADD_VALUES, SCATTER_REVERSE));
+  PetscCall(VecGhostUpdateEnd(c->c, ADD_VALUES, SCATTER_REVERSE));
   if (!share) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, s->comm));
   *share = norm2[1] > 0. ? PetscSqrtReal(norm2[0] / norm2[1]) : 0.;
@@ -410,7 +390,7 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   const SbSpace s = c->space;
   const PetscScalar *x;
   PetscScalar *z;
-  Vec from = c->y;
+  Vec from;
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
@@ -418,11 +398,9 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
     PetscCall(SbBlockSolverSolve(c->direct, c->c, c->y));
   else
     PetscCall(PCApply(c->solver, c->c, c->y));
-  if (c->wide) {
-    PetscCall(VecGhostUpdateBegin(c->y, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostUpdateEnd(c->y, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostGetLocalForm(c->y, &from));
-  }
+  PetscCall(VecGhostUpdateBegin(c->y, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostUpdateEnd(c->y, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostGetLocalForm(c->y, &from));
   PetscCall(VecGetArrayRead(from, &x));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -438,7 +416,7 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   }
   PetscCall(VecRestoreArray(Z, &z));
   PetscCall(VecRestoreArrayRead(from, &x));
-  if (c->wide) PetscCall(VecGhostRestoreLocalForm(c->y, &from));
+  PetscCall(VecGhostRestoreLocalForm(c->y, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

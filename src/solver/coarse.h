@@ -15,6 +15,15 @@
 */
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
 
+/* Bodies in contact: own rows of a symmetric matrix of 3x3 blocks on the nodes of a space. */
+typedef struct {
+  PetscInt n;       /* number of own nodes */
+  PetscInt *ia;     /* [n+1] offsets of the rows */
+  PetscInt *ja;     /* [ia[n]] global nodes, ascending in a row */
+  PetscReal *value; /* [ia[n]][9] row-major, N/m */
+  uint8_t *contact; /* [n] the node is in contact */
+} SbContactRows;
+
 /* Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns; by
    unknowns of its own; of P2's edge nodes by the mean of two vertices. */
 typedef enum { SB_MEMBER, SB_ITSELF, SB_MEAN } SbWay;
@@ -28,7 +37,6 @@ struct _p_SbCoarse {
   PetscBool aggregated; /* nodes are aggregated; else all are themselves or means */
   PetscInt nagg, *agg;  /* number of own aggregates; [nnode_owned] that of each node, -1: fully prescribed */
   PetscInt *parent;     /* [nnode][2] vertices of an edge node of P2, else the node twice; NULL: not in use */
-  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; NULL likewise */
   /* of own nodes, then those of other ranks in the rows of A, ascending: */
   PetscInt nall;
   uint8_t *way;      /* [nall] SbWay */
@@ -61,10 +69,9 @@ struct _p_SbCoarse {
    rank's. */
 PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool vertices, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
-/* Finds the units and the pattern of E. A: BAIJ or SBAIJ; ia[nnode_owned+1], ja: its rows, global nodes,
-   NULL: those of the space; contact[nnode_owned]: the node moves by itself; NULL: none. Collective. */
-PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const PetscInt ia[], const PetscInt ja[],
-                                  const uint8_t contact[]);
+/* Finds the units and the pattern of E. A: BAIJ or SBAIJ; rows: its pattern, and nodes in contact, which move
+   by themselves; NULL: that of the space, and none. Collective. */
+PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const SbContactRows *rows);
 /* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern. Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
 /* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be positive
@@ -82,17 +89,6 @@ PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 /* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not collective. */
 PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
 
-/* bodies in contact (pc_coarse.c) */
-
-/* Own rows of a symmetric matrix of 3x3 blocks on the nodes of a space. */
-typedef struct {
-  PetscInt n;       /* number of own nodes */
-  PetscInt *ia;     /* [n+1] offsets of the rows */
-  PetscInt *ja;     /* [ia[n]] global nodes, ascending in a row */
-  PetscReal *value; /* [ia[n]][9] row-major, N/m */
-  uint8_t *contact; /* [n] the node is in contact */
-} SbContactRows;
-
 /* Position of a column in row r, whose columns are ascending; -1: none. */
 static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r, PetscInt column)
 {
@@ -108,8 +104,7 @@ static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], Petsc
   modes of aggregates of the others or the vertices of P2.
 
   Collective; space and rows are borrowed. The operator of pc is a matrix with these rows and the fast
-  product, another matrix when their pattern or the nodes in contact have changed.
+  product, another matrix when their pattern or the nodes in contact have changed. Output: the solver of the
+  coarse space, borrowed.
 */
-PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc);
-/* SbBlockSolverCost() of the coarse space. Collective; after PCSetUp(). */
-PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries);
+PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc, SbBlockSolver *coarse);

@@ -98,30 +98,6 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the blocks of coarse->value into E. */
-static PetscErrorCode fill_matrix(SbCoarse c)
-{
-  PetscInt widest = 0, *columns;
-  PetscScalar *values;
-
-  PetscFunctionBeginUser;
-  for (PetscInt u = 0; u < c->n; u++) widest = PetscMax(widest, 3 * (c->ia[u + 1] - c->ia[u]));
-  PetscCall(PetscMalloc2(widest, &columns, 3 * widest, &values));
-  for (PetscInt u = 0; u < c->n; u++) {
-    const PetscInt n = 3 * (c->ia[u + 1] - c->ia[u]), row = 3 * (c->first + u);
-    const PetscReal *block = c->value + 9 * (size_t)c->ia[u];
-
-    for (PetscInt k = 0; k < n; k++) columns[k] = 3 * c->ja[c->ia[u] + k / 3] + k % 3;
-    for (PetscInt e = 0; e < 3 * n; e++) values[n * (e % 9 / 3) + e / 9 * 3 + e % 3] = block[e];
-    PetscCall(
-      MatSetValues(c->E, 3, (const PetscInt[]){row, row + 1, row + 2}, n, columns, values, ADD_VALUES));
-  }
-  PetscCall(PetscFree2(columns, values));
-  PetscCall(MatAssemblyBegin(c->E, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(c->E, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
 {
   PCFailedReason reason;
@@ -133,18 +109,20 @@ PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
     c->changed = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(fill_matrix(c));
-  /* a diagonal that is not positive, unless parts of it are on other ranks; not a number */
-  for (PetscInt u = 0; u < c->n && !c->wide; u++) {
+  /* the blocks into E; not ok: a diagonal not positive, unless parts of it are on other ranks; not a number */
+  for (PetscInt u = 0; u < c->n; u++) {
     for (PetscInt k = c->ia[u]; k < c->ia[u + 1]; k++) {
-      for (int e = 0; e < 9; e++) {
-        const PetscReal x = c->value[9 * (size_t)k + (size_t)e];
+      const PetscInt i = 3 * (c->first + u), j = 3 * c->ja[k];
+      const PetscReal *block = c->value + 9 * (size_t)k;
 
-        if (PetscIsInfOrNanReal(x) || (c->ja[k] == c->first + u && e % 4 == 0 && x <= 0.))
-          c->ok = PETSC_FALSE;
-      }
+      PetscCall(MatSetValues(c->E, 3, (const PetscInt[]){i, i + 1, i + 2}, 3,
+                             (const PetscInt[]){j, j + 1, j + 2}, block, ADD_VALUES));
+      for (int e = 0; e < 9 && !c->wide; e++)
+        if (PetscIsInfOrNanReal(block[e]) || (i == j && e % 4 == 0 && block[e] <= 0.)) c->ok = PETSC_FALSE;
     }
   }
+  PetscCall(MatAssemblyBegin(c->E, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(c->E, MAT_FINAL_ASSEMBLY));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->ok, 1, SB_MPI_BOOL, MPI_LAND, c->space->comm));
   if (!c->ok) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCSetOperators(c->solver, c->E, c->E));

@@ -44,36 +44,17 @@ struct _p_SbContactSystem {
   PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
   PetscInt *last;    /* [n] last solve in which contact used the row, -1: never */
   PetscInt nsolve;
-  PetscInt limit, most;      /* limits of CG's iterations: by options; by the cost of a factorisation */
-  PetscInt budget;           /* credit of iterations */
-  PetscInt resume, pause;    /* number of the solve in which CG is tried again; solves until then */
-  PetscReal *tangent;        /* [ka[n]][9] blocks of the tangent */
-  PetscBool fresh[2];        /* matrix, factor: lack the current values */
-  PetscBool foreign[2];      /* matrix, factor: have an old pattern */
-  char method[32], type[32]; /* the user's Krylov method and preconditioner, "": none */
-  SbBlockSolver factor;
+  PetscInt limit, most;         /* limits of CG's iterations: by options; by the cost of a factorisation */
+  PetscInt budget;              /* credit of iterations */
+  PetscInt resume, pause;       /* number of the solve in which CG is tried again; solves until then */
+  PetscReal *tangent;           /* [ka[n]][9] blocks of the tangent */
+  PetscBool fresh[2];           /* matrix, factor: lack the current values */
+  PetscBool foreign[2];         /* matrix, factor: have an old pattern */
+  char method[32], type[32];    /* the user's Krylov method and preconditioner, "": none */
+  SbBlockSolver factor, coarse; /* of all; of the coarse space, borrowed */
   KSP ksp;
   Mat A;
 };
-
-PetscErrorCode SbBlocksReserve(SbBlocks *b, PetscInt more)
-{
-  PetscInt size = b->size;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(b->n + more, sizeof(*b->node), &size, &b->node));
-  PetscCall(SbReserve(b->n + more, sizeof(*b->block), &b->size, &b->block));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbBlocksFree(SbBlocks *b)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(b->node));
-  PetscCall(PetscFree(b->block));
-  *b = (SbBlocks){0};
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The user's Krylov method, unless NULL, and preconditioner, "" if not set; room for 32 characters each. */
 static PetscErrorCode user_types(char method[], char type[])
@@ -138,7 +119,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   PetscFunctionBeginUser;
   /* contact blocks by rows */
   PetscCall(PetscMalloc1(b->n, &key));
-  for (PetscInt k = 0; k < b->n; k++) key[k] = b->node[k][0];
+  for (PetscInt k = 0; k < b->n; k++) key[k] = b->block[k].v[0];
   PetscCall(SbBucketByKey(b->n, key, n, &first, &order));
   PetscCall(PetscFree(key));
   for (PetscInt r = 0; r < n; r++)
@@ -161,7 +142,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
       stamp[m++] = c->used[k];
     }
     for (PetscInt k = first[r]; k < first[r + 1]; k++, m++) {
-      column[m] = b->node[order[k]][1];
+      column[m] = b->block[order[k]].v[1];
       stamp[m] = c->nsolve;
     }
     PetscCall(PetscSortIntWithArray(m, column, stamp));
@@ -198,10 +179,10 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscFunctionBeginUser;
   c->nsolve++;
   for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt r = b->node[k][0];
+    const PetscInt r = b->block[k].v[0];
 
     c->last[r] = c->nsolve;
-    missing = (PetscBool)(missing || SbRowFind(rows->ia, rows->ja, r, b->node[k][1]) < 0 ||
+    missing = (PetscBool)(missing || SbRowFind(rows->ia, rows->ja, r, b->block[k].v[1]) < 0 ||
                           (c->space->fixed[r] != 7 && !rows->contact[r]));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
@@ -216,11 +197,11 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   for (PetscInt k = 0; k < c->ka[rows->n]; k++)
     for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
   for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt place = SbRowFind(rows->ia, rows->ja, b->node[k][0], b->node[k][1]);
+    const PetscInt place = SbRowFind(rows->ia, rows->ja, b->block[k].v[0], b->block[k].v[1]);
     PetscReal *to = rows->value + 9 * (size_t)place;
 
     if (c->used[place] >= 0) c->used[place] = c->nsolve;
-    for (int e = 0; e < 9; e++) to[e] += b->block[k][e];
+    for (int e = 0; e < 9; e++) to[e] += b->block[k].H[e];
   }
   c->fresh[0] = c->fresh[1] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -259,19 +240,17 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   const SbSpace s = c->space;
   const SbContactRows *rows = &c->rows;
   PetscBool own = (PetscBool)!c->type[0], apart;
-  PetscMPIInt size;
   Mat P;
   PC pc;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (c->foreign[0]) {
     PetscCall(MatDestroy(&c->A));
     PetscCall(MatCreate(s->comm, &c->A));
     PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
     PetscCall(MatSetBlockSize(c->A, 3));
-    PetscCall(MatSetType(c->A, own && size == 1 ? MATSBAIJ : MATBAIJ));
-    if (own && size == 1) PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
+    PetscCall(MatSetType(c->A, own && !s->ghosted ? MATSBAIJ : MATBAIJ));
+    if (own && !s->ghosted) PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
     PetscCall(MatSeqSBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatSeqBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatMPIBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
@@ -287,7 +266,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
       KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10, own ? MOST : MOST_USER));
     PetscCall(KSPGetPC(c->ksp, &pc));
     if (own)
-      PetscCall(SbPCContactCreate(s, rows, pc));
+      PetscCall(SbPCContactCreate(s, rows, pc, &c->coarse));
     else
       PetscCall(PCSetType(pc, c->type));
     PetscCall(KSPSetFromOptions(c->ksp));
@@ -306,7 +285,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
 }
 
 /* Finds the number of iterations that cost as much as the factorisation. */
-static PetscErrorCode find_most(SbContactSystem c, PC pc)
+static PetscErrorCode find_most(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
   PetscReal nblock = (PetscReal)rows->ia[rows->n], flops[2], entries[2];
@@ -321,7 +300,7 @@ static PetscErrorCode find_most(SbContactSystem c, PC pc)
     c->foreign[1] = PETSC_FALSE;
   }
   PetscCall(SbBlockSolverCost(c->factor, &flops[0], &entries[0]));
-  PetscCall(SbPCContactCost(pc, &flops[1], &entries[1]));
+  PetscCall(SbBlockSolverCost(c->coarse, &flops[1], &entries[1]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nblock, 1, MPIU_REAL, MPI_SUM, c->space->comm));
   nblock += entries[1] / 9.;
   c->most =
@@ -333,7 +312,6 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
                               PetscInt *iterations)
 {
   const PetscBool changed = c->foreign[0];
-  PC pc;
 
   PetscFunctionBeginUser;
   if (c->fresh[0]) PetscCall(set_up_iteration(c));
@@ -342,8 +320,7 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscCall(KSPSetUp(c->ksp));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (!c->type[0]) {
-    PetscCall(KSPGetPC(c->ksp, &pc));
-    if (changed) PetscCall(find_most(c, pc));
+    if (changed) PetscCall(find_most(c));
     c->budget = PetscMin(c->budget + c->most, SAVED * c->most);
     PetscCall(
       KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PetscMin(c->limit, c->budget)));

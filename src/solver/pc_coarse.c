@@ -84,7 +84,6 @@
 typedef struct {
   SbSpace space;
   SbCoarse coarse;
-  PetscInt nsetup;
   PetscBool guess_given;
   /* two-level */
   PetscInt wanted;     /* number of aggregates, 0: by the number of nodes */
@@ -161,21 +160,19 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     PetscInt wanted = p->wanted, limit = p->limit, nfree = 0, total;
     PetscReal nu = 0.;
     PetscBool spread;
-    PetscMPIInt size;
 
-    PetscCallMPI(MPI_Comm_size(s->comm, &size));
     /* 300 was best for 36,000 nodes (192,000 tets); the factor's cost grows faster than their number */
     if (!wanted)
       wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
     if (limit < 0)
-      limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (size * NODES_PER_FACTORED)));
-    spread = (PetscBool)(size > 1 && wanted > limit);
+      limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (s->size * NODES_PER_FACTORED)));
+    spread = (PetscBool)(s->size > 1 && wanted > limit);
     if (spread && !p->wanted) wanted = s->Nnode / NODES_PER_SPREAD;
     for (PetscInt i = 0; i < s->nnode_owned; i++) nfree += s->fixed[i] != 7;
     PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
     wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
     PetscCall(SbCoarseCreate(s, wanted, PETSC_FALSE, &p->coarse));
-    PetscCall(SbCoarseSetPattern(p->coarse, A, NULL, NULL, NULL));
+    PetscCall(SbCoarseSetPattern(p->coarse, A, NULL));
     if (p->coarse->N) PetscCall(SbCoarseCreateSolver(p->coarse, (PetscBool)!spread));
     for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
@@ -189,7 +186,6 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     PetscCall(set_up_fine(p, pc, A, &ok));
   }
   PetscCall(SbCoarseSetUp(p->coarse, A));
-  p->nsetup++;
   PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates, %s%s\n", p->coarse->N / 2,
                       p->coarse->spread ? "spread over the ranks" : "factored by one of them",
                       p->coarse->ok ? "" : ": the coarse operator is not positive definite"));
@@ -219,12 +215,10 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
     PetscCall(MatCreateVecs(A, &p->p, NULL));
   }
   /* another matrix of contact has another pattern */
-  if (p->rows && id != p->pattern)
-    PetscCall(SbCoarseSetPattern(c, A, p->rows->ia, p->rows->ja, p->rows->contact));
+  if (!p->pattern || (p->rows && id != p->pattern)) PetscCall(SbCoarseSetPattern(c, A, p->rows));
   if (!p->rows && !p->pattern) {
     char type[SB_NAME_MAX] = "";
 
-    PetscCall(SbCoarseSetPattern(c, A, NULL, NULL, NULL));
     PetscCall(PetscOptionsGetString(NULL, "pc_coarse_", "-pc_type", type, sizeof(type), NULL));
     PetscCall(SbCoarseCreateSolver(c, (PetscBool)(3 * c->N <= FACTORED && strcmp(type, PCGAMG))));
   }
@@ -241,7 +235,7 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
       ok = PETSC_FALSE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
-  if (ok || p->rows) PetscCall(SbCoarseSetUp(c, A)); /* SbPCContactCost() needs it */
+  if (ok || p->rows) PetscCall(SbCoarseSetUp(c, A)); /* the cost of the coarse space needs it */
   c->ok = (PetscBool)(ok && c->ok);
   PetscCall(PCSetFailedReason(pc, c->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
@@ -387,15 +381,13 @@ static PetscErrorCode PCPostSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
 
 static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
 {
-  PetscInt count[2] = {0, 0};
+  PetscInt count[2] = {0, 0}, most;
   PetscViewer own;
-  PetscMPIInt rank;
   TwoLevel *p;
   SbCoarse c;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
   c = p->coarse;
   if (c && !c->aggregated) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "  Gauss-Seidel on P2; P1 on the vertices by:\n"));
@@ -405,20 +397,23 @@ static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
   if (c && c->parent)
     PetscCall(PetscViewerASCIIPrintf(
       viewer, "  Gauss-Seidel, and the vertices of P2 bodies in the place of their aggregates\n"));
-  count[0] = c ? c->nagg : 0;
+  count[0] = most = c ? c->nagg : 0;
   for (PetscInt i = 0; p->rows && i < p->rows->n; i++) count[1] += p->rows->contact[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, p->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, p->space->comm));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each",
                                    count[0]));
   if (p->rows)
     PetscCall(PetscViewerASCIIPrintf(viewer, ", and %" PetscInt_FMT " nodes of contact\n", count[1]));
+  else if (c && c->spread)
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer, ", spread over the ranks, at most %" PetscInt_FMT " on one; fine level:\n", most));
   else
-    PetscCall(PetscViewerASCIIPrintf(viewer, ", %s; fine level:\n",
-                                     c && c->spread ? "spread over the ranks" : "factored by one of them"));
+    PetscCall(PetscViewerASCIIPrintf(viewer, ", factored by one of the ranks; fine level:\n"));
   if (p->fine && p->simple) PetscCall(PCView(p->fine, viewer));
   if (p->fine && !p->simple) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
-    if (!rank) PetscCall(PCView(p->fine, own));
+    if (!p->space->rank) PetscCall(PCView(p->fine, own));
     PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -492,7 +487,7 @@ PetscErrorCode SbPCPMultigridCreate(SbSpace s, PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
+PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc, SbBlockSolver *coarse)
 {
   PetscInt nodes = NODES, nvertex = 0;
   TwoLevel *p;
@@ -504,21 +499,13 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
   p->rows = rows;
   if (s->plan->face_term[0]) nodes = PetscClipInterval(s->Nnode / AGGREGATES, NODES_FACES, NODES);
   PetscCall(SbCoarseCreate(s, (s->nnode_owned + nodes - 1) / nodes, PETSC_TRUE, &p->coarse));
-  PetscCall(SbBlockSolverCreate(s->comm, &p->coarse->direct));
+  PetscCall(SbBlockSolverCreate(s->comm, coarse));
+  p->coarse->direct = *coarse;
   /* P2: the vertices are the coarse space while there are few */
-  for (PetscInt i = 0; p->coarse->vertex && i < s->nnode_owned; i++) nvertex += p->coarse->vertex[i];
+  for (PetscInt i = 0; p->coarse->parent && i < s->nnode_owned; i++)
+    nvertex += p->coarse->parent[2 * i] == i && s->element[s->node_body[i]]->nodes_per[1];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nvertex, 1, MPIU_INT, MPI_SUM, s->comm));
   if (nvertex > VERTICES) PetscCall(PetscFree(p->coarse->parent));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries)
-{
-  TwoLevel *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &p));
-  PetscCall(SbBlockSolverCost(p->coarse->direct, flops, entries));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -539,22 +526,5 @@ PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *c
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(set_up_fine(p, pc, A, &ok));
   *changed = ok;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
-                                  PetscBool *simple)
-{
-  PetscMPIInt rank;
-  TwoLevel *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbPCShellFind(pc, NAME, &p));
-  PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
-  PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
-  if (naggregate) *naggregate = p->coarse ? p->coarse->N / 2 : 0;
-  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->nagg : rank ? 0 : p->coarse->N / 2;
-  if (nsetup) *nsetup = p->nsetup;
-  if (simple) *simple = p->simple;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -97,50 +97,22 @@ static PetscErrorCode find_means(SbLevels v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x, or 0 at a prescribed component of node i. */
-static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscReal x)
-{
-  return s->fixed[i] & (1 << c) ? 0. : x;
-}
-
 /* The cycle for CR. */
 static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
-  SbSpace s = v->at[k], p = v->at[k + 1];
-  Mat A = v->A[k];
-  const PetscReal *x;
-  PetscScalar *out;
 
   PetscFunctionBeginUser;
-  PetscCall(SbGaussSeidelDown(A, v->inverse, NULL, r, z, v->t[k]));
-  /* the residual of the vertices */
-  PetscCall(SbSpaceGetLocalRead(s, v->t[k], &x));
-  PetscCall(VecZeroEntries(v->r[k + 1]));
-  PetscCall(VecGetArray(v->r[k + 1], &out));
-  for (PetscInt i = 0; i < s->nnode; i++) {
-    for (PetscInt a = 0; a < 3; a++) {
-      const PetscInt u = v->corner[3 * i + a];
-
-      for (PetscInt c = 0; c < 3 && u < p->nnode_owned; c++)
-        out[3 * u + c] += unless_fixed(p, u, c, unless_fixed(s, i, c, x[3 * i + c] / 3.));
-    }
-  }
-  PetscCall(VecRestoreArray(v->r[k + 1], &out));
-  PetscCall(SbSpaceRestoreLocalRead(s, v->t[k], &x));
-  /* their correction, interpolated to the faces */
+  PetscCall(SbGaussSeidelDown(v->A[k], v->inverse, NULL, r, z, v->t[k]));
+  /* the residual of the vertices; their correction, interpolated to the faces */
+  PetscCall(SbSpaceZeroPrescribed(v->at[k], PETSC_TRUE, v->t[k]));
+  PetscCall(MatMultTranspose(v->P, v->t[k], v->r[k + 1]));
+  PetscCall(SbSpaceZeroPrescribed(v->at[k + 1], PETSC_TRUE, v->r[k + 1]));
   PetscCall(KSPSolve(v->coarse, v->r[k + 1], v->z[k + 1]));
-  PetscCall(SbSpaceGetLocalRead(p, v->z[k + 1], &x));
-  PetscCall(VecGetArray(z, &out));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscInt *a = v->corner + 3 * i;
-
-    for (PetscInt c = 0; c < 3; c++)
-      out[3 * i + c] += unless_fixed(s, i, c, (x[3 * a[0] + c] + x[3 * a[1] + c] + x[3 * a[2] + c]) / 3.);
-  }
-  PetscCall(VecRestoreArray(z, &out));
-  PetscCall(SbSpaceRestoreLocalRead(p, v->z[k + 1], &x));
-  PetscCall(SbGaussSeidelUp(A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(MatMult(v->P, v->z[k + 1], v->t[k]));
+  PetscCall(SbSpaceZeroPrescribed(v->at[k], PETSC_TRUE, v->t[k]));
+  PetscCall(VecAXPY(z, 1., v->t[k]));
+  PetscCall(SbGaussSeidelUp(v->A[k], v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,10 +135,10 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   for (PetscInt i = 0; i < s->nnode; i++) {
     const PetscInt k = v->mean[i];
 
-    for (PetscInt c = 0; c < 3 && k < v->at[1]->nnode_owned; c++)
-      out[3 * k + c] += unless_fixed(v->at[1], k, c, x[3 * i + c]);
+    for (PetscInt c = 0; c < 3 && k < v->at[1]->nnode_owned; c++) out[3 * k + c] += x[3 * i + c];
   }
   PetscCall(VecRestoreArray(v->r[1], &out));
+  PetscCall(SbSpaceZeroPrescribed(v->at[1], PETSC_TRUE, v->r[1]));
   PetscCall(cycle_faces(v, v->r[1], v->z[1]));
   PetscCall(SbSpaceGetLocalRead(v->at[1], v->z[1], &mean));
   PetscCall(VecGetArrayRead(v->t[0], &diagonal));
@@ -262,8 +234,8 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     /* diagonal of the face terms and the mass matrix, without the cells */
     PetscCall(VecGetArray(v->r[0], &d));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[s->node_body[i]],
-                      inertia = v->shift_a + v->shift_v * s->alpha[s->node_body[i]];
+      const PetscReal stiffness = v->stage.shift_k + v->stage.shift_v * s->beta[s->node_body[i]],
+                      inertia = v->stage.shift_a + v->stage.shift_v * s->alpha[s->node_body[i]];
 
       d[3 * i] = stiffness * p->face_term[0][p->diagonal[i]] + inertia * s->node_mass[i];
     }
@@ -277,9 +249,10 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
       const PetscReal w = v->weight[i];
 
       if (i >= s->nnode_owned || j < 0) continue;
-      v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
-                         2. * w * (1. - w) * (v->shift_k + v->shift_v * s->beta[s->node_body[i]]) *
-                           p->face_term[at < 0][at < 0 ? ~at : at]);
+      v->jump[i] =
+        1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
+              2. * w * (1. - w) * (v->stage.shift_k + v->stage.shift_v * s->beta[s->node_body[i]]) *
+                p->face_term[at < 0][at < 0 ? ~at : at]);
     }
     PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   }
@@ -294,6 +267,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
 {
   SbLevels v;
+  Mat P;
   PC pc;
   SbSpace upper, lower;
 
@@ -315,14 +289,20 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   PetscCall(add_level(v, PETSC_TRUE));
   upper = v->at[v->n - 2];
   lower = v->at[v->n - 1];
-  PetscCall(PetscMalloc1(3 * upper->nnode, &v->corner));
-  for (PetscInt i = 0; i < 4 * upper->mesh->ncell; i++) {
-    const PetscInt *vertex = lower->cell_node + 4 * (i / 4), a = i % 4;
+  PetscCall(MatCreateAIJ(s->comm, upper->nnode_owned, lower->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, 3,
+                         NULL, 3, NULL, &P));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt *vertex = lower->cell_node + 4 * (i / 4), a = i % 4, node = upper->cell_node[i];
     const PetscBool face = (PetscBool)!SbSpaceCellElement(upper, i / 4)->nodes_per[0];
 
-    for (PetscInt k = 0; k < 3; k++)
-      v->corner[3 * upper->cell_node[i] + k] = vertex[face ? (a + 1 + k) % 4 : a];
+    for (PetscInt k = 0; k < (face ? 3 : 1) && node < upper->nnode_owned; k++)
+      PetscCall(MatSetValue(P, upper->gnode[node], lower->gnode[vertex[face ? (a + 1 + k) % 4 : a]],
+                            face ? 1. / 3. : 1., INSERT_VALUES));
   }
+  PetscCall(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatCreateMAIJ(P, 3, &v->P));
+  PetscCall(MatDestroy(&P));
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(SbSpaceCreateVec(v->at[k], &v->r[k]));
     PetscCall(SbSpaceCreateVec(v->at[k], &v->z[k]));
@@ -357,7 +337,7 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
     PetscCall(VecDestroy(&v->t[k]));
   }
   PetscCall(PetscFree4(v->mean, v->across, v->weight, v->jump));
-  PetscCall(PetscFree(v->corner));
+  PetscCall(MatDestroy(&v->P));
   PetscCall(KSPDestroy(&v->coarse));
   PetscCall(PCDestroy(&v->multigrid));
   PetscCall(PetscFree(*levels));

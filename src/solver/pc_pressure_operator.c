@@ -13,8 +13,8 @@
 #include "sbkernel.h"
 #include "sbsolver.h"
 
-#define PRESSURE_OPERATOR "SbPressureOperator"
-#define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define S0 1.5             /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
 
 static void clear_fixed(SbSpace s, PetscReal x[])
 {
@@ -62,30 +62,20 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
                                              PetscReal factor, PetscScalar y[])
 {
   SbSpace s = op->space;
-  const PetscScalar *q;
-  PetscScalar *x;
   PetscReal *f;
-  Vec local = op->p;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArray(op->p, &x));
-  PetscCall(PetscArraycpy(x, p, s->mesh->ncell_owned));
-  PetscCall(VecRestoreArray(op->p, &x));
-  if (s->ghosted) {
-    PetscCall(VecGhostUpdateBegin(op->p, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostUpdateEnd(op->p, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostGetLocalForm(op->p, &local));
-  }
-  PetscCall(VecGetArrayRead(local, &q));
-  PetscCall(SbSpaceGetLocalWrite(s, op->y, &f));
+  PetscCall(PetscArraycpy(op->p, p, s->mesh->ncell_owned));
+  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 1, MPIU_REAL, op->p, op->p));
+  PetscCall(SbSpaceGetLocalWrite(s, op->u, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
-  /* y[nnode][3] += B^T p, complete on owned nodes; p[ncell] with ghosts. */
+  /* f = B^T p, complete on owned nodes */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
-      const PetscReal *value = q + s->batch_cell[b];
+      const PetscReal *value = op->p + s->batch_cell[b];
       SbPack force[30], lane = {0};
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
@@ -97,9 +87,7 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
   }
   clear_fixed(s, f);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
-  PetscCall(SbSpaceRestoreLocalWrite(s, op->y, &f));
-  PetscCall(VecRestoreArrayRead(local, &q));
-  if (s->ghosted) PetscCall(VecGhostRestoreLocalForm(op->p, &local));
+  PetscCall(SbSpaceRestoreLocalWrite(s, op->u, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,17 +192,6 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
-{
-  void (*mark)(void) = NULL;
-
-  PetscFunctionBeginUser;
-  *op = NULL;
-  PetscCall(PetscObjectQueryFunction((PetscObject)K, PRESSURE_OPERATOR, &mark));
-  if (mark) PetscCall(MatShellGetContext(K, op));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The matrices of all levels without the volumetric part, which goes to op->volume. */
 static PetscErrorCode assemble(Mat K, const SbStage *stage)
 {
@@ -224,9 +201,7 @@ static PetscErrorCode assemble(Mat K, const SbStage *stage)
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
   v = op->levels;
-  v->shift_a = stage->shift_a;
-  v->shift_v = stage->shift_v;
-  v->shift_k = stage->shift_k;
+  v->stage = *stage;
   if (v->spring) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
   PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -258,7 +233,7 @@ static PetscErrorCode finish(Mat K)
   PetscCall(SbLevelsShareSprings(op->levels));
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
-  /* C, its inverse and S of the cells, from the moduli of the last assembly */
+  /* C, its inverse, S and weight of the cells, from the moduli of the last assembly */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -270,10 +245,13 @@ static PetscErrorCode finish(Mat K)
 
         for (int k = 0; k < 3 * region->nnode; k++)
           square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
-        op->norm[c] = PetscSqrtReal(square);
         op->Cinv[c] = modulus / V;
         op->C[c] = modulus > 0. ? V / modulus : 1.;
         op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
+        op->weight[c] = 1.;
+        if (modulus > 0.)
+          op->weight[c] =
+            PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
       }
     }
   }
@@ -288,13 +266,10 @@ static PetscErrorCode MatDestroy_Pressure(Mat K)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
-  PetscCall(PetscObjectComposeFunction((PetscObject)K, PRESSURE_OPERATOR, NULL));
   PetscCall(SbLevelsDestroy(&op->levels));
   PetscCall(PetscFree(op->memory));
-  PetscCall(PetscFree4(op->C, op->Cinv, op->S, op->norm));
+  PetscCall(PetscFree5(op->C, op->Cinv, op->S, op->weight, op->p));
   PetscCall(VecDestroy(&op->u));
-  PetscCall(VecDestroy(&op->y));
-  PetscCall(VecDestroy(&op->p));
   PetscCall(VecDestroy(&op->a));
   PetscCall(VecDestroy(&op->b));
   PetscCall(PetscFree(op));
@@ -303,9 +278,8 @@ static PetscErrorCode MatDestroy_Pressure(Mat K)
 
 PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
 {
-  const PetscInt n = s->mesh->ncell_owned, nall = s->mesh->ncell;
+  const PetscInt n = s->mesh->ncell_owned;
   SbPressureOperator op;
-  PetscInt first, *number;
 
   PetscFunctionBeginUser;
   PetscCheck(!s->faces != !s->edge_node, s->comm, PETSC_ERR_USER,
@@ -320,16 +294,8 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
   op->volume.modulus = op->volume.b + op->volume.stride * s->nbatch;
   op->volume.shear = op->volume.modulus + s->nbatch;
-  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
+  PetscCall(PetscMalloc5(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->weight, s->mesh->ncell, &op->p));
   PetscCall(SbSpaceCreateVec(s, &op->u));
-  PetscCall(SbSpaceCreateVec(s, &op->y));
-  /* one value per cell, with ghosts */
-  PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
-  PetscCall(PetscMalloc1(nall, &number));
-  for (PetscInt c = 0; c < n; c++) number[c] = first - n + c;
-  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 1, MPIU_INT, number, number));
-  PetscCall(VecCreateGhost(s->comm, n, PETSC_DECIDE, nall - n, number + n, &op->p));
-  PetscCall(PetscFree(number));
   PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));
@@ -340,7 +306,6 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(MatSetOption(*K, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*K, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*K));
-  PetscCall(PetscObjectComposeFunction((PetscObject)*K, PRESSURE_OPERATOR, MatMult_Pressure));
   op->assembly = (SbAssembly){op->levels->A[0], assemble, add_spring, finish};
   PetscCall(SbMatrixSetAssembly(*K, &op->assembly));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,12 +15,12 @@ struct _p_SbLevels {
   SbSpace at[3]; /* at[0] = space; the others are owned */
   Mat A[3];      /* matrices of the levels: BAIJ; the last one AIJ */
   SbElement *element[3];
-  PetscReal shift_a, shift_v, shift_k; /* shifts of the last assembly */
-  PetscInt *mean;       /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
-  PetscInt *across;     /* [nnode] node on the other side of the face, -1: none */
-  PetscReal *weight;    /* [nnode] own weight in the mean of the two sides */
-  PetscReal *jump;      /* [nnode_owned] inverse stiffness of the jump, m/N */
-  PetscInt *corner;     /* [nodes of at[n-2]][3] local vertices of the face; P1: its vertex three times */
+  SbStage stage;     /* of the last assembly: its shifts */
+  PetscInt *mean;    /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
+  PetscInt *across;  /* [nnode] node on the other side of the face, -1: none */
+  PetscReal *weight; /* [nnode] own weight in the mean of the two sides */
+  PetscReal *jump;   /* [nnode_owned] inverse stiffness of the jump, m/N */
+  Mat P;             /* of at[n-2] and at[n-1]: a face has the mean of its vertices; else the node itself */
   Vec r[3], z[3], t[3]; /* work vectors with ghosts; t[0] is the diagonal of A[0] with a DG body */
   PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none so far */
   PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before any rank has springs */
@@ -40,24 +40,22 @@ PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 
 /* The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C =
-   V / lambda. */
+   V / lambda. The context of the matrix of SbPressureOperatorCreate(). */
 typedef struct _p_SbPressureOperator *SbPressureOperator;
 struct _p_SbPressureOperator {
   SbSpace space; /* borrowed */
   SbLevels levels;
   SbAssembly assembly; /* how the matrix is assembled */
   SbVolumetric volume;
-  void *memory;    /* data of SbVolumetric, owned */
-  PetscReal *C;    /* [ncell_owned] m^3/Pa; 1 where the cell's volumetric part stays in A */
-  PetscReal *Cinv; /* [ncell_owned] Pa/m^3; 0 for such cells */
-  PetscReal *S;    /* [ncell_owned] C + S0 V / (2 mu), m^3/Pa: approximates C + B A^-1 B^T */
-  PetscReal *norm; /* [ncell_owned] Euclidean norm of the cell's row of B, m^2 */
-  Vec u, y;        /* ghosted work vectors */
-  Vec p;           /* pressures of cells with ghosts, Pa */
-  Vec a, b;        /* vectors for A that borrow their arrays */
+  void *memory;      /* data of SbVolumetric, owned */
+  PetscReal *C;      /* [ncell_owned] m^3/Pa; 1 where the cell's volumetric part stays in A */
+  PetscReal *Cinv;   /* [ncell_owned] Pa/m^3; 0 for such cells */
+  PetscReal *S;      /* [ncell_owned] C + S0 V / (2 mu), m^3/Pa: approximates C + B A^-1 B^T */
+  PetscReal *weight; /* [ncell_owned] of the cells' rows in the norm of GMRES, N/m^3 */
+  PetscReal *p;      /* [ncell] pressures of the cells, Pa */
+  Vec u;             /* work vector with ghosts */
+  Vec a, b;          /* vectors for A that borrow their arrays */
 };
-/* The operator behind a matrix of SbPressureOperatorCreate(), else NULL. Not collective. */
-PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op);
 /* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts. Collective. */
 PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
                                        PetscScalar y[], PetscScalar d[]);

@@ -27,11 +27,11 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   PetscCall(PetscArrayzero(s->crossing, t->ntri));
   PetscCall(SbBoxTreeCreateTriangles(t->ntri, t->tri, t->x, &tree));
   for (PetscInt i = 0, other; i < t->ntri; i++) {
-    SbBoxQuery query;
+    SbBoxNearest query;
     PetscReal box[6];
 
     SbTriangleBox(t->x, t->tri + 3 * i, box);
-    for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &other);) {
+    for (SbBoxNearestBegin(&tree, box, 0, &query); SbBoxNearestNext(&query, &other);) {
       if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other)) continue;
       if (s->n < NAMED) PetscCall(PetscArraycpy(s->pair[s->n], ((const PetscInt[2]){i, other}), 2));
       s->crossing[i] = s->crossing[other] = PETSC_TRUE;

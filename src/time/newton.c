@@ -176,7 +176,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
     PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
     PetscCall(VecAYPX(n->rhs, n->run->barrier_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++)
-      for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->barrier_weight;
+      for (int i = 0; i < 9; i++) n->blocks.block[k].H[i] *= n->run->barrier_weight;
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
@@ -702,7 +702,8 @@ static PetscErrorCode SNESReset_Newton(SNES snes)
 
   PetscFunctionBeginUser;
   PetscCall(SbContactSystemDestroy(&n->system));
-  PetscCall(SbBlocksFree(&n->blocks));
+  PetscCall(PetscFree(n->blocks.block));
+  n->blocks.size = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

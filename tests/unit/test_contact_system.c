@@ -84,11 +84,11 @@ static PetscErrorCode check_changes(PetscInt way)
 
   /* a large negative diagonal */
   for (PetscInt k = 0; k < p.blocks.n; k++)
-    for (int e = 0; e < 9; e++) p.blocks.block[k][e] *= -1.;
+    for (int e = 0; e < 9; e++) p.blocks.block[k].H[e] *= -1.;
   PetscCall(SbContactSystemSolve(system, p.K, &p.blocks, PETSC_TRUE, p.F, p.Y, &reason, &its));
   SB_CHECK(reason < 0, "an indefinite matrix was solved with: %s", KSPConvergedReasons[reason]);
   for (PetscInt k = 0; k < p.blocks.n; k++)
-    for (int e = 0; e < 9; e++) p.blocks.block[k][e] *= -1.;
+    for (int e = 0; e < 9; e++) p.blocks.block[k].H[e] *= -1.;
   PetscCall(solve(&p, system, "after an indefinite matrix", &its));
   PetscCall(SbContactSystemDestroy(&system));
   PetscCall(contact_problem_close(&p));

@@ -120,7 +120,7 @@ static PetscErrorCode test_operator(const char *options, PetscReal amplitude, co
   PetscCall(VecNorm(Kx, NORM_2, &error));
   SB_CHECK(norm > 0. && error < 1e-12 * norm, "%s: operator and matrix differ by %g of %g", options, error,
            norm);
-  PetscCall(SbPressureOperatorGet(K, &op));
+  PetscCall(MatShellGetContext(K, &op));
   PetscCall(SbLevelsSetUp(op->levels, &positive));
   SB_CHECK(positive, "a diagonal block is not positive");
   PetscCall(SbLevelsApply(op->levels, x, Kx));
