@@ -21,10 +21,6 @@ typedef enum {
 } SbTangentKind;
 
 typedef struct {
-  /* reads -body_<name>_...; scope = {"body", <law>, <name>} */
-  PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
-  /* checks that the law has this tangent, sets `tangent` and `frame`; NULL when there is one tangent only */
-  PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume:
@@ -40,7 +36,7 @@ typedef struct {
   /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as for a law
      of R^T F: fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is cheaper than the full
      tangent. W = -mu I is Hooke's tensor turned by R. NULL when the law is not of this kind. Co-rotated has
-     it with its exact tangents. */
+     it with its exact tangents; with the warped one `frame` takes its place. */
   void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
@@ -69,21 +65,19 @@ struct _p_SbMaterial {
 };
 
 extern PetscFunctionList SbMaterialList;
-/* Adds a law and the rows of its options (classes "body" and "inclusion", type = law). create() fills the
-   table, `tangent` and the flags of a material whose numbers are set. Not collective, same on all ranks. */
-PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
-                                  const SbOption rows[]);
+/* Adds a law; tangent: its option of this name (classes "body" and "inclusion", type = law), NULL: it has one
+   tangent only. create() fills the table and the flags of a material whose numbers are set. The first tangent
+   is the warped one of a law with a spin, else the exact one. Not collective, same on all ranks. */
+PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial), const SbOption *tangent);
 /* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/* Creates the law by name and reads young, poisson, density and the law's own options. body: the scope of the
-   body or inclusion (its `type` is not examined). The material is owned by the caller. Errors: PETSC_ERR_USER
-   for an unknown law and for what the option readers and the next two refuse. Not collective, same on all
-   ranks. */
+/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope of the body
+   or inclusion (its `type` is not examined). The material is owned by the caller. Errors: PETSC_ERR_USER for
+   an unknown law and for what the option readers refuse. Not collective, same on all ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
-/* The same from numbers: E in Pa, nu without unit, density in kg/m^3, first tangent. Reads no options; messages
-   begin with `where`. */
+/* The same from numbers: E > 0 in Pa, nu in (-1, 0.5), density > 0 in kg/m^3, first tangent. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       const char *where, SbMaterial *m);
+                                       SbMaterial *m);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
 /* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its tangent follows

@@ -44,7 +44,7 @@ struct _p_SbModel {
   SbMaterial *material;           /* [nmaterial] one per body, then those of inclusions */
   char (*inclusion)[SB_NAME_MAX]; /* [nmaterial - nbody] names of the inclusions */
   SbElement *element;             /* [nbody] */
-  SbStart *start;                 /* [nbody] NULL: at rest, with the bodies' velocities */
+  SbStart *start;                 /* [nbody] */
   PetscReal t_begin;              /* s, at set-up: 0, or the time of re-meshing */
   SbMesh mesh;
   SbSpace space;
@@ -55,7 +55,7 @@ struct _p_SbModel {
     nupdate_active_set, ntime_of_impact, nrestitution, npotential;
   SbEffect *lists, *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
     *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
-  struct {
+  struct _SbBounce {
     Vec U0, V0;     /* state at the start of the step; borrowed */
     PetscReal dt;   /* length of the step, s */
     PetscReal left; /* factor on the coefficients of restitution in this step */
@@ -71,7 +71,8 @@ struct _p_SbModel {
 };
 
 PetscErrorCode SbModelDestroy(SbModel *model);
-/* After bodies, sets, materials, elements and effects: mesh, space, set-up, lists. Collective. */
+/* After bodies, sets, materials, elements and effects: mesh, space, set-up, lists. With -validate the
+   invariants of mesh and space are checked: ordering, ranges, ownership, sums. Collective. */
 PetscErrorCode SbModelSetUp(SbModel model);
 /* F = M a + C v + f_int(u) - f_ext(t, u, v); zero where prescribed if constrain, else the reaction.
    V, A may be NULL. Collective. */

@@ -42,8 +42,8 @@ PetscErrorCode SbRegisterAll(void);
 
   Options read: -bodies and -body_<name>_..., -sets and -set_<name>_at, -effects and -effect_<name>_...; -mass
   and -mesh_..., which are used later, so that their values are checked before anything is computed.
-  A set that an effect names in its option `on` and -sets does not define is, in this order: the body of that
-  name, all bodies ("all"), the whole boundary ("boundary"), the physical group of that name in the meshes.
+  A set that is named and that -sets does not define is, in this order: the body of that name, all bodies
+  ("all"), the whole boundary ("boundary"), the physical group of that name in the meshes.
   Errors: PETSC_ERR_USER for a missing or unknown name, doubled names, values out of range.
 */
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model);
@@ -58,5 +58,3 @@ PetscErrorCode SbSceneCheck(SbModel model);
 
 /* Warns of bodies so large that their files may be in mm. Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneCheckSizes(SbModel model);
-/* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective. */
-PetscErrorCode SbSceneValidate(SbModel model);

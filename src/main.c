@@ -38,7 +38,6 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
   PetscCall(SbSceneCheckSizes(s->model));
-  PetscCall(SbSceneValidate(s->model));
   PetscCall(SbRunSetUp(s->run));
   PetscCall(SbOutputLoadState(s->run));
   PetscCall(SbLedgerAttach(s->ledger));

@@ -73,18 +73,6 @@ static void frame_corotated(const struct _p_SbMaterial *m, const SbPack F[9], Sb
   SbPolar(F, R);
 }
 
-/* S = sym(R^T F) as 00 01 02 11 12 22, kappa. */
-SB_KERNEL static void stretch(PetscReal lambda, PetscReal mu, const SbPack F[restrict 9],
-                              const SbPack R[restrict 9], SbPack S[restrict 6], SbPack kappa)
-{
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal r[9];
-
-    SbStretchTensor(F, R, l, r, S);
-    kappa[l] = lambda * (S[0][l] + S[3][l] + S[5][l] - 3) - 2 * mu;
-  }
-}
-
 /* W = kappa (q I - S)^-1 */
 SB_KERNEL static void twist_exact(const SbPack S[restrict 6], const SbPack kappa, SbPack W[restrict 9])
 {
@@ -130,14 +118,34 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
   }
 }
 
-/* C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
-   j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1. */
-SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
-                                const SbPack W[restrict 9], SbPack C[restrict 81])
+SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                     SbPack R[restrict 9], SbPack W[restrict 9])
 {
   const PetscReal mu = m->mu, lambda = m->lambda;
-  SbPack ZW[27];
+  SbPack S[6], kappa;
 
+  SbPolar(F, R);
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal r[9];
+
+    SbStretchTensor(F, (const SbPack *)R, l, r, S);
+    kappa[l] = lambda * (S[0][l] + S[3][l] + S[5][l] - 3) - 2 * mu;
+  }
+  if (m->tangent == SB_TANGENT_EXACT_SPD)
+    twist_spd(mu, (const SbPack *)S, kappa, W);
+  else
+    twist_exact((const SbPack *)S, kappa, W);
+}
+
+/* C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
+   j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1. */
+SB_KERNEL static void tangent_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                        SbPack C[restrict 81])
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+  SbPack R[9], W[9], ZW[27];
+
+  spin_corotated(m, F, R, W);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], w[9];
 
@@ -165,46 +173,12 @@ SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[re
   }
 }
 
-static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9])
+void SbMaterialCreate_Corotated(SbMaterial m)
 {
-  SbPack S[6], kappa;
-
-  SbPolar(F, R);
-  stretch(m->lambda, m->mu, F, (const SbPack *)R, S, kappa);
-  if (m->tangent == SB_TANGENT_EXACT_SPD)
-    twist_spd(m->mu, (const SbPack *)S, kappa, W);
-  else
-    twist_exact((const SbPack *)S, kappa, W);
-}
-
-static void tangent_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
-{
-  SbPack R[9], W[9];
-
-  spin_corotated(m, F, R, W);
-  add_modes(m, (const SbPack *)R, (const SbPack *)W, C);
-}
-
-static PetscErrorCode settangent_corotated(SbMaterial m, SbTangentKind kind)
-{
-  PetscFunctionBeginUser;
-  m->tangent = kind;
-  m->ops.frame = kind == SB_TANGENT_WARPED ? frame_corotated : NULL;
-  m->ops.spin = kind == SB_TANGENT_WARPED ? NULL : spin_corotated;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
-{
-  PetscFunctionBeginUser;
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
-  m->ops.settangent = settangent_corotated;
-  m->ops.energy = energy_corotated;
-  m->ops.stress = stress_corotated;
-  m->ops.pressure = pressure_corotated;
-  m->ops.frame = frame_corotated;
-  m->ops.tangent = tangent_corotated;
-  m->ops.volumetric = frame_corotated;
-  m->tangent = SB_TANGENT_WARPED;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  m->ops = (SbMaterialOps){.energy = energy_corotated,
+                           .stress = stress_corotated,
+                           .pressure = pressure_corotated,
+                           .spin = spin_corotated,
+                           .tangent = tangent_corotated,
+                           .volumetric = frame_corotated};
 }

@@ -69,16 +69,13 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
   }
 }
 
-PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
+void SbMaterialCreate_Linear(SbMaterial m)
 {
-  PetscFunctionBeginUser;
-  m->ops.energy = energy_linear;
-  m->ops.stress = stress_linear;
-  m->ops.pressure = pressure_linear;
-  m->ops.frame = frame_linear;
-  m->ops.tangent = tangent_linear;
-  m->ops.volumetric = frame_linear;
+  m->ops = (SbMaterialOps){.energy = energy_linear,
+                           .stress = stress_linear,
+                           .pressure = pressure_linear,
+                           .frame = frame_linear,
+                           .tangent = tangent_linear,
+                           .volumetric = frame_linear};
   m->linear = PETSC_TRUE;
-  m->tangent = SB_TANGENT_EXACT;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

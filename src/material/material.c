@@ -1,5 +1,5 @@
 /*
-  Creation of material laws by name, their options, and functions shared by several laws: tangents, damping.
+  The material laws: their names and options, creation, choice of the tangent, damping.
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
@@ -8,6 +8,22 @@
 
 PetscFunctionList SbMaterialList = NULL;
 
+static const SbOption body_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
+   "mass per volume in the reference configuration"},
+};
+/* of laws with and without a warped tangent */
+static const SbOption tangents[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive definite); "
+   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
+   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, for CG"},
+};
+
 static PetscErrorCode destroy_list(void)
 {
   PetscFunctionBeginUser;
@@ -15,36 +31,37 @@ static PetscErrorCode destroy_list(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
-                                  const SbOption rows[])
+PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial), const SbOption *tangent)
 {
   PetscFunctionBeginUser;
   if (!SbMaterialList) PetscCall(PetscRegisterFinalize(destroy_list));
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
-  if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
-  if (nrows) PetscCall(SbOptionsRegister("inclusion", law, nrows, rows));
+  if (tangent) PetscCall(SbOptionsRegister("body", law, 1, tangent));
+  if (tangent) PetscCall(SbOptionsRegister("inclusion", law, 1, tangent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, NULL));
+  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated, &tangents[0]));
+  PetscCall(SbMaterialRegister("stvk", SbMaterialCreate_StVK, &tangents[1]));
+  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean, &tangents[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       const char *where, SbMaterial *material)
+                                       SbMaterial *material)
 {
-  PetscErrorCode (*create)(SbMaterial) = NULL;
+  void (*create)(SbMaterial) = NULL;
   SbMaterial m;
-  char all[256] = "";
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListFind(SbMaterialList, law, &create));
-  if (!create) PetscCall(SbListAdvise(SbMaterialList, law, sizeof(all), all));
-  PetscCheck(create, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"; the laws are %s",
-             where, law, all);
-  PetscCheck(E > 0 && E < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: Young's modulus is %g Pa; it must lie in (0, inf)", where, (double)E);
-  PetscCheck(nu > -1 && nu < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: Poisson's ratio is %g; it must lie in (-1, 0.5): take 0.499 for an incompressible material",
-             where, (double)nu);
-  PetscCheck(density > 0 && density < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: density is %g kg/m^3; it must lie in (0, inf)", where, (double)density);
+  PetscCheck(create, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
   PetscCall(PetscNew(&m));
   PetscCall(PetscStrncpy(m->law, law, sizeof(m->law)));
   PetscCall(SbLogNamed("Mat", law, &m->event));
@@ -53,7 +70,8 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
   m->mu = E / (2 * (1 + nu));
   m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
   m->density = density;
-  PetscCall((*create)(m));
+  create(m);
+  PetscCall(SbMaterialSetTangent(m, m->ops.spin ? SB_TANGENT_WARPED : SB_TANGENT_EXACT));
   *material = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,16 +80,23 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 {
   SbScope scope;
   PetscReal E, nu, density;
-  char where[3 * SB_NAME_MAX];
+  PetscInt choice;
+  SbMaterial m;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(where, sizeof(where), "-%s_%s_material", body->klass, body->instance));
   SbScopeSet(&scope, body->klass, law, body->instance);
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));
-  PetscCall(SbMaterialCreateElastic(law, E, nu, density, where, material));
-  if ((*material)->ops.setfromoptions) PetscCall(((*material)->ops.setfromoptions)(*material, &scope));
+  PetscCall(SbMaterialCreateElastic(law, E, nu, density, material));
+  m = *material;
+  if (SbOptionExists(&scope, "tangent")) {
+    /* auto, then the tangents of the law: all or, without a warped one, the two exact ones */
+    PetscCall(SbOptionChoice(&scope, "tangent", &choice));
+    m->adaptive = (PetscBool)(choice == 0);
+    choice += m->ops.spin ? SB_TANGENT_WARPED - 1 : SB_TANGENT_EXACT - 1;
+    PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)choice));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,7 +113,7 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
   if (!m->shear) {
-    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, "material", &m->shear));
+    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, &m->shear));
     PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
   }
   *shear = m->shear;
@@ -98,35 +123,13 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
 {
   PetscFunctionBeginUser;
-  if (m->ops.settangent) {
-    PetscCall((m->ops.settangent)(m, kind));
-  } else {
-    PetscCheck(kind == m->tangent, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "material law %s has one tangent only: do not choose one", m->law);
-  }
-  if (m->shear) PetscCall(SbMaterialSetTangent(m->shear, kind));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind)
-{
-  PetscFunctionBeginUser;
-  PetscCheck(kind != SB_TANGENT_WARPED, PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck(!m->linear || kind == SB_TANGENT_EXACT, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "material law %s has one tangent only: do not choose one", m->law);
+  PetscCheck(kind != SB_TANGENT_WARPED || m->ops.spin, PETSC_COMM_SELF, PETSC_ERR_USER,
              "material law %s has no warped tangent: choose exact or exact_spd", m->law);
   m->tangent = kind;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope)
-{
-  const PetscInt first = m->tangent == SB_TANGENT_WARPED ? SB_TANGENT_WARPED : SB_TANGENT_EXACT;
-  PetscInt choice;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionChoice(scope, "tangent", &choice));
-  m->adaptive = (PetscBool)(choice == 0);
-  PetscCall(
-    SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)(first + choice - 1)));
+  if (m->ops.spin) m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.volumetric : NULL;
+  if (m->shear) PetscCall(SbMaterialSetTangent(m->shear, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,17 +1,13 @@
 /*
-  material_impl.h - shared by the laws: constructors, options, projection of an isotropic tangent.
+  material_impl.h - shared by the laws: constructors, projection of an isotropic tangent.
 */
 #pragma once
 #include <sbmaterial.h>
 
-PetscErrorCode SbMaterialCreate_Linear(SbMaterial m);
-PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m);
-PetscErrorCode SbMaterialCreate_StVK(SbMaterial m);
-PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m);
-
-/* Reads `tangent`: auto, then the tangents of the law, all or, without a warped one, the two exact ones. */
-PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope);
-PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
+void SbMaterialCreate_Linear(SbMaterial m);
+void SbMaterialCreate_Corotated(SbMaterial m);
+void SbMaterialCreate_StVK(SbMaterial m);
+void SbMaterialCreate_NeoHookean(SbMaterial m);
 
 /* r = R of a lane, S = sym(R^T F) as 00 01 02 11 12 22. */
 SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, PetscReal r[9], SbPack S[6])

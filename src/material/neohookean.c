@@ -72,39 +72,6 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
   }
 }
 
-SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                    SbPack C[restrict 81])
-{
-  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
-  SbPack cof[9], pF[9], shear, stretch;
-
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], c[9];
-
-    SbPackGet(9, F, l, f);
-    SbMatCofactor(f, c);
-    const PetscReal g = 1 / (SbDot9(f, f) + 1), p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
-    shear[l] = a * (1 - g);
-    stretch[l] = 2 * a * g * g;
-    SbPackPut(9, c, l, cof);
-    for (int k = 0; k < 9; k++) pF[k][l] = p * f[k];
-  }
-  for (int ij = 0; ij < 9; ij++) {
-    for (int kl = ij; kl < 9; kl++) {
-      const int row = kl / 3 - ij / 3, column = (kl % 3 - ij % 3 + 3) % 3; /* 0 same, 1 next, 2 previous */
-      const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
-      const PetscReal same = ij == kl, sign = row && column ? (row == column ? 1 : -1) : 0;
-      SbPack c;
-
-      for (int l = 0; l < SB_BATCH; l++) {
-        c[l] = b * cof[ij][l] * cof[kl][l] + stretch[l] * F[ij][l] * F[kl][l] + sign * pF[third][l] +
-               same * shear[l];
-      }
-      SbTangentPut(c, ij, kl, C);
-    }
-  }
-}
-
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
@@ -131,12 +98,41 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
                     (const SbPack *)twist, C);
 }
 
-static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
+SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                         SbPack C[restrict 81])
 {
-  if (m->tangent == SB_TANGENT_EXACT_SPD)
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
+  SbPack cof[9], pF[9], shear, stretch;
+
+  if (m->tangent == SB_TANGENT_EXACT_SPD) {
     tangent_spd(m, F, C);
-  else
-    tangent_exact(m, F, C);
+    return;
+  }
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], c[9];
+
+    SbPackGet(9, F, l, f);
+    SbMatCofactor(f, c);
+    const PetscReal g = 1 / (SbDot9(f, f) + 1), p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
+    shear[l] = a * (1 - g);
+    stretch[l] = 2 * a * g * g;
+    SbPackPut(9, c, l, cof);
+    for (int k = 0; k < 9; k++) pF[k][l] = p * f[k];
+  }
+  for (int ij = 0; ij < 9; ij++) {
+    for (int kl = ij; kl < 9; kl++) {
+      const int row = kl / 3 - ij / 3, column = (kl % 3 - ij % 3 + 3) % 3; /* 0 same, 1 next, 2 previous */
+      const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
+      const PetscReal same = ij == kl, sign = row && column ? (row == column ? 1 : -1) : 0;
+      SbPack c;
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        c[l] = b * cof[ij][l] * cof[kl][l] + stretch[l] * F[ij][l] * F[kl][l] + sign * pF[third][l] +
+               same * shear[l];
+      }
+      SbTangentPut(c, ij, kl, C);
+    }
+  }
 }
 
 SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
@@ -172,18 +168,13 @@ static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[9
   SbAddCofactorTangent(F, p, C);
 }
 
-PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
+void SbMaterialCreate_NeoHookean(SbMaterial m)
 {
-  PetscFunctionBeginUser;
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
-  m->ops.settangent = SbMaterialSetTangent_Exact;
-  m->ops.energy = energy_neohookean;
-  m->ops.stress = stress_neohookean;
-  m->ops.pressure = pressure_neohookean;
-  m->ops.tangent = tangent_neohookean;
-  m->ops.volumetric = volumetric_neohookean;
-  m->ops.curvature = curvature_neohookean;
+  m->ops = (SbMaterialOps){.energy = energy_neohookean,
+                           .stress = stress_neohookean,
+                           .pressure = pressure_neohookean,
+                           .tangent = tangent_neohookean,
+                           .volumetric = volumetric_neohookean,
+                           .curvature = curvature_neohookean};
   m->jacobian = PETSC_TRUE;
-  m->tangent = SB_TANGENT_EXACT;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,9 +17,10 @@
        is the result of one inverse iteration; multiplying this column by the adjugate is a second one.
   A lane is accepted if the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) relative to lambda^3) and the last
   Laguerre step was so short that the error is below rounding. Other lanes are computed one by one by the
-  robust path: Jacobi's method on N, which is accurate to rounding for any symmetric matrix.
+  robust path: LAPACK's eigenvectors of N.
 */
 #include <sbkernel.h>
+#include <petscblaslapack.h>
 
 #define ROOT_STEPS 3
 #define SMALLEST_GAP 1e-3 /* least p'(lambda) / (4 lambda^3) of an accepted lane; at most 16/27 */
@@ -134,34 +135,11 @@ SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
   return LAST_STEP * slope > 2 * x * x * fabs(step) ? 1 : 0;
 }
 
-/* One Jacobi rotation of a symmetric 4x4 matrix N that zeroes N[p][q]; V accumulates the rotations. */
-static void jacobi4(PetscReal N[4][4], PetscReal V[4][4], int p, int q)
-{
-  const PetscReal tau = (N[q][q] - N[p][p]) / (2 * N[p][q]);
-  const PetscReal t = (tau < 0 ? -1 : 1) / (fabs(tau) + sqrt(1 + tau * tau)), c = 1 / sqrt(1 + t * t),
-                  s = t * c;
-
-  for (int k = 0; k < 4; k++) {
-    const PetscReal kp = N[k][p], kq = N[k][q], vp = V[k][p], vq = V[k][q];
-
-    N[k][p] = c * kp - s * kq;
-    N[k][q] = s * kp + c * kq;
-    V[k][p] = c * vp - s * vq;
-    V[k][q] = s * vp + c * vq;
-  }
-  for (int k = 0; k < 4; k++) {
-    const PetscReal pk = N[p][k], qk = N[q][k];
-
-    N[p][k] = c * pk - s * qk;
-    N[q][k] = s * pk + c * qk;
-  }
-  N[p][q] = N[q][p] = 0;
-}
-
-/* Any F: scaled to a largest entry of one, Jacobi's method to convergence. */
+/* Any F, scaled to a largest entry of one. */
 static void polar_robust(const PetscReal F[9], PetscReal R[9])
 {
-  PetscReal scale = 0, G[9], n[10], V[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, q[4];
+  PetscReal scale = 0, G[9], n[10], lambda[4], work[34 * 4]; /* of LAPACK: (block size + 2) n */
+  PetscBLASInt four = 4, nwork = 34 * 4, info;
   int best = 0;
 
   for (int k = 0; k < 9; k++) {
@@ -173,24 +151,11 @@ static void polar_robust(const PetscReal F[9], PetscReal R[9])
   }
   for (int k = 0; k < 9; k++) G[k] = scale > 0 ? F[k] / scale : 0;
   davenport(G, n);
-  PetscReal N[4][4] = {
-    {n[0], n[1], n[2], n[3]}, {n[1], n[4], n[5], n[6]}, {n[2], n[5], n[7], n[8]}, {n[3], n[6], n[8], n[9]}};
-
-  /* Convergence is quadratic: about six sweeps; the bound only makes the loop finite. */
-  for (int sweep = 0; sweep < 30; sweep++) {
-    PetscReal largest = 0;
-
-    for (int i = 0; i < 4; i++) {
-      for (int j = i + 1; j < 4; j++) {
-        largest = fabs(N[i][j]) > largest ? fabs(N[i][j]) : largest;
-        if (fabs(N[i][j]) > 1e-20) jacobi4(N, V, i, j);
-      }
-    }
-    if (largest <= 1e-20) break;
-  }
-  for (int k = 1; k < 4; k++) best = N[k][k] > N[best][best] ? k : best;
-  for (int k = 0; k < 4; k++) q[k] = V[k][best];
-  quaternion_rotation(q, R);
+  PetscReal N[16] = {n[0], 0, 0, 0, n[1], n[4], 0, 0, n[2], n[5], n[7], 0, n[3], n[6], n[8], n[9]};
+  LAPACKsyev_("V", "U", &four, N, &four, lambda, work, &nwork, &info);
+  /* the first of equal ones, which is I for F = 0 */
+  while (lambda[best] < lambda[3]) best++;
+  quaternion_rotation(N + 4 * best, R);
 }
 
 SB_KERNEL void SbPolar(const SbPack F[restrict 9], SbPack R[restrict 9])

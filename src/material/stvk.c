@@ -55,38 +55,6 @@ SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack 
   }
 }
 
-SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                    SbPack C[restrict 81])
-{
-  const PetscReal mu = m->mu, lambda = m->lambda;
-  SbPack S[9], B[9]; /* B = mu F F^T */
-
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], e[9], b[9];
-
-    green_strain(F, l, f, e);
-    const PetscReal pressure = lambda * (e[0] + e[4] + e[8]);
-    SbMatMulTranspose(f, f, b);
-    for (int k = 0; k < 9; k++) {
-      S[k][l] = 2 * mu * e[k] + (k % 4 == 0 ? pressure : 0);
-      B[k][l] = mu * b[k];
-    }
-  }
-  for (int ij = 0; ij < 9; ij++) {
-    for (int kl = ij; kl < 9; kl++) {
-      const int i = ij / 3, j = ij % 3, k = kl / 3, n = kl % 3;
-      const PetscReal same_row = i == k, same_column = j == n;
-      SbPack c;
-
-      for (int l = 0; l < SB_BATCH; l++) {
-        c[l] = lambda * F[ij][l] * F[kl][l] + mu * F[3 * i + n][l] * F[3 * k + j][l] +
-               same_row * S[3 * n + j][l] + same_column * B[3 * i + k][l];
-      }
-      SbTangentPut(c, ij, kl, C);
-    }
-  }
-}
-
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
@@ -114,12 +82,40 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
                     (const SbPack *)twist, C);
 }
 
-static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
+SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                   SbPack C[restrict 81])
 {
-  if (m->tangent == SB_TANGENT_EXACT_SPD)
+  const PetscReal mu = m->mu, lambda = m->lambda;
+  SbPack S[9], B[9]; /* B = mu F F^T */
+
+  if (m->tangent == SB_TANGENT_EXACT_SPD) {
     tangent_spd(m, F, C);
-  else
-    tangent_exact(m, F, C);
+    return;
+  }
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], e[9], b[9];
+
+    green_strain(F, l, f, e);
+    const PetscReal pressure = lambda * (e[0] + e[4] + e[8]);
+    SbMatMulTranspose(f, f, b);
+    for (int k = 0; k < 9; k++) {
+      S[k][l] = 2 * mu * e[k] + (k % 4 == 0 ? pressure : 0);
+      B[k][l] = mu * b[k];
+    }
+  }
+  for (int ij = 0; ij < 9; ij++) {
+    for (int kl = ij; kl < 9; kl++) {
+      const int i = ij / 3, j = ij % 3, k = kl / 3, n = kl % 3;
+      const PetscReal same_row = i == k, same_column = j == n;
+      SbPack c;
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        c[l] = lambda * F[ij][l] * F[kl][l] + mu * F[3 * i + n][l] * F[3 * k + j][l] +
+               same_row * S[3 * n + j][l] + same_column * B[3 * i + k][l];
+      }
+      SbTangentPut(c, ij, kl, C);
+    }
+  }
 }
 
 /* theta = tr(F^T F - I) / 2 */
@@ -139,18 +135,13 @@ static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], con
     for (int l = 0; l < SB_BATCH; l++) C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
 }
 
-PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
+void SbMaterialCreate_StVK(SbMaterial m)
 {
-  PetscFunctionBeginUser;
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
-  m->ops.settangent = SbMaterialSetTangent_Exact;
-  m->ops.energy = energy_stvk;
-  m->ops.stress = stress_stvk;
-  m->ops.pressure = pressure_stvk;
-  m->ops.tangent = tangent_stvk;
-  m->ops.volumetric = volumetric_stvk;
-  m->ops.curvature = curvature_stvk;
+  m->ops = (SbMaterialOps){.energy = energy_stvk,
+                           .stress = stress_stvk,
+                           .pressure = pressure_stvk,
+                           .tangent = tangent_stvk,
+                           .volumetric = volumetric_stvk,
+                           .curvature = curvature_stvk};
   m->softens = PETSC_TRUE;
-  m->tangent = SB_TANGENT_EXACT;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

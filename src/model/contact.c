@@ -37,7 +37,7 @@ PetscErrorCode SbModelContactBeginStep(SbModel m, PetscReal t, PetscReal dt, Vec
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscCall(SbEvaluationBegin(m, t, &start));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  if (m->nrestitution) SbModelRestitutionBegin(m, dt, U0, V0);
+  if (m->nrestitution) m->bounce = (struct _SbBounce){.U0 = U0, .V0 = V0, .dt = dt, .left = 1.};
   for (PetscInt e = 0; e < m->nbegin_step; e++)
     SbEffectCall(m->begin_step[e], begin_step, m->space, t, dt, start.stage.u, start.stage.v, u);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));

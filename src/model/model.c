@@ -20,19 +20,17 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(SbSpaceDestroy(&m->space));
   PetscCall(SbMeshDestroy(&m->mesh));
   for (PetscInt k = 0; k < m->nmaterial; k++) PetscCall(SbMaterialDestroy(&m->material[k]));
-  for (PetscInt b = 0; m->element && b < m->nbody; b++) PetscCall(SbElementDestroy(&m->element[b]));
-  for (PetscInt b = 0; m->start && b < m->nbody; b++) {
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    PetscCall(SbElementDestroy(&m->element[b]));
+    PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
     for (int k = 0; k < 3; k++) {
       PetscCall(SbFormulaDestroy(&m->start[b].displacement[k]));
       PetscCall(SbFormulaDestroy(&m->start[b].velocity[k]));
     }
   }
-  PetscCall(PetscFree(m->start));
+  PetscCall(PetscFree3(m->body, m->element, m->start));
   PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
-  PetscCall(PetscFree(m->element));
-  for (PetscInt b = 0; m->body && b < m->nbody; b++) PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
-  PetscCall(PetscFree(m->body));
   PetscCall(PetscFree(m->set));
   PetscCall(PetscFree(*model));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,6 +97,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
   PetscInt nlist = 0;
+  PetscBool validate;
   SbEffect *list;
 
   PetscFunctionBeginUser;
@@ -156,6 +155,10 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, history);
   for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass += m->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(&mass, &m->mass, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(SbOptionBool(&SbRunScope, "validate", &validate));
+  if (!validate) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbMeshValidate(m->mesh));
+  PetscCall(SbSpaceValidate(m->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,13 +204,6 @@ PetscErrorCode SbEvaluationEnd(SbModel m, SbEvaluation *e)
   if (e->A) PetscCall(SbSpaceRestoreLocalRead(m->space, e->A, &e->stage.a));
   if (e->F) PetscCall(SbSpaceRestoreLocalWrite(m->space, e->F, &e->f));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor
-   there: they prescribe the load path themselves. */
-static inline PetscReal load_factor(SbModel m, SbEffect e)
-{
-  return e->steady ? m->load : 1.;
 }
 
 PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool apart, PetscReal sign,
@@ -273,7 +269,9 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   PetscCall(SbSpaceAssembleTangent(m->space, &e.stage, A));
   for (PetscInt k = 0; k < m->ntangent; k++) {
     if (!SbEffectActs(m->tangent[k], t)) continue;
-    m->space->block_scale = load_factor(m, m->tangent[k]);
+    /* in a static run the load factor, except for formulas of t, which is the load factor there: they
+       prescribe the load path themselves */
+    m->space->block_scale = m->tangent[k]->steady ? m->load : 1.;
     SbEffectCall(m->tangent[k], tangent, m->space, &e.stage, A);
   }
   PetscCall(SbSpaceFinishTangent(m->space, A));
@@ -291,7 +289,7 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscCall(SbSpaceGetLocalRead(m->space, X, &x));
   for (PetscInt k = 0; k < m->nnonsymmetric; k++) {
     if (!SbEffectActs(m->nonsymmetric[k], t)) continue;
-    e.stage.shift_k = load_factor(m, m->nonsymmetric[k]);
+    e.stage.shift_k = m->nonsymmetric[k]->steady ? m->load : 1.;
     SbEffectCall(m->nonsymmetric[k], nonsymmetric, m->space, &e.stage, x, e.f);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
@@ -342,7 +340,7 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(U));
   PetscCall(VecGetArray(U, &v));
-  for (PetscInt i = 0; m->start && i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const SbStart *start = &m->start[s->node_body[i]];
 
     for (int k = 0; start->moved && k < 3; k++)
@@ -356,17 +354,14 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const SbBody *body = &m->body[s->node_body[i]];
-    const SbStart *start = m->start ? &m->start[s->node_body[i]] : NULL;
-    const PetscReal *w = body->angular_velocity;
-    PetscReal r[3];
+    const SbStart *start = &m->start[s->node_body[i]];
+    PetscReal r[3], spin[3];
 
     SbSubtract(s->node_x + 3 * i, centre[s->node_body[i]], r);
+    SbCross(body->angular_velocity, r, spin);
     for (PetscInt k = 0; k < 3; k++) {
-      const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-
-      v[3 * i + k] = body->velocity[k] + w[k1] * r[k2] - w[k2] * r[k1];
-      if (start && start->velocity[k])
-        v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
+      v[3 * i + k] = body->velocity[k] + spin[k];
+      if (start->velocity[k]) v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
       if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
     }
   }

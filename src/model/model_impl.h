@@ -4,9 +4,7 @@
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin: at the start of an
-   attempted step; Update: energy check of a converged active set; `again`: they were reduced. Collective. */
-void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
+/* restitution.c: energy check of a converged active set; `again`: coefficients were reduced. Collective. */
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1, and
    f[nnode][3], zero, of F; V, A and F may be NULL. Collective. */

@@ -37,6 +37,16 @@ static PetscReal gap_after(const SbInitialContact *t, const PetscReal way[])
   return t->gap + SbDot3(t->n, way + 3 * t->body[0]) - SbDot3(t->n, way + 3 * t->body[1]);
 }
 
+/* Squared length of the part of a contact's normal along which its two bodies are not fixed. */
+static PetscReal free_part(const SbInitialContact *t, const uint8_t fixed[])
+{
+  PetscReal sum = 0.;
+
+  for (int k = 0; k < 6; k++)
+    if (!(fixed[t->body[k / 3]] >> (k % 3) & 1)) sum += PetscSqr(t->n[k % 3]);
+  return sum;
+}
+
 /* Gauss-Seidel: each contact moves its bodies along it, except fixed components; way[nbody + 1][3], m. */
 static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
@@ -48,11 +58,8 @@ static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt n
     worst = 0.;
     for (PetscInt i = 0; i < n; i++) {
       const SbInitialContact *t = &touch[i];
-      const PetscReal missing = t->to - gap_after(t, way);
-      PetscReal sum = 0.;
+      const PetscReal missing = t->to - gap_after(t, way), sum = free_part(t, fixed);
 
-      for (int k = 0; k < 6; k++)
-        if (!(fixed[t->body[k / 3]] >> (k % 3) & 1)) sum += PetscSqr(t->n[k % 3]);
       if (missing <= 0. || sum < MISSED) continue;
       worst = PetscMax(worst, missing / t->to);
       for (int k = 0; k < 6; k++) {
@@ -68,28 +75,23 @@ static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt n
 /* Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components
    allow. Bodies enclosed by others without enough space are fixed. Displacements are limited to a few gaps,
    the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
-   fixed here; way[nbody + 1][3], m; moved: some body moves. */
-static void find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody, uint8_t fixed[],
-                      PetscReal way[], PetscBool *moved)
+   fixed here; way[nbody + 1][3], m. Returns whether some body moves. */
+static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody, uint8_t fixed[],
+                           PetscReal way[])
 {
-  PetscReal longest = 0., most = PETSC_MAX_REAL, scale;
-  PetscBool again;
+  PetscReal longest = 0., most = PETSC_MAX_REAL;
+  PetscBool again = PETSC_FALSE;
 
-  *moved = PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) {
     const SbInitialContact *t = &touch[i];
-    PetscBool mobile = PETSC_FALSE;
 
-    for (int k = 0; k < 6; k++)
-      mobile = (PetscBool)(mobile ||
-                           (!(fixed[t->body[k / 3]] >> (k % 3) & 1) && PetscAbsReal(t->n[k % 3]) > MISSED));
-    *moved = (PetscBool)(*moved || (mobile && t->gap < CLOSE * t->to));
+    again = (PetscBool)(again || (t->gap < CLOSE * t->to && free_part(t, fixed) >= MISSED));
     most = PetscMin(most, FAR * t->to);
   }
-  if (!*moved) return;
+  if (!again) return PETSC_FALSE;
 
   /* fix the bodies of contacts whose gap would decrease */
-  do {
+  while (again) {
     again = PETSC_FALSE;
     sweep_touches(n, touch, nbody, fixed, way);
     for (PetscInt i = 0; i < n; i++) {
@@ -103,14 +105,13 @@ static void find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody
         fixed[b] = 7;
       }
     }
-  } while (again);
+  }
 
   /* limit the displacement */
   for (PetscInt b = 0; b <= nbody; b++)
     longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
-  *moved = (PetscBool)(longest > MISSED * most);
-  scale = longest > most ? most / longest : 1.;
-  for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
+  for (PetscInt k = 0; longest > most && k < 3 * (nbody + 1); k++) way[k] *= most / longest;
+  return (PetscBool)(longest > MISSED * most);
 }
 
 /* Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
@@ -144,7 +145,7 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
     n /= (PetscInt)sizeof(*touch);
     if (n) qsort(touch, (size_t)n, sizeof(*touch), by_value);
     PetscCall(PetscFree(list.touch));
-    find_ways(n, touch, nbody, fixed, way, &go_on);
+    go_on = find_ways(n, touch, nbody, fixed, way);
     PetscCall(PetscFree(touch));
     for (PetscInt i = 0; go_on && i < 3 * s->nnode; i++) u[i] += way[3 * s->node_body[i / 3] + i % 3];
   }
@@ -202,7 +203,7 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
 
   /* impact velocities of this step */
   if (!m->nrestitution || !V0) PetscFunctionReturn(PETSC_SUCCESS);
-  SbModelRestitutionBegin(m, dt, U0, V0);
+  m->bounce = (struct _SbBounce){.U0 = U0, .V0 = V0, .dt = dt, .left = 1.};
   PetscCall(SbEvaluationBegin(m, t, &at));
   for (PetscInt e = 0; e < m->npotential; e++)
     if (m->potential[e]->ops.meet) CONTACT_CALL(m->potential[e], meet, m->space, dt, at.stage.u, at.stage.v);

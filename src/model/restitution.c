@@ -28,15 +28,6 @@
 #define STEEP 2.1    /* factor on the excess 1 - most / W: a stiff body's W / D grows with the root of e */
 #define ROUND 1e-9   /* relative tolerance of W <= D */
 
-void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
-{
-  m->bounce.U0 = U0;
-  m->bounce.V0 = V0;
-  m->bounce.dt = dt;
-  m->bounce.left = 1.;
-  m->bounce.reductions = 0;
-}
-
 PetscErrorCode SbModelRestitutionUpdate(SbModel m, Vec U, PetscBool *again)
 {
   PetscReal W = 0., before, after, work, most;

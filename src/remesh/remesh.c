@@ -289,7 +289,6 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   }
   s.model->t_begin = before->t_now;
   PetscCall(SbModelSetUp(s.model));
-  PetscCall(SbSceneValidate(s.model));
   PetscCall(SbRunSetUp(run));
   PetscCall(PetscStrncpy(run->solver_reason, before->solver_reason, sizeof(run->solver_reason)));
   // transfer the state

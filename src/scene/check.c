@@ -9,32 +9,29 @@
 #include <unistd.h>
 #include "scene_impl.h"
 
-#define NAMES_MAX 1000 /* largest number of directory entries that are compared */
-#define LARGE 2.       /* m; files of larger soft bodies are usually in mm */
-#define LIGHT 10.      /* kg/m^3; no soft body in SI units has a lower density */
+#define LARGE 2.  /* m; files of larger soft bodies are usually in mm */
+#define LIGHT 10. /* kg/m^3; no soft body in SI units has a lower density */
 
 /* Similar file names in the folder of `path`, with the folder; "" if there are none. Rank 0 only. */
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
 {
   const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
   char folder[PETSC_MAX_PATH_LEN], found[PETSC_MAX_PATH_LEN];
-  DIR *dir;
-  struct dirent *entry;
+  struct dirent **entry;
   const char **list;
-  PetscInt n = 0;
+  int n;
 
   PetscFunctionBeginUser;
   text[0] = 0;
   SbFormat(sizeof(folder), folder, "%.*s", (int)(name - path), path);
-  dir = opendir(slash ? folder : ".");
-  if (!dir) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(NAMES_MAX, &list));
-  while (n < NAMES_MAX && (entry = readdir(dir)))
-    PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
-  (void)closedir(dir);
+  n = scandir(slash ? folder : ".", &entry, NULL, alphasort);
+  if (n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &list));
+  for (int i = 0; i < n; i++) list[i] = entry[i]->d_name;
   SbSuggestNames(name, n, list, sizeof(found), found);
   if (found[0]) SbFormat(size, text, "%s%s", folder, found);
-  for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
+  for (int i = 0; i < n; i++) free(entry[i]);
+  free(entry);
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -79,15 +76,15 @@ PetscErrorCode SbSceneCheck(SbModel model)
   PetscBool constrained = model->dynamic;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < model->nbody; i++)
-    if (strncmp(model->body[i].mesh, "box:", 4)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
                               (model->effect[e]->ops.potential && model->effect[e]->springs));
-  for (PetscInt i = 0; i < model->nbody; i++)
+  for (PetscInt i = 0; i < model->nbody; i++) {
+    if (strncmp(model->body[i].mesh, "box:", 4)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
     PetscCheck(model->dynamic || (!model->start[i].moved && !model->start[i].state[0]), PETSC_COMM_SELF,
                PETSC_ERR_USER, "-body_%s_%s is for dynamic runs: -time static begins without loads, at rest",
                model->body[i].name, model->start[i].moved ? "displacement" : "state");
+  }
   PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
              "type fixed or prescribed_displacement");

@@ -35,7 +35,6 @@ PetscErrorCode SbRegisterAll(void)
 
   PetscCall(SbElementRegisterAll());
   PetscCall(SbMaterialRegisterAll());
-  PetscCall(SbSetsRegister());
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
   PetscFunctionReturn(PETSC_SUCCESS);

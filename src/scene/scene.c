@@ -1,9 +1,19 @@
 /*
   scene.c - builds the model from options, without computing: bodies with material and element, effects, sets.
+
+  Names of bodies, sets and effects are parts of option names: -body_<name>_young. These are case-insensitive
+  in PETSc, hence names must differ in more than case. PETSc also takes `-body_young` for a missing
+  `-body_1_young`: a part of a name that has only digits could read another name's option, and is an error.
+
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. All such
+  names are collected before the mesh is read, because its sets are marked while the bodies are read.
 */
+#include <ctype.h>
 #include "scene_impl.h"
 
-/* Materials registered by material/register.c, for the manual. */
+#define NAME_LENGTH 31 /* PETSc allows 63 characters of an option's name in YAML files */
+
+/* Materials registered by SbMaterialRegisterAll(), for the manual. */
 #define LAWS "linear|corotated|stvk|neohookean"
 
 static const SbOption run_rows[] = {
@@ -54,12 +64,72 @@ static const SbOption inclusion_rows[] = {
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
 };
 
+static const SbOption set_rows[] = {
+  {"at", SB_OPTION_STRING, 1, "", NULL, "",
+   "shape of the set in the reference configuration, after scale, rotate, translate (m): "
+   "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, halfspace:nx,ny,nz,d (n.x "
+   "<= d), or group:name, body:name, boundary"},
+};
+
 PetscErrorCode SbSceneRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("set", "", PETSC_STATIC_ARRAY_LENGTH(set_rows), set_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Describes what is wrong with a name; NULL if it is valid. */
+static const char *name_problem(const char *name)
+{
+  PetscBool only_digits = PETSC_FALSE;
+
+  if (strlen(name) > NAME_LENGTH) return "is longer than 31 characters";
+  if (!isalpha((unsigned char)name[0])) return "does not begin with a letter";
+  for (const char *c = name; *c; c++)
+    if (!isalnum((unsigned char)*c) && *c != '_') return "may hold letters, digits and underscores only";
+  for (const char *c = name; *c; c++) {
+    if (*c == '_') {
+      if (!c[1] || c[1] == '_') return "has an underscore without a word after it";
+      only_digits = PETSC_TRUE;
+    } else if (!isdigit((unsigned char)*c))
+      only_digits = PETSC_FALSE;
+    if (only_digits && *c != '_' && (c[1] == '_' || !c[1]))
+      return "has a part of digits only; leave out the underscore before it";
+  }
+  if (!strcasecmp(name, "all") || !strcasecmp(name, "boundary"))
+    return "has a meaning of its own where sets are named";
+  return NULL;
+}
+
+/* Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has
+   letters, digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or
+   "effect". The caller frees the names with PetscFree(). */
+static PetscErrorCode read_names(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
+{
+  char problem[4 * SB_NAME_MAX] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(&SbRunScope, key, n, names));
+  // the first invalid name
+  for (PetscInt i = 0; i < *n && !problem[0]; i++) {
+    const char *name = (*names)[i], *wrong = name_problem(name);
+
+    if (!strcmp(what, "body") && !strcasecmp(name, SB_OPTION_DEFAULT))
+      wrong = "stands for all bodies in -body_default_young and the like";
+    if (wrong) PetscCall(PetscSNPrintf(problem, sizeof(problem), "the name '%s' %s", name, wrong));
+    for (PetscInt j = 0; j < i && !problem[0]; j++) {
+      const char *hint = strcmp(name, (*names)[j]) ? " (upper and lower case count as one)" : "";
+
+      if (strcasecmp(name, (*names)[j])) continue;
+      PetscCall(PetscSNPrintf(problem, sizeof(problem),
+                              "two are named '%s'%s; every %s needs a name of its own", name, hint, what));
+    }
+  }
+  if (problem[0]) PetscCall(PetscFree(*names));
+  PetscCheck(!problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: %s", key, problem);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,10 +236,8 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
     PetscCall(SbSceneReadCopies(model->comm, names[i], &ncopy[i], &copy[i]));
     nbody += PetscMax(ncopy[i], 1);
   }
-  PetscCall(PetscCalloc1(nbody, &model->body));
+  PetscCall(PetscCalloc3(nbody, &model->body, nbody, &model->element, nbody, &model->start));
   PetscCall(PetscCalloc1(nbody, &model->material));
-  PetscCall(PetscCalloc1(nbody, &model->element));
-  PetscCall(PetscCalloc1(nbody, &model->start));
   model->nmaterial = model->nbody = nbody;
 
   /* each body with its options, each copy with its placement */
@@ -201,13 +269,121 @@ static PetscErrorCode read_bodies(SbModel model)
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSceneReadNames("bodies", "body", &n, &names));
+  PetscCall(read_names("bodies", "body", &n, &names));
   PetscCall(PetscCalloc2(n, &ncopy, n, &copy));
   ierr = read_named_bodies(model, n, (const char(*)[SB_NAME_MAX])names, ncopy, copy);
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(copy[i]));
   PetscCall(PetscFree2(ncopy, copy));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(ierr);
+}
+
+/* Index of the body of this name, or of its first copy. */
+static PetscInt find_body(SbModel model, const char *name)
+{
+  for (PetscInt i = 0; i < model->nbody; i++)
+    if (!strcmp(model->body[i].name, name) || !strcmp(model->body[i].copy_of, name)) return i;
+  return -1;
+}
+
+static PetscInt find_set(SbModel model, const char *name)
+{
+  for (PetscInt i = 0; i < model->nset; i++)
+    if (!strcmp(model->set[i].name, name)) return i;
+  return -1;
+}
+
+static PetscErrorCode read_set(SbModel model, const char *name)
+{
+  SbSet *set = &model->set[model->nset];
+  SbScope scope;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCheck(find_body(model, name) < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-sets: '%s' is the name of a body and means the whole of it; give the set another name", name);
+  SbScopeSet(&scope, "set", "", name);
+  SbOptionName(&scope, "at", sizeof(option), option);
+  PetscCall(SbOptionString(&scope, "at", sizeof(text), text));
+  PetscCall(SbSetParse(option, text, set));
+  PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
+  PetscCheck(set->shape != SB_SET_BODY || find_body(model, set->group) >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s: the scenario has no body %s", option, text, set->group);
+  model->nset++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the set of a name without a definition in -sets. */
+static PetscErrorCode use_name(SbModel model, const char *name)
+{
+  SbSet *set = &model->set[model->nset];
+
+  PetscFunctionBeginUser;
+  if (find_set(model, name) >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
+  set->shape = find_body(model, name) >= 0 ? SB_SET_BODY
+               : !strcmp(name, "all")      ? SB_SET_HALFSPACE
+               : !strcmp(name, "boundary") ? SB_SET_BOUNDARY
+                                           : SB_SET_GROUP;
+  if (set->shape == SB_SET_HALFSPACE) {
+    /* one that contains every point */
+    set->p[2] = 1;
+    set->p[3] = PETSC_MAX_REAL;
+  } else if (set->shape != SB_SET_BOUNDARY) {
+    PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
+  }
+  model->nset++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the sets of -sets, then those that effects, probes and inclusions name without one. */
+static PetscErrorCode read_sets(SbModel model)
+{
+  char(*names)[SB_NAME_MAX];
+  SbScope scope;
+  PetscInt n, room;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_names("sets", "set", &n, &names));
+  room = n;
+  PetscCall(PetscCalloc1(n + SB_SET_MAX + 1, &model->set));
+  for (PetscInt i = 0; i < n && !ierr; i++) ierr = read_set(model, names[i]);
+  PetscCall(PetscFree(names));
+  PetscCall(ierr);
+  for (PetscInt e = 0; e < model->neffect; e++) {
+    // sets of an effect; none if its type has no such option
+    SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
+    if (!SbOptionExists(&scope, "on")) continue;
+    PetscCall(SbOptionNames(&scope, "on", &n, &names));
+    for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
+    PetscCall(PetscFree(names));
+  }
+  /* sets over which probes average */
+  PetscCall(SbOptionNames(&SbRunScope, "probes", &n, &names));
+  for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
+    char name[SB_NAME_MAX];
+
+    SbScopeSet(&scope, "probe", "", names[i / 2]);
+    PetscCall(SbOptionString(&scope, i % 2 ? "in" : "on", sizeof(name), name));
+    if (name[0]) PetscCall(use_name(model, name));
+  }
+  PetscCall(PetscFree(names));
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    SbBody *body = &model->body[b];
+
+    for (PetscInt k = 0; k < body->ninclusion && model->nset <= SB_SET_MAX; k++) {
+      const char *name = model->inclusion[body->inclusion[k].material - model->nbody];
+
+      PetscCall(use_name(model, name));
+      body->inclusion[k].set = find_set(model, name);
+    }
+  }
+  PetscCheck(model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the scenario uses more than %d sets (%" PetscInt_FMT
+             " in -sets, the others named by effects, probes and inclusions); join some of them",
+             SB_SET_MAX, room);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
@@ -222,28 +398,16 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   (*model)->comm = comm;
   PetscCall(read_bodies(*model));
 
-  PetscCall(SbSceneReadNames("effects", "effect", &n, &names));
+  PetscCall(read_names("effects", "effect", &n, &names));
   PetscCall(PetscCalloc1(n, &(*model)->effect));
   for (PetscInt i = 0; i < n && !ierr; i++)
     ierr = SbEffectCreate(names[i], &(*model)->effect[(*model)->neffect++]);
   PetscCall(PetscFree(names));
   PetscCall(ierr);
-  PetscCall(SbSceneReadSets(*model));
+  PetscCall(read_sets(*model));
 
   /* check options that are read after the mesh already now, to report errors early */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++)
     PetscCall(SbOptionCheckEarly(&SbRunScope, keys[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSceneValidate(SbModel model)
-{
-  PetscBool validate;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionBool(&SbRunScope, "validate", &validate));
-  if (!validate) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbMeshValidate(model->mesh));
-  PetscCall(SbSpaceValidate(model->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

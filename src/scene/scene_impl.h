@@ -8,10 +8,6 @@
 /* Register the options of the command line and of the scene. */
 PetscErrorCode SbCommandRegister(void);
 PetscErrorCode SbSceneRegister(void);
-PetscErrorCode SbSetsRegister(void);
-
-/* Reads the sets of -sets, then those that effects name without one, into model->set. Not collective. */
-PetscErrorCode SbSceneReadSets(SbModel model);
 
 /* Placement of a copy of a body. */
 typedef struct {
@@ -21,8 +17,3 @@ typedef struct {
 PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, SbPlacement **place);
 /* Adds a further scale, rotation and translation to the body. */
 void SbPlacementAdd(const SbPlacement *place, SbBody *body);
-
-/* Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has
-   letters, digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or
-   "effect". The caller frees the names with PetscFree(). */
-PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX]);

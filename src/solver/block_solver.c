@@ -13,13 +13,13 @@
 struct _p_SbBlockSolver {
   MPI_Comm comm;
   PetscMPIInt rank, size;
-  PetscInt n, N; /* number of block rows of this rank; of all ranks */
+  PetscInt n, N; /* number of block rows of this rank; of all ranks, 0 on the others than rank 0 */
   MPI_Datatype triple, block;
   PetscMPIInt *row_count, *row_first, *entry_count, *entry_first; /* [size] MPI counts and displacements */
   PetscInt *ia, *ja;                                              /* rank 0: pattern of all rows */
   PetscReal *value, *x; /* rank 0 of several: blocks of all rows; right-hand side, solution */
   SbFactor factor;
-  PetscInt64 dissected; /* number of entries of the factor when METIS ordered it */
+  PetscReal dissected; /* number of entries of the factor when METIS ordered it */
 };
 
 PetscErrorCode SbBlockSolverCreate(MPI_Comm comm, SbBlockSolver *solver)
@@ -51,8 +51,7 @@ PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver)
   PetscCallMPI(MPI_Type_free(&b->block));
   PetscCall(SbFactorDestroy(&b->factor));
   PetscCall(PetscFree4(b->row_count, b->row_first, b->entry_count, b->entry_first));
-  PetscCall(PetscFree2(b->ia, b->ja));
-  PetscCall(PetscFree2(b->value, b->x));
+  PetscCall(PetscFree4(b->ia, b->ja, b->value, b->x));
   PetscCall(PetscFree(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -72,11 +71,10 @@ static PetscInt sum_counts(PetscMPIInt size, const PetscMPIInt count[], PetscMPI
 /* Gathers the pattern on rank 0, and factors it symbolically. */
 PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[])
 {
-  const PetscBool root = (PetscBool)!b->rank;
   PetscMPIInt rows, entries;
-  PetscInt nentry, before = b->N, *length = NULL;
+  PetscInt nentry, before = b->N, *length;
   SbFactor old = b->factor;
-  PetscInt64 size = 0, bytes;
+  PetscReal flops, size;
 
   PetscFunctionBeginUser;
   b->n = n;
@@ -84,13 +82,11 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
   PetscCall(PetscMPIIntCast(ia[n], &entries));
   PetscCallMPI(MPI_Gather(&rows, 1, MPI_INT, b->row_count, 1, MPI_INT, 0, b->comm));
   PetscCallMPI(MPI_Gather(&entries, 1, MPI_INT, b->entry_count, 1, MPI_INT, 0, b->comm));
-  PetscCall(PetscFree2(b->ia, b->ja));
-  PetscCall(PetscFree2(b->value, b->x));
+  PetscCall(PetscFree4(b->ia, b->ja, b->value, b->x));
   b->N = sum_counts(b->size, b->row_count, b->row_first);
   nentry = sum_counts(b->size, b->entry_count, b->entry_first);
-  PetscCall(PetscMalloc2(b->N + 1, &b->ia, nentry, &b->ja));
-  if (b->size > 1)
-    PetscCall(PetscMalloc2(root ? 9 * (size_t)nentry : 0, &b->value, root ? 3 * (size_t)b->N : 0, &b->x));
+  PetscCall(PetscMalloc4(b->N + 1, &b->ia, nentry, &b->ja, b->size > 1 ? 9 * (size_t)nentry : 0, &b->value,
+                         3 * (size_t)b->N, &b->x));
   PetscCall(PetscMalloc1(n, &length));
   for (PetscInt i = 0; i < n; i++) length[i] = ia[i + 1] - ia[i];
   PetscCallMPI(
@@ -98,21 +94,21 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
   PetscCallMPI(
     MPI_Gatherv(ja, entries, MPIU_INT, b->ja, b->entry_count, b->entry_first, MPIU_INT, 0, b->comm));
   PetscCall(PetscFree(length));
-  if (!root) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->rank) PetscFunctionReturn(PETSC_SUCCESS);
   b->ia[0] = 0;
   for (PetscInt i = 0; i < b->N; i++) b->ia[i + 1] += b->ia[i];
 
   /* keep the old order while its factor is not too large */
   b->factor = NULL;
   if (old && before == b->N) {
-    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, SbFactorOrder(old), &b->factor));
-    SbFactorSize(b->factor, &size, &bytes);
-    if ((PetscReal)size > WORSE * (PetscReal)b->dissected) PetscCall(SbFactorDestroy(&b->factor));
+    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, old, &b->factor));
+    SbFactorCost(b->factor, &flops, &size);
+    if (size > WORSE * b->dissected) PetscCall(SbFactorDestroy(&b->factor));
   }
   PetscCall(SbFactorDestroy(&old));
   if (!b->factor) {
     PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, NULL, &b->factor));
-    SbFactorSize(b->factor, &b->dissected, &bytes);
+    SbFactorCost(b->factor, &flops, &b->dissected);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -134,14 +130,9 @@ PetscErrorCode SbBlockSolverSetUp(SbBlockSolver b, PetscInt n, const PetscInt ia
 PetscErrorCode SbBlockSolverCost(SbBlockSolver b, PetscReal *flops, PetscReal *entries)
 {
   PetscReal cost[2] = {0., 0.};
-  PetscInt64 size, bytes;
 
   PetscFunctionBeginUser;
-  if (!b->rank) {
-    SbFactorSize(b->factor, &size, &bytes);
-    cost[0] = SbFactorFlops(b->factor);
-    cost[1] = (PetscReal)size;
-  }
+  if (!b->rank) SbFactorCost(b->factor, &cost[0], &cost[1]);
   PetscCallMPI(MPI_Bcast(cost, 2, MPIU_REAL, 0, b->comm));
   *flops = cost[0];
   *entries = cost[1];

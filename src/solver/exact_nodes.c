@@ -10,33 +10,27 @@
 
 #define MOST_NODES 600 /* largest number of nodes: with more their factorisation costs more than it saves */
 
-static PetscErrorCode free_arrays(SbExactNodes *e)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbFactorDestroy(&e->factor));
-  PetscCall(PetscFree5(e->node, e->ia, e->ka, e->x, e->y));
-  PetscCall(PetscFree5(e->ja, e->kja, e->block, e->kblock, e->value));
-  e->n = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e)
 {
   PetscFunctionBeginUser;
-  PetscCall(free_arrays(e));
-  PetscCall(PetscFree(e->index));
+  PetscCall(SbFactorDestroy(&e->factor));
+  PetscCall(PetscFree5(e->index, e->node, e->ia, e->x, e->y));
+  PetscCall(PetscFree2(e->ja, e->value));
+  e->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscReal spread[], PetscReal limit)
 {
   const SbPlan p = s->plan;
-  PetscInt nz = 0;
+  PetscInt nz = 0, *ia, *ja;
+  PetscReal *block;
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  PetscCall(free_arrays(e));
-  if (!e->index) PetscCall(PetscMalloc1(s->nnode_owned, &e->index));
+  PetscCall(SbExactNodesDestroy(e));
+  PetscCall(PetscMalloc5(s->nnode_owned, &e->index, MOST_NODES, &e->node, MOST_NODES + 1, &e->ia,
+                         3 * MOST_NODES, &e->x, 3 * MOST_NODES, &e->y));
   /* the nodes above the limit, which is raised while they are too many */
   while (PETSC_TRUE) {
     e->n = 0;
@@ -46,32 +40,30 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
     limit *= 1.3;
   }
   if (!e->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(
-    PetscMalloc5(e->n, &e->node, e->n + 1, &e->ia, e->n + 1, &e->ka, 3 * e->n, &e->x, 3 * e->n, &e->y));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (e->index[i] < 0) continue;
     e->node[e->index[i]] = i;
     nz += p->di[i + 1] - p->di[i];
   }
-  PetscCall(PetscMalloc5(nz, &e->ja, nz, &e->kja, 9 * nz, &e->block, 9 * nz, &e->kblock, 9 * nz, &e->value));
-  PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, e->block));
-  for (PetscInt k = 0; k < 9 * nz; k++) e->value[k] = (float)e->block[k];
-  /* the blocks between exact nodes */
-  e->ka[0] = nz = 0;
-  for (PetscInt k = 0; k < e->n; k++) {
-    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
-      const PetscInt j = e->index[e->ja[at]];
-
-      if (j < 0) continue;
-      PetscCall(PetscArraycpy(e->kblock + 9 * nz, e->block + 9 * at, 9));
-      e->kja[nz++] = j;
+  PetscCall(PetscMalloc2(nz, &e->ja, 9 * nz, &e->value));
+  PetscCall(PetscMalloc3(e->n + 1, &ia, nz, &ja, 9 * nz, &block));
+  PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, block));
+  for (PetscInt k = 0; k < 9 * nz; k++) e->value[k] = (float)block[k];
+  /* the blocks between exact nodes, moved to the front */
+  ia[0] = nz = 0;
+  for (PetscInt k = 0, at = 0; k < e->n; k++) {
+    for (; at < e->ia[k + 1]; at++) {
+      if (e->index[e->ja[at]] < 0) continue;
+      for (int c = 0; c < 9; c++) block[9 * nz + c] = block[9 * at + c];
+      ja[nz++] = e->index[e->ja[at]];
     }
-    e->ka[k + 1] = nz;
+    ia[k + 1] = nz;
   }
-  PetscCall(SbFactorCreate(e->n, 0, e->ka, e->kja, &e->factor));
-  PetscCall(SbFactorNumeric(e->factor, e->ka, e->kja, e->kblock, NULL, &ok));
+  PetscCall(SbFactorCreate(e->n, 0, ia, ja, &e->factor));
+  PetscCall(SbFactorNumeric(e->factor, ia, ja, block, NULL, &ok));
+  PetscCall(PetscFree3(ia, ja, block));
   /* an indefinite block: no node is solved exactly */
-  if (!ok) PetscCall(free_arrays(e));
+  if (!ok) PetscCall(SbExactNodesDestroy(e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

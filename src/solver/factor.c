@@ -55,11 +55,8 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   *factor = f;
   e = &f->e;
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
-  // a supernode is divided evenly into panels of at most PANEL nodes
-  for (PetscInt g = 0; g < e->nsuper; g++) f->npanel += (e->first[g + 1] - e->first[g] + PANEL - 1) / PANEL;
-  PetscCall(PetscMalloc1(f->npanel, &f->panel));
-  f->npanel = 0;
-  // each panel's nodes, rows below and position of its words
+  PetscCall(PetscMalloc1(e->nsuper + e->nfree / PANEL, &f->panel));
+  // a supernode is divided evenly into panels of at most PANEL nodes: their rows below and position of words
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
     const PetscInt npart = (ncol + PANEL - 1) / PANEL;
@@ -81,8 +78,8 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
-                                   const PetscInt order[], SbFactor *factor)
+PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[], SbFactor old,
+                                   SbFactor *factor)
 {
   const SbElimination *e;
   SbFactor f;
@@ -91,7 +88,7 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
   PetscCall(PetscNew(&f));
   *factor = f;
   e = &f->e;
-  PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
+  PetscCall(SbEliminationCreate(n, 0, ia, ja, old ? old->e.order : NULL, &f->e));
   // positions of the supernodes' columns in L
   PetscCall(PetscCalloc1(e->nsuper + 1, &f->column));
   for (PetscInt g = 0; g < e->nsuper; g++) {
@@ -102,11 +99,6 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
   }
   PetscCall(PetscMalloc2(f->column[e->nsuper], &f->L, 3 * n + f->tallest, &f->y));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-const PetscInt *SbFactorOrder(SbFactor f)
-{
-  return f->e.order;
 }
 
 PetscErrorCode SbFactorDestroy(SbFactor *f)
@@ -125,34 +117,24 @@ PetscErrorCode SbFactorDestroy(SbFactor *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
-{
-  *entries = 0;
-  *bytes = (PetscInt64)(sizeof(*f->word) * f->nword);
-  if (f->column) {
-    *entries = (PetscInt64)f->column[f->e.nsuper];
-    *bytes = (PetscInt64)sizeof(*f->L) * *entries;
-  }
-  for (PetscInt q = 0; q < f->npanel; q++) {
-    const PetscInt64 ncol = 3 * f->panel[q].ncol;
-
-    *entries += ncol * (ncol + 1) / 2 + ncol * 3 * f->panel[q].nrow;
-  }
-}
-
-PetscReal SbFactorFlops(SbFactor f)
+void SbFactorCost(SbFactor f, PetscReal *flops, PetscReal *entries)
 {
   const SbElimination *e = &f->e;
-  PetscReal sum = 0.;
 
-  // entries in n columns with m rows below; operations for the leading block, the rows below, the update
+  // of n columns with m rows below; operations for the leading block, the rows below, the update
+  *flops = *entries = 0.;
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscReal n = 3. * (PetscReal)(e->first[g + 1] - e->first[g]);
     const PetscReal m = 3. * (PetscReal)(e->start[g + 1] - e->start[g]) - n;
 
-    sum += n * (n * n / 3. + n * m + m * m);
+    *flops += n * (n * n / 3. + n * m + m * m);
+    *entries += f->column ? n * (n + m) : n * (n + 1.) / 2. + n * m;
   }
-  return sum;
+}
+
+PetscInt64 SbFactorBytes(SbFactor f)
+{
+  return (PetscInt64)(sizeof(*f->word) * f->nword);
 }
 
 /* Work space of a factorisation. */

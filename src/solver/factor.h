@@ -36,11 +36,10 @@ PetscErrorCode SbEliminationDestroy(SbElimination *e);
 /* SbFactorCreate - symbolic factorisation (arguments as above). Not collective. */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                               SbFactor *f);
-/* The same for an exact factor, in double precision, without kept nodes; order: as above. Not collective. */
-PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
-                                   const PetscInt order[], SbFactor *f);
-/* The order of elimination, borrowed: [n] node at each position. */
-const PetscInt *SbFactorOrder(SbFactor f);
+/* The same for an exact factor, in double precision, without kept nodes, in the order of elimination of an
+   old factor or (NULL) of METIS. Not collective. */
+PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[], SbFactor old,
+                                   SbFactor *f);
 /*
   SbFactorNumeric - numeric factorisation.
 
@@ -62,8 +61,8 @@ void SbFactorForward(SbFactor f, const float b[], float kept[]);
 void SbFactorBackward(SbFactor f, const float kept[], float x[]);
 /* A x = b with a factor of SbFactorCreateExact(); b and x [n][3] may be the same. Not collective. */
 PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[]);
-/* Number of entries of the factor, and bytes that one substitution reads. */
-void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes);
-/* Multiplications and additions of an exact factorisation. */
-PetscReal SbFactorFlops(SbFactor f);
+/* Multiplications and additions of an exact factorisation; number of entries of the factor. */
+void SbFactorCost(SbFactor f, PetscReal *flops, PetscReal *entries);
+/* Bytes that one substitution reads, of a factor in integers. */
+PetscInt64 SbFactorBytes(SbFactor f);
 PetscErrorCode SbFactorDestroy(SbFactor *f);

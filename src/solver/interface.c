@@ -113,14 +113,13 @@ PetscErrorCode SbInterfaceCreate(SbSpace s, SbInterface *face)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));
-  f->comm = s->comm;
+  f->space = s;
   PetscCall(PetscMalloc1(s->nnode, &f->index));
   PetscCall(choose_nodes(s, f->index, &f->n));
-  PetscCall(PetscMalloc1(f->n, &f->mine));
+  f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
+  PetscCall(PetscMalloc2(f->n, &f->mine, f->nblock, &f->rows));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (f->index[i] >= 0) f->mine[f->nmine++] = i;
-  f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
-  PetscCall(PetscMalloc1(f->nblock, &f->rows));
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->n, &f->scale));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->sum));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->y));
@@ -132,13 +131,12 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
 {
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*f)->rows));
   free((*f)->word);
   free((*f)->scale);
   free((*f)->sum);
   free((*f)->y);
   PetscCall(PetscFree((*f)->index));
-  PetscCall(PetscFree((*f)->mine));
+  PetscCall(PetscFree2((*f)->mine, (*f)->rows));
   PetscCall(PetscFree(*f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,19 +150,19 @@ static inline PetscInt block_of(PetscInt n, PetscInt k, PetscInt *first)
 
 /* S = L L^T in place, S a lower triangle [n][n], column-major; at the end each rank has all of L. Block
    column k belongs to rank k modulo the number of ranks. */
-static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock, PetscReal S[], PetscBool *ok)
+static PetscErrorCode factor_columns(SbInterface f, PetscReal S[], PetscBool *ok)
 {
+  const PetscMPIInt size = f->space->size, rank = f->space->rank;
+  const PetscInt n = 3 * f->n;
   const PetscScalar one = 1., minus = -1.;
-  PetscMPIInt size, rank, count;
+  PetscMPIInt count;
   PetscBLASInt ld, nc, nj, below, info;
   PetscInt c, j;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(PetscBLASIntCast(n, &ld));
   *ok = PETSC_TRUE;
-  for (PetscInt k = 0; k < nblock && *ok; k++) {
+  for (PetscInt k = 0; k < f->nblock && *ok; k++) {
     PetscReal *column, *corner;
 
     PetscCall(PetscBLASIntCast(block_of(n, k, &c), &nc));
@@ -180,10 +178,10 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
                       BLAStrsm_("R", "L", "T", "N", &below, &nc, &one, corner, &ld, corner + nc, &ld));
     }
     PetscCall(PetscMPIIntCast((PetscInt)nc * n, &count));
-    PetscCallMPI(MPI_Bcast(column, count, MPIU_REAL, (PetscMPIInt)(k % size), comm));
+    PetscCallMPI(MPI_Bcast(column, count, MPIU_REAL, (PetscMPIInt)(k % size), f->space->comm));
     *ok = (PetscBool)(corner[0] > 0.);
     /* contribution of this rank's columns */
-    for (PetscInt b = k + 1; b < nblock && *ok; b++) {
+    for (PetscInt b = k + 1; b < f->nblock && *ok; b++) {
       if (b % size != rank) continue;
       PetscCall(PetscBLASIntCast(block_of(n, b, &j), &nj));
       below = ld - (PetscBLASInt)j;
@@ -196,17 +194,17 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
 
 PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal schur[], PetscBool *ok)
 {
+  const MPI_Comm comm = f->space->comm;
+  const PetscMPIInt size = f->space->size, rank = f->space->rank;
   const PetscInt n = 3 * f->n;
   const PetscScalar one = 1.;
-  PetscMPIInt size, rank, count;
+  PetscMPIInt count;
   PetscInt64 *load;
   PetscReal *x;
 
   PetscFunctionBeginUser;
   *ok = PETSC_TRUE;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Comm_size(f->comm, &size));
-  PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
   /* each block column is summed on the rank that factors it */
   for (PetscInt k = 0; k < f->nblock; k++) {
     const PetscMPIInt owner = (PetscMPIInt)(k % size);
@@ -216,14 +214,14 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
     PetscCall(PetscMPIIntCast(block_of(n, k, &first) * n, &count));
     column = schur + (size_t)first * (size_t)n;
     PetscCallMPI(
-      MPI_Reduce(rank == owner ? MPI_IN_PLACE : column, column, count, MPIU_REAL, MPI_SUM, owner, f->comm));
+      MPI_Reduce(rank == owner ? MPI_IN_PLACE : column, column, count, MPIU_REAL, MPI_SUM, owner, comm));
   }
-  PetscCall(factor_columns(f->comm, n, f->nblock, schur, ok));
+  PetscCall(factor_columns(f, schur, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* distribute the row blocks of W, long ones first, each to the rank with the least work so far */
   PetscCall(PetscMalloc2(size, &load, (size_t)n * BLOCK, &x));
-  PetscCallMPI(MPI_Allgather(&work, 1, MPIU_INT64, load, 1, MPIU_INT64, f->comm));
+  PetscCallMPI(MPI_Allgather(&work, 1, MPIU_INT64, load, 1, MPIU_INT64, comm));
   f->nrows = 0;
   f->nword = 0;
   for (PetscInt b = f->nblock - 1; b >= 0; b--) {
@@ -288,9 +286,9 @@ PetscErrorCode SbInterfaceSolve(SbInterface f, float x[])
   PetscFunctionBeginUser;
   if (!f->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMPIIntCast(3 * f->n, &n));
-  PetscCallMPI(MPI_Allreduce(x, f->sum, n, MPI_FLOAT, MPI_SUM, f->comm));
+  PetscCallMPI(MPI_Allreduce(x, f->sum, n, MPI_FLOAT, MPI_SUM, f->space->comm));
   PetscCall(PetscArrayzero(x, n));
   multiply_rows(f, x);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x, n, MPI_FLOAT, MPI_SUM, f->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x, n, MPI_FLOAT, MPI_SUM, f->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

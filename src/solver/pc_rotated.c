@@ -92,7 +92,6 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   const PetscInt *index = p->face->index, nall = s->plan->di[n] + s->plan->oi[n];
   const size_t m = 3 * (size_t)p->face->n, nkept = 3 * (size_t)p->nkeep;
   PetscInt *node, *ia, *ja, nz = 0, count = ninterior;
-  PetscInt64 entries, bytes;
   PetscReal *block, *own, *schur;
 
   PetscFunctionBeginUser;
@@ -135,8 +134,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
     }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
-  SbFactorSize(p->factor, &entries, &bytes);
-  if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));
+  if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * SbFactorBytes(p->factor), schur, ok));
   PetscCall(PetscFree2(own, schur));
   PetscCall(PetscFree4(node, ia, ja, block));
   p->nfactor++;
@@ -163,10 +161,10 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
     PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
-    PetscCall(PetscMalloc3(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread));
-    PetscCall(PetscMalloc5(9 * n, &p->Q, 3 * n, &p->diagonal, 3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z));
     PetscCall(
-      PetscMalloc4(3 * p->n, &p->b, 3 * p->n, &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
+      PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n, &p->diagonal));
+    PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n, &p->x,
+                           3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
   }
   /* the rotations of cells that belong to the operator */
   PetscCall(SbMatrixFreeGetRotations(A, &cells));
@@ -206,81 +204,66 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = Q^T x or Q x of one node. */
-SB_INLINE void turn_back(const float Q[9], const float x[3], float y[3])
+/* y = Q x of one node or, back, Q^T x. */
+SB_INLINE void turn(const float Q[9], int back, const float x[3], float y[3])
 {
-  for (int c = 0; c < 3; c++) y[c] = Q[c] * x[0] + Q[3 + c] * x[1] + Q[6 + c] * x[2];
-}
+  const int row = back ? 1 : 3, column = back ? 3 : 1;
 
-SB_INLINE void turn_forth(const float Q[9], const float x[3], float y[3])
-{
-  for (int c = 0; c < 3; c++) y[c] = Q[3 * c] * x[0] + Q[3 * c + 1] * x[1] + Q[3 * c + 2] * x[2];
-}
-
-/* z = Q A0^-1 Q^T r on owned nodes. */
-static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
-{
-  SbSpace s = p->space;
-  const SbInterface f = p->face;
-  const PetscInt ninterior = p->n - p->nkeep;
-
-  PetscFunctionBeginUser;
-  // Q^T r in the interior, and forward substitution
-  for (PetscInt k = 0; k < ninterior; k++) turn_back(p->Q + 9 * p->node[k], r + 3 * p->node[k], p->b + 3 * k);
-  PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
-  SbFactorForward(p->factor, p->b, p->kept);
-  if (f->n) {
-    // interface: right-hand side of own rows plus the contributions of the interior
-    PetscCall(PetscArrayzero(p->edge, 3 * f->n));
-    for (PetscInt k = 0; k < f->nmine; k++) {
-      const PetscInt i = f->mine[k];
-
-      turn_back(p->Q + 9 * i, r + 3 * i, p->edge + 3 * f->index[i]);
-    }
-    for (PetscInt k = 0; k < 3 * p->nkeep; k++)
-      p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3] += p->kept[k];
-    PetscCall(SbInterfaceSolve(f, p->edge));
-    for (PetscInt k = 0; k < 3 * p->nkeep; k++)
-      p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
-  }
-  // backward substitution, and multiplication by Q
-  SbFactorBackward(p->factor, p->kept, p->x);
-  for (PetscInt k = 0; k < ninterior; k++)
-    turn_forth(p->Q + 9 * p->node[k], p->x + 3 * k, z + 3 * p->node[k]);
-  for (PetscInt k = 0; k < f->nmine; k++) {
-    const PetscInt i = f->mine[k];
-
-    turn_forth(p->Q + 9 * i, p->edge + 3 * f->index[i], z + 3 * i);
-  }
-  // prescribed nodes: divide by the diagonal
-  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
-    const PetscInt i = s->fixed_node[k];
-
-    for (PetscInt c = 3 * i; c < 3 * i + 3 && s->fixed[i] == 7; c++) z[c] = p->diagonal[c] * r[c];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (int c = 0; c < 3; c++)
+    y[c] = Q[row * c] * x[0] + Q[row * c + column] * x[1] + Q[row * c + 2 * column] * x[2];
 }
 
 static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
 {
+  const PetscScalar *in;
+  PetscScalar *out;
+  PetscInt n, ninterior;
+  float *r, *z;
+  SbInterface f;
   Rotated *p;
   SbSpace s;
-  const PetscScalar *r;
-  PetscScalar *z;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   s = p->space;
-  PetscCall(VecGetArrayRead(R, &r));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p->r[i] = (float)(p->scale * r[i]);
-  PetscCall(VecRestoreArrayRead(R, &r));
-  PetscCall(PetscArraycpy(p->r1, p->r, 3 * s->nnode_owned));
-  SbExactNodesBefore(&p->exact, p->r1);
-  PetscCall(apply_factor(p, p->r1, p->z));
-  SbExactNodesAfter(&p->exact, p->r, p->z);
-  PetscCall(VecGetArrayWrite(Z, &z));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) z[i] = p->z[i] / p->scale;
-  PetscCall(VecRestoreArrayWrite(Z, &z));
+  f = p->face;
+  n = 3 * s->nnode_owned;
+  ninterior = p->n - p->nkeep;
+  r = p->r1;
+  z = p->z;
+  // the residual in single precision, without the part of the exact nodes
+  PetscCall(VecGetArrayRead(R, &in));
+  for (PetscInt i = 0; i < n; i++) p->r[i] = r[i] = (float)(p->scale * in[i]);
+  PetscCall(VecRestoreArrayRead(R, &in));
+  SbExactNodesBefore(&p->exact, r);
+  // Q^T r in the interior, and forward substitution
+  for (PetscInt k = 0; k < ninterior; k++) turn(p->Q + 9 * p->node[k], 1, r + 3 * p->node[k], p->b + 3 * k);
+  PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
+  SbFactorForward(p->factor, p->b, p->kept);
+  // interface: right-hand side of own rows plus the contributions of the interior
+  PetscCall(PetscArrayzero(p->edge, 3 * f->n));
+  for (PetscInt k = 0; k < f->nmine; k++)
+    turn(p->Q + 9 * f->mine[k], 1, r + 3 * f->mine[k], p->edge + 3 * f->index[f->mine[k]]);
+  for (PetscInt k = 0; k < 3 * p->nkeep; k++)
+    p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3] += p->kept[k];
+  PetscCall(SbInterfaceSolve(f, p->edge));
+  for (PetscInt k = 0; k < 3 * p->nkeep; k++)
+    p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
+  // backward substitution, and multiplication by Q
+  SbFactorBackward(p->factor, p->kept, p->x);
+  for (PetscInt k = 0; k < ninterior; k++) turn(p->Q + 9 * p->node[k], 0, p->x + 3 * k, z + 3 * p->node[k]);
+  for (PetscInt k = 0; k < f->nmine; k++)
+    turn(p->Q + 9 * f->mine[k], 0, p->edge + 3 * f->index[f->mine[k]], z + 3 * f->mine[k]);
+  // prescribed nodes: divide by the diagonal
+  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
+    const PetscInt c = 3 * s->fixed_node[k / 3] + k % 3;
+
+    if (s->fixed[c / 3] == 7) z[c] = p->diagonal[c] * r[c];
+  }
+  SbExactNodesAfter(&p->exact, p->r, z);
+  PetscCall(VecGetArrayWrite(Z, &out));
+  for (PetscInt i = 0; i < n; i++) out[i] = z[i] / p->scale;
+  PetscCall(VecRestoreArrayWrite(Z, &out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -320,12 +303,12 @@ static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
 
 static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 {
-  PetscInt64 entries = 0, bytes = 0;
+  PetscReal flops, entries = 0.;
   Rotated *p;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
+  if (p->factor) SbFactorCost(p->factor, &flops, &entries);
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  factor of a past operator turned with the nodes: %" PetscInt_FMT
                                    " factorisations, rank 0: %g million entries, %" PetscInt_FMT
@@ -346,9 +329,8 @@ static PetscErrorCode PCDestroy_Rotated(PC pc)
   PetscCall(PetscFree2(p->node, p->local));
   PetscCall(PetscFree2(p->ia, p->ja));
   PetscCall(PetscFree(p->cells));
-  PetscCall(PetscFree3(p->turn, p->turn0, p->spread));
-  PetscCall(PetscFree5(p->Q, p->diagonal, p->r, p->r1, p->z));
-  PetscCall(PetscFree4(p->b, p->x, p->kept, p->edge));
+  PetscCall(PetscFree5(p->turn, p->turn0, p->spread, p->Q, p->diagonal));
+  PetscCall(PetscFree7(p->r, p->r1, p->z, p->b, p->x, p->kept, p->edge));
   PetscCall(PetscFree(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -383,14 +365,12 @@ PetscErrorCode SbPCRotatedCreate(SbSpace s, PC pc)
 PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
                                    PetscInt *nface)
 {
-  PetscInt64 entries, bytes = 0;
   Rotated *p;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
   if (nfactor) *nfactor = p->nfactor;
-  if (interior) *interior = 2 * bytes;
+  if (interior) *interior = p->factor ? 2 * SbFactorBytes(p->factor) : 0;
   if (interface) *interface = p->face ? (PetscInt64)(sizeof(*p->face->word) * p->face->nword) : 0;
   if (nface) *nface = p->face ? p->face->n : 0;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,12 +7,10 @@
 #include "sbsolver.h"
 #include "factor.h"
 
-/* interface between ranks */
-
 /* The interface nodes, and W of their inverse Schur complement W^T W, distributed by rows (interface.c). */
 typedef struct _p_SbInterface *SbInterface;
 struct _p_SbInterface {
-  MPI_Comm comm;
+  SbSpace space;          /* borrowed */
   PetscInt n;             /* number of interface nodes, all ranks */
   PetscInt *index;        /* [nnode] number of a local node in the interface, -1 for others */
   PetscInt nmine;         /* number owned by this rank */
@@ -39,23 +37,18 @@ PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
 PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
 
-/* nodes solved exactly */
-
 /* Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the
    node fits, and a few such nodes dominate the number of iterations. They are solved exactly: with B =
    A_BB^-1 on them the preconditioner is B + (1 - B A) P (1 - A B), symmetric and positive definite for any P
    that is. */
 typedef struct {
-  PetscInt n;         /* number of nodes */
-  PetscInt *node;     /* [n] owned local nodes */
-  PetscInt *index;    /* [nnode_owned] position in node, -1 for others */
-  PetscInt *ia, *ja;  /* pattern of their rows in the operator */
-  PetscReal *block;   /* [ia[n]][9] blocks of these rows */
-  float *value;       /* [ia[n]][9] the same in single precision */
-  PetscInt *ka, *kja; /* pattern of the blocks between exact nodes */
-  PetscReal *kblock;
-  float *x, *y; /* [n][3] work vectors */
-  SbFactor factor;
+  PetscInt n;        /* number of nodes */
+  PetscInt *node;    /* [n] owned local nodes */
+  PetscInt *index;   /* [nnode_owned] position in node, -1 for others */
+  PetscInt *ia, *ja; /* pattern of their rows in the operator */
+  float *value;      /* [ia[n]][9] blocks of these rows */
+  float *x, *y;      /* [n][3] work vectors */
+  SbFactor factor;   /* of the blocks between exact nodes */
 } SbExactNodes;
 
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);

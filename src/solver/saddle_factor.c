@@ -48,38 +48,28 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
   PetscFunctionBeginUser;
   /* the factorisation of this K with these constraints is missing */
   if (!c->factored || c->factored_matrix != c->matrix || c->factored_version != c->version) {
-    const PetscInt n = s->nnode_owned, *di = s->plan->di, *oi = s->plan->oi, nz = di[n] + oi[n];
-    PetscInt *ia, *ja, *near, *far;
+    const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
+    PetscInt *ia, *ja;
     PetscReal *block;
 
     PetscCall(PCDestroy(&c->factored));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
-    /* the projected matrix as AIJ; MatConvert() would need parts of the block matrix that are in use */
-    /* K, block by block */
-    PetscCall(PetscMalloc5(n + 1, &ia, nz, &ja, 9 * (size_t)nz, &block, 3 * n, &near, 3 * n, &far));
+    /* K as AIJ; MatConvert() would need parts of the block matrix that are in use */
+    PetscCall(PetscMalloc3(n + 1, &ia, nz, &ja, 9 * (size_t)nz, &block));
     PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, ja, block));
-    for (PetscInt k = 0; k < 3 * n; k++) {
-      near[k] = 3 * (di[k / 3 + 1] - di[k / 3]);
-      far[k] = 3 * (oi[k / 3 + 1] - oi[k / 3]);
-    }
-    PetscCall(MatCreateAIJ(s->comm, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode, 0, near, 0, far, &A));
-
+    PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_AIJ, &A));
     /* springs are added and blocks projected while they are copied */
     for (PetscInt k = 0; k < n; k++) {
-      const PetscInt row = 3 * s->gnode[k], rows[3] = {row, row + 1, row + 2};
-
       for (PetscInt j = ia[k]; j < ia[k + 1]; j++) {
-        const PetscInt column = 3 * s->gnode[ja[j]], columns[3] = {column, column + 1, column + 2};
-
         if (ja[j] == k) SbConstraintsAddSprings(s, k, block + 9 * j);
         SbConstraintsProjectBlock(s, k, ja[j], 3, 1, block + 9 * j);
-        PetscCall(MatSetValues(A, 3, rows, 3, columns, block + 9 * j, INSERT_VALUES));
+        PetscCall(MatSetValuesBlocked(A, 1, &s->gnode[k], 1, &s->gnode[ja[j]], block + 9 * j, INSERT_VALUES));
       }
     }
     PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     PetscCall(MatSetOption(A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
-    PetscCall(PetscFree5(ia, ja, block, near, far));
+    PetscCall(PetscFree3(ia, ja, block));
     PetscCall(PCCreate(s->comm, &c->factored));
     PetscCall(PCSetOptionsPrefix(c->factored, "saddle_"));
     PetscCall(PCSetOperators(c->factored, A, A));

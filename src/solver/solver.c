@@ -78,16 +78,15 @@ static const SbSolverPreset presets[] = {
 
 /* Matrix types and options for preconditioners of -pc_type. The last row: all others. */
 static const SbSolverPreset by_type[] = {
-  {PCNONE, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", .by_type = PETSC_TRUE},
-  {PCJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", .by_type = PETSC_TRUE},
-  {PCPBJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", .by_type = PETSC_TRUE},
-  {PCICC, SB_MATRIX_SBAIJ, "-ksp_type cg -pc_type icc", .by_type = PETSC_TRUE},
-  {PCBJACOBI, SB_MATRIX_AIJ, "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite",
+  {PCNONE, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
+  {PCJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
+  {PCPBJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
+  {PCICC, SB_MATRIX_SBAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
+  {PCBJACOBI, SB_MATRIX_AIJ, "-ksp_type cg -sub_pc_factor_shift_type positive_definite",
    .by_type = PETSC_TRUE},
-  {PCASM, SB_MATRIX_AIJ, "-ksp_type cg -pc_type asm -sub_pc_factor_shift_type positive_definite",
-   .by_type = PETSC_TRUE},
-  {PCSOR, SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", .by_type = PETSC_TRUE},
-  {PCHYPRE, SB_MATRIX_AIJ, "-ksp_type cg -pc_type hypre", .package = "hypre", .by_type = PETSC_TRUE},
+  {PCASM, SB_MATRIX_AIJ, "-ksp_type cg -sub_pc_factor_shift_type positive_definite", .by_type = PETSC_TRUE},
+  {PCSOR, SB_MATRIX_AIJ, "-ksp_type cg -pc_sor_local_symmetric", .by_type = PETSC_TRUE},
+  {PCHYPRE, SB_MATRIX_AIJ, "-ksp_type cg", .package = "hypre", .by_type = PETSC_TRUE},
   {"", SB_MATRIX_AIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
 };
 
@@ -135,17 +134,12 @@ static const SbSolverPreset *find_preset(const char *name)
 }
 
 /* Value of an option in a preset's option string, "" if it has none. */
-static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
+static void preset_value(const SbSolverPreset *preset, const char *name, char value[SB_NAME_MAX])
 {
   const char *at = strstr(preset->options, name);
 
-  PetscFunctionBeginUser;
-  value[0] = 0;
-  if (at) {
-    at += strlen(name) + 1;
-    PetscCall(PetscStrncpy(value, at, PetscMin(size, strcspn(at, " ") + 1)));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  at = at ? at + strlen(name) + 1 : "";
+  SbFormat(SB_NAME_MAX, value, "%.*s", (int)strcspn(at, " "), at);
 }
 
 /* Properties of the bodies that make systems hard to solve. */
@@ -210,7 +204,7 @@ static PetscErrorCode find_type(const char *choice, const SbSolverPreset **prese
   }
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   if (base) {
-    PetscCall(preset_value(base, "-pc_type", sizeof(own), own));
+    preset_value(base, "-pc_type", own);
     *preset = strcmp(own, type) ? NULL : base;
   }
   for (size_t k = 0; !*preset; k++)
@@ -226,11 +220,9 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   char method[SB_NAME_MAX] = "", count[48], system[64];
   PetscInt nface = 0, most = 0;
   PetscBool has = PETSC_TRUE, turns;
-  PetscMPIInt nrank;
   Hardness hard;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   PetscCall(find_hardness(s, &hard));
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!hard.indefinite, &package));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
@@ -242,7 +234,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     turns = (PetscBool)(dynamic && !linear && hard.face_nu <= NU_ROTATED && strcmp(method, KSPMINRES) &&
                         unknowns <= (hard.slivers && hard.nu <= NU_SLIVERS ? ROTATED_SLIVERS : ROTATED));
   if (*preset) turns = PETSC_FALSE;
-  if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
+  if (turns && s->ghosted && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
   if (nface > most) {
     if (strcmp(choice, "auto"))
       PetscCall(SbWarning(s->comm,
@@ -265,8 +257,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
                "another solver, or auto");
     name = package;
-    SbFormat(size, reason, "the factorisation for %s on %d rank%s%s", count, (int)nrank, nrank > 1 ? "s" : "",
-             hard.indefinite ? "; the exact tangent may be indefinite" : "");
+    SbFormat(size, reason, "the factorisation for %s on %d rank%s%s", count, (int)s->size,
+             s->ghosted ? "s" : "", hard.indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (strcmp(choice, "auto")) {
     SbFormat(size, reason, "chosen by -solver");
   } else if (turns) {
@@ -320,7 +312,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   if (nface > most)
     SbAppend(size, reason,
              "; %d ranks meet at %" PetscInt_FMT " nodes, and rotated and realtime take %" PetscInt_FMT,
-             (int)nrank, nface, most);
+             (int)s->size, nface, most);
   if (!*preset) *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
   if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
@@ -382,14 +374,12 @@ PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
   SbMatrixKind kind = preset->matrix;
-  PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   /* PETSc's block ICC has no shift, and breaks down for CR and DG with any tangent; P1 needs no shift, and
      its block ICC takes two fifths less time than the scalar one */
   if (kind == SB_MATRIX_SBAIJ && !preset->precondition && s->faces) kind = SB_MATRIX_AIJ;
-  if (kind == SB_MATRIX_SBAIJ && nrank > 1) kind = SB_MATRIX_BAIJ;
+  if (kind == SB_MATRIX_SBAIJ && s->ghosted) kind = SB_MATRIX_BAIJ;
   if (preset->create)
     PetscCall(preset->create(s, A));
   else
@@ -402,15 +392,13 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
   const char *package;
-  PetscMPIInt size;
   PetscBool has;
   Hardness hard;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
   PetscCall(find_hardness(s, &hard));
   PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !hard.indefinite), &package));
-  if (size > 1) {
+  if (s->ghosted) {
     /* on several ranks, MUMPS for any other matrix type */
     package = MATSOLVERMUMPS;
     PetscCall(SbHasPackage(package, &has));
@@ -441,15 +429,13 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
   PetscBool given, symmetric, reproducible;
-  PetscMPIInt size;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   /* algebraic multigrid sums its coarse matrices in the order in which messages arrive */
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  if (reproducible && size > 1)
+  if (reproducible && s->ghosted)
     PetscCall(SbSolverSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
@@ -463,8 +449,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
     KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, SbConstraintsSeparate(s) ? 1e10 : PETSC_DEFAULT, 5000));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
   /* the preset's types, or those of the user */
-  PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
-  PetscCall(preset_value(preset, "-pc_type", sizeof(type), type));
+  preset_value(preset, "-ksp_type", method);
+  preset_value(preset, "-pc_type", type);
   PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), NULL));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", users, sizeof(users), &given));
   PetscCall(KSPSetType(ksp, given ? users : method));
@@ -514,7 +500,7 @@ PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace s)
 }
 
 /* Errors for a factorisation that the matrix type, the number of ranks or -reproducible rules out. */
-static PetscErrorCode check_factor(PC pc, Mat A)
+static PetscErrorCode check_factor(SbSpace s, PC pc, Mat A)
 {
   static const struct {
     PCType type;
@@ -527,26 +513,24 @@ static PetscErrorCode check_factor(PC pc, Mat A)
     {PCILU, MAT_FACTOR_ILU, "-pc_type bjacobi -sub_pc_type ilu, which does it on each rank"},
   };
   MatSolverType package;
-  PetscMPIInt size;
   PetscBool is, has, distributed, reproducible;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)pc), &size));
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &distributed, PCLU, PCCHOLESKY, ""));
-  PetscCheck(!reproducible || size == 1 || !distributed, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+  PetscCheck(!reproducible || !s->ghosted || !distributed, s->comm, PETSC_ERR_USER,
              "-reproducible: a factorisation on %d ranks has other last digits in each run; choose -solver "
              "direct, which factors on one of them",
-             (int)size);
+             (int)s->size);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     PetscCall(PetscObjectTypeCompare((PetscObject)pc, of[i].type, &is));
     if (!is) continue;
     PetscCall(PCFactorGetMatSolverType(pc, &package));
     PetscCall(MatGetFactorAvailable(A, package, of[i].kind, &has));
-    PetscCheck(has, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+    PetscCheck(has, s->comm, PETSC_ERR_USER,
                "-pc_type %s%s%s has no factorisation on %d rank%s in this PETSc: choose %s", of[i].type,
-               package ? " -pc_factor_mat_solver_type " : "", package ? package : "", (int)size,
-               size == 1 ? "" : "s", of[i].advice);
+               package ? " -pc_factor_mat_solver_type " : "", package ? package : "", (int)s->size,
+               s->ghosted ? "s" : "", of[i].advice);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -605,7 +589,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   }
   PetscCall(SbPCCheckPivots(pc));
   /* unsupported combinations are errors before anything is computed */
-  PetscCall(check_factor(pc, P));
+  PetscCall(check_factor(s, pc, P));
   PetscCall(check_method(s, ksp, pc, preset, &direct));
   /* the matrix without the nonsymmetric part is the preconditioner of the complete tangent */
   PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));

@@ -77,8 +77,6 @@ PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, Pets
 /* The context of a PCSHELL with this name, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context);
 
-/* sweeps of Gauss-Seidel */
-
 /* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes. extra[n][3] (output;
    NULL: none): l1 terms, added to the diagonal, with which sweeps converge on several ranks. Zero and
    *positive = false where a determinant is not positive on this rank. Not collective. */

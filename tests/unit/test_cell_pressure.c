@@ -25,9 +25,9 @@ static PetscErrorCode test_energy(const char *law, PetscRandom random)
   SbPack F[9], psi, without, p;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., "test", &m));
+  PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., &m));
   /* lambda is 0 for nu = 0; mu is that of m */
-  PetscCall(SbMaterialCreateElastic(law, 2. * m->mu, 0., 1., "test", &shear));
+  PetscCall(SbMaterialCreateElastic(law, 2. * m->mu, 0., 1., &shear));
   for (int i = 0; i < 20; i++) {
     PetscCall(deform(random, 0.3, F));
     m->ops.energy(m, (const SbPack *)F, psi);
@@ -48,7 +48,7 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
   SbPack F[9], p;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialCreateElastic(law, 1000., 0.4999, 1., "test", &m));
+  PetscCall(SbMaterialCreateElastic(law, 1000., 0.4999, 1., &m));
   PetscCall(deform(random, size, F));
   m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) {

@@ -393,7 +393,7 @@ int main(int argc, char **argv)
   for (int k = 0; k < 4; k++) {
     SbMaterial m;
 
-    PetscCall(SbMaterialCreateElastic(laws[k], 2e4, 0.35, 1000, "test", &m));
+    PetscCall(SbMaterialCreateElastic(laws[k], 2e4, 0.35, 1000, &m));
     test_force(e, m);
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT));
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT_SPD));

@@ -74,7 +74,7 @@ int main(int argc, char **argv)
       PetscReal sum = -r[3 * e.node[k] + c];
 
       for (PetscInt at = e.ia[k]; at < e.ia[k + 1]; at++)
-        for (PetscInt d = 0; d < 3; d++) sum += e.block[9 * at + 3 * c + d] * z[3 * e.ja[at] + d];
+        for (PetscInt d = 0; d < 3; d++) sum += e.value[9 * at + 3 * c + d] * z[3 * e.ja[at] + d];
       worst = PetscMax(worst, PetscAbsReal(sum));
     }
   }

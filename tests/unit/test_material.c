@@ -63,8 +63,7 @@ static PetscErrorCode test_refusals(void)
   static const struct {
     const char *law, *young, *poisson, *density, *tangent, *names;
   } refused[] = {
-    {"corotatd", "5e3", "0.25", "1", NULL,
-     "-body_bcorotatd_material|\"corotatd\"|corotated|linear|stvk|neohookean"},
+    {"corotatd", "5e3", "0.25", "1", NULL, "\"corotatd\""},
     {"corotated", NULL, "0.25", "1", NULL, "-body_bcorotated_young|(0, inf)"},
     {"corotated", "-1", "0.25", "1", NULL, "-body_bcorotated_young -1 Pa|(0, inf) Pa"},
     {"corotated", "5e3", NULL, "1", NULL, "-body_bcorotated_poisson|(-1, 0.5)"},
@@ -81,13 +80,7 @@ static PetscErrorCode test_refusals(void)
     SB_CHECK_ERROR(create(refused[k].law, refused[k].young, refused[k].poisson, refused[k].density,
                           refused[k].tangent, &m),
                    PETSC_ERR_USER, refused[k].names);
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", PETSC_INFINITY, 0.3, 1, "test", &m), PETSC_ERR_USER,
-                 "(0, inf)");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, NAN, 1, "test", &m), PETSC_ERR_USER, "(-1, 0.5)");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.5, 1, "test", &m), PETSC_ERR_USER, "(-1, 0.5)");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 0, 0.3, 1, "test", &m), PETSC_ERR_USER, "(0, inf)");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.3, 0, "test", &m), PETSC_ERR_USER, "(0, inf)");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("rubber", 1, 0.3, 1, "test", &m), PETSC_ERR_USER, "\"rubber\"");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("rubber", 1, 0.3, 1, &m), PETSC_ERR_USER, "\"rubber\"");
   PetscCall(create("linear", "1", "0", "1", NULL, &m));
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -32,7 +32,7 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbMaterialCreateElastic("linear", 5e3, nu[k], 1000, "test", &m));
+    PetscCall(SbMaterialCreateElastic("linear", 5e3, nu[k], 1000, &m));
     SB_CHECK(m->linear, "flags");
     check_rest(m);
     check_lanes(m);

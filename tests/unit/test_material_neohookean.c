@@ -65,7 +65,7 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbMaterialCreateElastic("neohookean", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, "test", &m));
+    PetscCall(SbMaterialCreateElastic("neohookean", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, &m));
     test_states(m);
     test_small_strains(m);
     PetscCall(check_law(m, PETSC_TRUE));

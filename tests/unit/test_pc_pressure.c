@@ -36,7 +36,7 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
   SbMaterial m;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialCreateElastic(law, 2. * mu * (1. + nu), nu, 1000., "test", &m));
+  PetscCall(SbMaterialCreateElastic(law, 2. * mu * (1. + nu), nu, 1000., &m));
   if (!strcmp(law, "corotated")) PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
   for (int k = 0; k < 60; k++) {
     const PetscReal middle = 0.5 * (low + high);
