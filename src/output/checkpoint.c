@@ -81,14 +81,14 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
   memcpy(number, all, sizeof(all));
 }
 
-static PetscErrorCode checksum_of(const Part *p, const PetscReal slice[], uint64_t *sum)
+static PetscErrorCode checksum_of(MPI_Comm comm, const Part *p, const PetscReal slice[], uint64_t *sum)
 {
   uint64_t mine = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < p->ncomp * p->order->n; i++)
     mine += SbMixReal((uint64_t)(p->ncomp * p->order->start + i) + (p->salt << 48), slice[i]);
-  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, p->order->comm));
+  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,10 +110,10 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
       PetscCall(VecGetArrayRead(p->vec, &array));
     else
       PetscCall(SbSpaceGetJumps(run->model->space, run->U, jumps));
-    PetscCall(SbOrderGather(p->order, p->ncomp, array, slice));
+    PetscCall(SbForestReduce(p->order->sf, p->ncomp, MPIU_REAL, array, slice));
     if (p->vec) PetscCall(VecRestoreArrayRead(p->vec, &array));
     PetscCall(SbH5WriteSlice(h, h->file, p->name, p->unit, p->order, p->ncomp, H5T_IEEE_F64LE, slice));
-    PetscCall(checksum_of(p, slice, &sum));
+    PetscCall(checksum_of(out->comm, p, slice, &sum));
     if (p->sum)
       PetscCall(SbH5PutInt(h, h->file, p->sum, (int64_t)sum));
     else
@@ -203,10 +203,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   // a run that may be asked to stop writes one, too: work and dissipation are part of the state
-  if (asked) {
-    PetscCall(SbOutputOrder(run, out));
-    run->want_energies = PETSC_TRUE;
-  }
+  if (asked) run->want_energies = PETSC_TRUE;
   if (asked || run->stop.listens) PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -262,11 +259,11 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
     if (p->sum) SbH5GetInt(h->file, p->sum, &own, ok);
     if (*ok && p->vec && p->vec == run->path) SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
     if (!*ok) break;
-    PetscCall(checksum_of(p, slice, &sum));
+    PetscCall(checksum_of(out->comm, p, slice, &sum));
     *ok = (PetscBool)(!p->sum || own == (int64_t)sum);
     if (!p->sum) *all += sum;
     if (p->vec) PetscCall(VecGetArray(p->vec, &array));
-    PetscCall(SbOrderScatter(p->order, p->ncomp, slice, array));
+    PetscCall(SbForestBroadcast(p->order->sf, p->ncomp, MPIU_REAL, slice, array));
     if (p->vec)
       PetscCall(VecRestoreArray(p->vec, &array));
     else if (*ok)
@@ -306,7 +303,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   if (*ok) PetscCall(read_parts(run, out, &h, &sum, ok));
   if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, 0., &sum, ok));
-  if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
+  if (*ok) SbCheckpointSumMeshes(run, &h, &sum, ok);
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
   /* scalars; the next step has the length of the uninterrupted run, unless -ts_dt or -ts_max_time differ */
@@ -344,30 +341,32 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
+PetscErrorCode SbCheckpointLoad(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  PetscBool latest = (PetscBool)!strcmp(file, "latest"), ok = PETSC_FALSE;
+  PetscBool ok;
   char path[PETSC_MAX_PATH_LEN];
   struct stat info;
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputOrder(run, out));
-  PetscCheck(stat(file, &info) || !S_ISDIR(info.st_mode), out->comm, PETSC_ERR_FILE_OPEN,
+  PetscCheck(stat(out->restart, &info) || !S_ISDIR(info.st_mode), out->comm, PETSC_ERR_FILE_OPEN,
              "-restart %s is a folder: name a checkpoint_*.h5 in it, or go on there with -output_dir %s "
              "-restart latest",
-             file, file);
-  for (int k = 0; !ok; k++) {
-    PetscCall(SbCheckpointFind(out, file, k, sizeof(path), path));
+             out->restart, out->restart);
+  for (;;) {
+    PetscCall(SbCheckpointFind(out, path));
     /* an unreadable one is skipped if an older one may be taken */
     PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
-               k ? "readable " : "", out->dir);
+               out->ndamaged ? "readable " : "", out->dir);
     PetscCall(load(run, out, path, &ok));
-    PetscCheck(ok || latest, out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s", path,
+    if (ok) break;
+    PetscCheck(!strcmp(out->restart, "latest"), out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s",
+               path,
                access(path, R_OK) ? "there is no such file, or it may not be read"
                                   : "it is truncated, damaged or not a checkpoint");
-    if (!ok)
-      PetscCall(SbWarning(out->comm, "%s is truncated or damaged: trying the checkpoint before it", path));
+    PetscCall(SbWarning(out->comm, SB_SKIPPED, path));
+    out->ndamaged++;
   }
   out->restarted = PETSC_TRUE;
   if (!out->quiet)

@@ -30,7 +30,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < m->neffect; k++) {
     SbEffect e = m->effect[k];
-    SbOrder order = {.comm = m->comm};
+    SbOrder order = {0};
     char name[2 * SB_NAME_MAX];
     PetscReal *record;
     uint64_t mine, all;
@@ -62,7 +62,7 @@ PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
   for (PetscInt k = 0; k < m->neffect && *ok; k++) {
     SbEffect e = m->effect[k];
-    SbOrder order = {.comm = m->comm};
+    SbOrder order = {0};
     char name[2 * SB_NAME_MAX];
     PetscBool there = PETSC_TRUE;
     PetscReal *record;

@@ -14,42 +14,42 @@ typedef struct {
   PetscInt n, ncomp; /* n of all ranks */
   hid_t type;        /* in the file */
   void *data;
+  uint64_t salt; /* in the checksum */
 } Array;
 
 #define NARRAY 8
 #define NCOUNT 4
+static const char *const counts[NCOUNT] = {"vertices", "tets", "faces", "curved"};
+
 static void arrays_of(SbMemoryMesh *g, const PetscInt count[NCOUNT], Array a[NARRAY])
 {
-  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, g->x};
-  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, g->cell};
-  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, g->tri};
-  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, g->vert_set};
-  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, g->cell_set};
-  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, g->tri_set};
-  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, g->edge};
-  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, g->edge_off};
+  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, g->x, 0};
+  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, g->cell, SALT};
+  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, g->tri, 2 * (uint64_t)SALT};
+  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, g->vert_set, 0};
+  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, g->cell_set, 0};
+  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, g->tri_set, 0};
+  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, g->edge, 3 * (uint64_t)SALT};
+  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, g->edge_off, 4 * (uint64_t)SALT};
 }
 
 /* Sum of positions and values, so that damage is seen. */
-static uint64_t sum_of(const SbMemoryMesh *g)
+static uint64_t sum_of(const Array array[NARRAY])
 {
   uint64_t sum = SALT;
 
-  for (PetscInt i = 0; i < 3 * g->nvert; i++) sum += SbMixReal((uint64_t)i, g->x[i]);
-  for (PetscInt i = 0; i < 4 * g->ncell; i++) sum += SbMixReal((uint64_t)i + SALT, (PetscReal)g->cell[i]);
-  for (PetscInt i = 0; i < 3 * g->ntri; i++)
-    sum += SbMixReal((uint64_t)i + 2 * (uint64_t)SALT, (PetscReal)g->tri[i]);
-  for (PetscInt i = 0; i < g->nvert; i++) sum += g->vert_set[i] * (uint64_t)(2 * i + 1);
-  for (PetscInt i = 0; i < g->ncell; i++) sum += g->cell_set[i] * (uint64_t)(2 * i + 1);
-  for (PetscInt i = 0; i < g->ntri; i++) sum += g->tri_set[i] * (uint64_t)(2 * i + 1);
-  for (PetscInt i = 0; i < 2 * g->nedge; i++)
-    sum += SbMixReal((uint64_t)i + 3 * (uint64_t)SALT, (PetscReal)g->edge[i]);
-  for (PetscInt i = 0; i < 3 * g->nedge; i++)
-    sum += SbMixReal((uint64_t)i + 4 * (uint64_t)SALT, g->edge_off[i]);
+  for (const Array *a = array; a < array + NARRAY; a++) {
+    for (PetscInt i = 0; i < a->n * a->ncomp; i++) {
+      if (a->type == H5T_STD_U64LE)
+        sum += ((uint64_t *)a->data)[i] * (uint64_t)(2 * i + 1);
+      else
+        sum +=
+          SbMixReal((uint64_t)i + a->salt, a->type == H5T_IEEE_F64LE ? ((PetscReal *)a->data)[i]
+                                                                     : (PetscReal)((PetscInt *)a->data)[i]);
+    }
+  }
   return sum;
 }
-
-static const char *const counts[NCOUNT] = {"vertices", "tets", "faces", "curved"};
 
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 {
@@ -66,10 +66,10 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 
     if (!g || !g->step) continue;
     memcpy(count, (const PetscInt[NCOUNT]){g->nvert, g->ncell, g->ntri, g->nedge}, sizeof(count));
-    if (!out->rank) own = sum_of(g);
     PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
-    PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
     arrays_of(g, count, a);
+    if (!out->rank) own = sum_of(a);
+    PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
     PetscCall(SbH5Reserve(h, 32 * ((PetscInt64)count[0] + count[2]) + 40 * ((PetscInt64)count[1] + count[3]) +
                                65536));
     SbFormat(sizeof(name), name, "mesh_%s", body->name);
@@ -81,7 +81,7 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
     for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
     for (int k = 0; k < NARRAY; k++) {
       const PetscInt N = a[k].n, n = out->rank ? 0 : N;
-      const SbOrder order = {.comm = out->comm, .N = N, .n = n, .start = N - n};
+      const SbOrder order = {.N = N, .n = n, .start = N - n};
 
       if (N) PetscCall(SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].type, a[k].data));
     }
@@ -96,72 +96,65 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
 {
   char name[2 * SB_NAME_MAX];
-  int64_t n[NCOUNT] = {0}, step = 0, sum = 0;
+  int64_t step = 0, sum = 0;
   PetscInt count[NCOUNT];
   Array a[NARRAY];
   hid_t group;
 
   PetscFunctionBeginUser;
   *in_memory = NULL;
-  PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
+  SbFormat(sizeof(name), name, "mesh_%s", body);
   if (!*ok || H5Lexists(file, name, H5P_DEFAULT) <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   group = H5Gopen2(file, name, H5P_DEFAULT);
   *ok = (PetscBool)(group >= 0);
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   /* older files have no curved edges */
   for (int k = 0; k < NCOUNT; k++) {
-    if (k < 3 || H5Aexists(group, counts[k]) > 0) SbH5GetInt(group, counts[k], &n[k], ok);
-    *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
+    int64_t n = 0;
+
+    if (k < 3 || H5Aexists(group, counts[k]) > 0) SbH5GetInt(group, counts[k], &n, ok);
+    *ok = (PetscBool)(*ok && n >= 0 && n < PETSC_MAX_INT / 8);
+    count[k] = *ok ? (PetscInt)n : 0;
   }
   SbH5GetInt(group, "step", &step, ok);
   SbH5GetInt(group, "sum", &sum, ok);
-  for (int k = 0; k < NCOUNT; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* counts must agree with the sizes of the datasets before anything is allocated */
-  *ok = (PetscBool)(*ok && SbH5Rows(group, "x", NULL) == n[0] && SbH5Rows(group, "cells", NULL) == n[1] &&
-                    (!n[2] || SbH5Rows(group, "triangles", NULL) == n[2]) &&
-                    (!n[3] || SbH5Rows(group, "curved_edges", NULL) == n[3]));
+  arrays_of(&(SbMemoryMesh){0}, count, a);
+  for (int k = 0; k < NARRAY; k++)
+    *ok = (PetscBool)(*ok && (!a[k].n || SbH5Rows(group, a[k].name, NULL) == a[k].n));
   if (*ok) {
     PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], count[3], in_memory));
     (*in_memory)->step = (PetscInt)step;
     SbH5GetReal(group, "mass", &(*in_memory)->mass, ok);
     SbH5GetReal(group, "bound", &(*in_memory)->bound, ok);
     arrays_of(*in_memory, count, a);
-    for (int k = 0; k < NARRAY && *ok; k++)
+    for (int k = 0; k < NARRAY && *ok; k++) {
       if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].type, a[k].n, a[k].ncomp, a[k].data);
-    /* check before the mesh is compared: a damaged file is not one of another mesh */
-    for (int k = 0; k < NARRAY; k++) {
-      if (a[k].type != H5T_STD_I64LE) continue;
-      for (PetscInt i = 0; i < a[k].n * a[k].ncomp && *ok; i++)
+      /* check before the mesh is compared: a damaged file is not one of another mesh */
+      for (PetscInt i = 0; a[k].type == H5T_STD_I64LE && i < a[k].n * a[k].ncomp && *ok; i++)
         *ok = (PetscBool)(((PetscInt *)a[k].data)[i] >= 0 && ((PetscInt *)a[k].data)[i] < count[0]);
     }
-    *ok = (PetscBool)(*ok && (int64_t)sum_of(*in_memory) == sum);
+    *ok = (PetscBool)(*ok && (int64_t)sum_of(a) == sum);
     if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));
   }
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok)
+void SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok)
 {
-  SbOutput out = (SbOutput)run->output;
-  struct {
-    uint64_t sum, ok;
-  } found = {0, 1};
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    char name[2 * SB_NAME_MAX];
+    int64_t own = 0;
+    hid_t group;
 
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < run->model->nbody && !out->rank; b++) {
-    PetscBool good = PETSC_TRUE;
-    SbMemoryMesh *in_memory;
-
-    PetscCall(read_mesh(h->file, run->model->body[b].name, &in_memory, &good));
-    if (in_memory) found.sum += sum_of(in_memory);
-    if (!good) found.ok = 0;
-    PetscCall(SbMemoryMeshDestroy(&in_memory));
+    SbFormat(sizeof(name), name, "mesh_%s", run->model->body[b].name);
+    group = SbH5OpenGroup(h->file, name);
+    if (group < 0) continue;
+    SbH5GetInt(group, "sum", &own, ok);
+    (void)H5Gclose(group);
+    *sum += (uint64_t)own;
   }
-  PetscCallMPI(MPI_Bcast(&found, 2, MPI_UINT64_T, 0, out->comm));
-  *sum += found.sum;
-  *ok = (PetscBool)(*ok && found.ok);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOutputRestoreMeshes(SbRun run)
@@ -173,8 +166,8 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
 
   PetscFunctionBeginUser;
   if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; !ok && (!k || !strcmp(out->restart, "latest")); k++) {
-    PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
+  for (;;) {
+    PetscCall(SbCheckpointFind(out, path));
     if (!path[0]) break;
 
     /* the meshes of that file, on rank 0 */
@@ -190,6 +183,9 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
       for (PetscInt b = 0; b < m->nbody && !ok; b++) PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
     }
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
+    if (ok || strcmp(out->restart, "latest")) break;
+    PetscCall(SbWarning(out->comm, SB_SKIPPED, path));
+    out->ndamaged++;
   }
   // broadcast which bodies have their own mesh, and its sizes
   for (PetscInt b = 0; b < m->nbody; b++) PetscCall(SbMemoryMeshShare(out->comm, &m->body[b].in_memory));

@@ -48,7 +48,7 @@ static int by_keys(const void *a, const void *b)
   return 0;
 }
 
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes)
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
 {
   SbContacts *c = &out->contacts;
   PetscInt bound = 0;
@@ -56,7 +56,6 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   SbRoute route;
 
   PetscFunctionBeginUser;
-  *n = -1;
   *bytes = 0;
   if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
@@ -64,23 +63,20 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
   /* Sends this rank's contact points to the ranks of their slices; sorts the received ones. */
   for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, out->comm));
   PetscCall(PetscMalloc1(c->list.n, &dest));
   for (PetscInt i = 0; i < c->list.n; i++)
     dest[i] = (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
   PetscCall(PetscFree(c->point));
-  PetscCall(SbRouteCreate(c->share.comm, c->list.n, dest, &route));
+  PetscCall(SbRouteCreate(out->comm, c->list.n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), NULL, c->list.point, &c->point));
   c->share.n = route.nrecv;
   PetscCall(SbRouteDestroy(&route));
   PetscCall(PetscFree(dest));
   if (c->share.n) qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
-  PetscCall(PetscFree(c->column));
-  PetscCall(PetscMalloc1(3 * c->share.n, &c->column));
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
   c->share.start -= c->share.n;
   PetscCallMPI(MPI_Allreduce(&c->share.n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
-  *n = c->share.N;
   for (int k = 0; k < NTABLE; k++) *bytes += 8 * (PetscInt64)c->share.N * table[k].ncomp + 8192;
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,11 +85,13 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 {
   SbContacts *c = &out->contacts;
+  PetscReal *column;
   hid_t group;
 
   PetscFunctionBeginUser;
   if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
+  PetscCall(PetscMalloc1(3 * c->share.n, &column));
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
@@ -106,55 +104,48 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
       const PetscReal push = SbDot3(p->force, p->normal);
 
       if (table[k].from == ROW)
-        c->column[i] = (PetscReal)(c->share.start + i);
+        column[i] = (PetscReal)(c->share.start + i);
       else if (table[k].from == NORMAL)
-        c->column[i] = push;
+        column[i] = push;
       else if (table[k].from == FRICTION)
-        c->column[i] = p->force[i % ncomp] - push * p->normal[i % ncomp];
+        column[i] = p->force[i % ncomp] - push * p->normal[i % ncomp];
       else if (table[k].whole)
-        c->column[i] = (PetscReal)(*(const PetscInt *)((const char *)p + table[k].from));
+        column[i] = (PetscReal)(*(const PetscInt *)((const char *)p + table[k].from));
       else
-        c->column[i] = ((const PetscReal *)((const char *)p + table[k].from))[i % ncomp];
+        column[i] = ((const PetscReal *)((const char *)p + table[k].from))[i % ncomp];
     }
-    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)c->share.n * ncomp, c->column, NULL,
+    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)c->share.n * ncomp, column, NULL,
                      H5P_DEFAULT);
-    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, c->column));
+    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, column));
   }
+  PetscCall(PetscFree(column));
   PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
   (void)H5Gclose(group);
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
+PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path)
 {
-  const hid_t group = SbH5OpenGroup(frame, "contacts");
-  int64_t count = 0;
-  PetscBool ok = PETSC_TRUE;
-
-  *n = -1;
-  *bytes = 8;
-  if (group < 0) return;
-  SbH5GetInt(group, "count", &count, &ok);
-  if (ok) *n = (PetscInt)count;
-  if (ok && count) (void)SbH5Rows(group, "gap", bytes);
-  (void)H5Gclose(group);
-}
-
-PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
-{
-  SbIndexValues values[NTABLE];
-  char group[64];
+  const hid_t group = out->contact_index ? SbH5OpenGroup(frame, "contacts") : -1;
+  SbArray array[NTABLE];
+  PetscInt bytes = out->precise ? 8 : 4;
+  int64_t n = 0;
+  PetscBool ok;
+  char name[64];
 
   PetscFunctionBeginUser;
-  if (!out->contact_index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (group < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  SbH5GetInt(group, "count", &n, &ok);
+  if (n) (void)SbH5Rows(group, "gap", &bytes);
+  (void)H5Gclose(group);
   for (int k = 0; k < NTABLE; k++)
-    values[k] = (SbIndexValues){.name = table[k].name,
-                                .ncomp = table[k].ncomp,
-                                .bytes = table[k].whole ? 4 : (int)bytes,
-                                .whole = table[k].whole};
-  (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  PetscCall(SbIndexAdd(out->contact_index, time, group, n, NTABLE - 1, values + 1));
+    array[k] = (SbArray){.name = table[k].name,
+                         .ncomp = table[k].ncomp,
+                         .bytes = table[k].whole ? 4 : (int)bytes,
+                         .whole = table[k].whole};
+  (void)snprintf(name, sizeof(name), "%s/contacts", path);
+  PetscCall(SbIndexAdd(out->contact_index, time, name, (PetscInt)n, NTABLE - 1, array + 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,19 +157,8 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   // After a restart frames that are kept may have contact points, which stay in the index.
   if (!out->contact_points && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
-  out->contacts.share.comm = out->comm;
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
   PetscCall(SbIndexCreate(out, "contacts", nowhere, &out->contact_index));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactsDestroy(SbOutput out)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbIndexDestroy(&out->contact_index));
-  PetscCall(PetscFree(out->contacts.list.point));
-  PetscCall(PetscFree(out->contacts.point));
-  PetscCall(PetscFree(out->contacts.column));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

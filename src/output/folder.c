@@ -2,6 +2,9 @@
   The folder of the results: created, write-tested and locked before anything is computed; an earlier run's
   results are moved aside when the run starts, files with other names never. Checkpoints are found by number.
 
+  Plain files are written whole beside their target and renamed into it, so that a reader, or a kill, never
+  meets half a file; failures of one rank are reported by all.
+
   The lock is one of the file system (fcntl) on a file that names host and process: it is released with its
   process, however that ends, and works between hosts where the file system supports it; else there is none.
 */
@@ -16,6 +19,35 @@
 static const char *const ours[] = {"fields.h5",     "fields.xmf",      "fields.vtkhdf",
                                    "contacts.xmf",  "contacts.vtkhdf", "history.csv",
                                    "scenario.opts", "run.json",        "ledger.csv"};
+
+PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message)
+{
+  SbCaughtError caught = {message[0] ? (int)code : 0, ""};
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(caught.text), caught.text, "%s", message);
+  PetscCall(SbCaughtRaise(comm, &caught));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbFileReplace(const char *path, const void *text, size_t size, char message[SB_MESSAGE_MAX])
+{
+  char tmp[PETSC_MAX_PATH_LEN + 8];
+  FILE *file;
+  int bad = 1;
+
+  (void)snprintf(tmp, sizeof(tmp), "%s.tmp", path);
+  errno = 0;
+  file = fopen(tmp, "w");
+  if (file) {
+    bad = fwrite(text, 1, size, file) != size;
+    bad = fclose(file) || bad || rename(tmp, path);
+  }
+  if (!bad) return;
+  SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
+           strerror(errno ? errno : EIO));
+  (void)unlink(tmp);
+}
 
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
 {
@@ -132,18 +164,10 @@ static int is_checkpoint(const struct dirent *entry)
   return end && !entry->d_name[end];
 }
 
-static int by_number(const struct dirent **a, const struct dirent **b)
-{
-  const long p = strtol((*a)->d_name + strlen("checkpoint_"), NULL, 10),
-             q = strtol((*b)->d_name + strlen("checkpoint_"), NULL, 10);
-
-  return (p > q) - (p < q);
-}
-
-/* Names of the checkpoints in a folder, oldest first; free with free_names(). */
+/* Names of the checkpoints in a folder, oldest first, by their numbers; free with free_names(). */
 static int list_checkpoints(const char *dir, struct dirent ***names)
 {
-  const int n = scandir(dir, names, is_checkpoint, by_number);
+  const int n = scandir(dir, names, is_checkpoint, versionsort);
 
   if (n < 0) *names = NULL;
   return PetscMax(n, 0);
@@ -171,26 +195,20 @@ PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
+PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN])
 {
   PetscFunctionBeginUser;
-  if (strcmp(file, "latest"))
-    PetscCall(PetscStrncpy(path, file, size));
-  else {
-    /* the k-th newest of the folder, which rank 0 knows; empty when there is none */
-    char name[SB_FILE_MAX] = "";
+  PetscCall(PetscStrncpy(path, out->restart, PETSC_MAX_PATH_LEN));
+  if (strcmp(path, "latest")) PetscFunctionReturn(PETSC_SUCCESS);
+  path[0] = 0;
+  if (!out->rank) {
+    struct dirent **names;
+    const int n = list_checkpoints(out->dir, &names), k = n - 1 - out->ndamaged;
 
-    if (!out->rank) {
-      struct dirent **names;
-      const int n = list_checkpoints(out->dir, &names);
-
-      if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
-      free_names(n, names);
-    }
-    PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
-    path[0] = 0;
-    if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
+    if (k >= 0) PetscCall(SbOutputPath(out, names[k]->d_name, PETSC_MAX_PATH_LEN, path));
+    free_names(n, names);
   }
+  PetscCallMPI(MPI_Bcast(path, PETSC_MAX_PATH_LEN, MPI_CHAR, 0, out->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

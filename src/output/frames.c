@@ -16,12 +16,8 @@
 
 typedef struct {
   PetscInt step; /* sorted by it */
-  PetscReal time;
+  PetscInt mesh; /* step after which its mesh was made, 0: the first one */
   char group[48];
-  PetscInt n;
-  SbIndexValues values[SB_FIELD_MAX]; /* [n] */
-  PetscInt npoint, point_bytes;       /* contact points, -1: not written; bytes of their numbers */
-  PetscInt mesh;                      /* step after which its mesh was made, 0: the first one */
 } SbFrame;
 
 struct _p_SbFrames {
@@ -44,7 +40,7 @@ static PetscErrorCode put(SbOutput out, hid_t where, const char *name, const cha
   PetscInt n = out->tet.n;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOrderGather(cell ? &out->cell : &out->point, ncomp, fr->owned, fr->slice));
+  PetscCall(SbForestReduce((cell ? &out->cell : &out->point)->sf, ncomp, MPIU_REAL, fr->owned, fr->slice));
   /* in place, from the end on */
   for (PetscInt i = out->cell.n - 1; cell && out->split && i >= 0; i--) {
     for (int k = 0; k < (out->split[i] ? 8 : 1); k++) {
@@ -121,7 +117,7 @@ static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
                                                    : -1.;
     if (ten_nodes && !out->quadratic) number[SB_CELL_NODES] = best_diagonal(s, c);
   }
-  PetscCall(SbOrderGather(&out->cell, wide, fr->owned, fr->slice));
+  PetscCall(SbForestReduce(out->cell.sf, wide, MPIU_REAL, fr->owned, fr->slice));
 
   /* the rows of this rank; points of cells are numbered one cell behind the other */
   PetscCall(PetscMalloc4(4 * out->tet.n, &corner, 4 * out->tet.n, &vertex,
@@ -197,7 +193,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
   /* disk space for points and cells */
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->tet.N * 40 +
-                                   (out->place ? (PetscInt64)out->cell.N * 40 : 0) + 65536));
+                                   (out->edge_number ? (PetscInt64)out->cell.N * 40 : 0) + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
 
@@ -236,9 +232,25 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static SbIndexValues values_of(const SbField *f, PetscInt bytes)
+/* Adds a frame of the file, with the fields that it has, to the indices. Rank 0. */
+static PetscErrorCode list_frame(SbOutput out, hid_t group, const char *path)
 {
-  return (SbIndexValues){f->name, (int)f->ncomp, (int)bytes, PETSC_FALSE, f->cell};
+  SbArray array[SB_FIELD_MAX];
+  PetscReal time = 0.;
+  PetscBool ok;
+  PetscInt bytes, n = 0, nfield;
+  const SbField *fields = SbFieldGetAll(&nfield);
+
+  PetscFunctionBeginUser;
+  SbH5GetReal(group, "time", &time, &ok);
+  for (const SbField *f = fields; f < fields + nfield; f++) {
+    (void)SbH5Rows(group, f->name, &bytes);
+    if (bytes)
+      array[n++] = (SbArray){.name = f->name, .ncomp = (int)f->ncomp, .bytes = (int)bytes, .cell = f->cell};
+  }
+  PetscCall(SbIndexAdd(out->frames->index, time, path, 0, n, array));
+  PetscCall(SbContactsList(out, group, time, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Writes the index files for viewers, with all frames so far. Rank 0. */
@@ -248,21 +260,29 @@ static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_
   if (!message[0] && out->contact_index) SbIndexWrite(out->contact_index, last, message);
 }
 
-static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
+  SbOutput out = (SbOutput)ctx;
   SbFrames fr = out->frames;
-  SbIndexValues values[SB_FIELD_MAX];
-  PetscInt n = 0, npoint;
   PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
   /* along an arc length the load factor may fall, viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
-  PetscBool full;
+  const PetscBool full = (PetscBool)(fr->node < 0 || fr->nlink == SB_H5_NODE_LINKS);
   hid_t group;
 
   PetscFunctionBeginUser;
+  /* frames at intervals of time or of steps, at the start and at the end */
+  if (step->step != run->step0 && !step->last &&
+      (out->every > 0. ? !SbOutputDue(out->every, step->t, step->dt) : step->step % out->every_steps))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  /* after a restart the first frame may be in the file */
+  if (fr->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogStagePush(SbLogStageOutput));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.fields, 0, 0, 0, 0));
   /* reserve disk space for the frame and its metadata: a full disk is an error before anything is written */
-  PetscCall(SbContactsFind(run, out, step, &npoint, &room));
+  PetscCall(SbContactsFind(run, out, step, &room));
   room += 65536 + 8192 * out->nfield;
   for (PetscInt i = 0; i < out->nfield; i++)
     room += (PetscInt64)(out->field[i]->cell ? out->tet.N : out->point.N) * out->field[i]->ncomp *
@@ -282,7 +302,6 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
     const SbField *f = out->field[i];
 
     if (f->constant) continue;
-    values[n++] = values_of(f, out->precise ? 8 : 4);
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     PetscCall(f->compute(f, run, step, fr->owned));
     PetscCall(
@@ -293,7 +312,6 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 
   /* the frame gets its name, and then its entry in the index */
   (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step->step);
-  full = (PetscBool)(fr->node < 0 || fr->nlink == SB_H5_NODE_LINKS);
   if (full) {
     if (fr->node >= 0) (void)H5Gclose(fr->node);
     PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 6, &fr->node));
@@ -310,32 +328,13 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscCall(SbH5Flush(&fr->h5));
   fr->nlink++;
   (void)snprintf(path, sizeof(path), "/step/%s/%s", hundred, name);
-  (void)H5Gclose(group);
   fr->last_step = step->step;
   if (fr->index) {
-    PetscCall(SbIndexAdd(fr->index, time, path, 0, n, values));
-    PetscCall(SbContactsList(out, time, path, npoint, out->precise ? 8 : 4));
+    PetscCall(list_frame(out, group, path));
     write_indices(out, step->last, message);
   }
+  (void)H5Gclose(group);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
-{
-  SbOutput out = (SbOutput)ctx;
-
-  PetscFunctionBeginUser;
-  /* frames at intervals of time or of steps, at the start and at the end */
-  if (step->step != run->step0 && !step->last &&
-      (out->every > 0. ? !SbOutputDue(out->every, step->t, step->dt) : step->step % out->every_steps))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  /* after a restart the first frame may be in the file */
-  if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscLogStagePush(SbLogStageOutput));
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
-  PetscCall(PetscLogEventBegin(out->event.fields, 0, 0, 0, 0));
-  PetscCall(write_frame(run, out, step));
   PetscCall(PetscLogEventEnd(out->event.fields, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
@@ -350,38 +349,24 @@ typedef struct {
   PetscErrorCode ierr;
 } List;
 
-/* Adds a frame, with its fields: a group in that of a hundred. */
-static herr_t list_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
+/* Adds a frame: a group in that of a hundred. */
+static herr_t add_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
 {
   List *l = (List *)ctx;
   const char *slash = strchr(name, '/');
   const hid_t group = slash && !strchr(slash + 1, '/') ? H5Gopen2(top, name, H5P_DEFAULT) : -1;
   int64_t step = 0, mesh = 0;
-  PetscBool ok = PETSC_TRUE, other = PETSC_TRUE;
-  PetscInt n;
-  const SbField *fields = SbFieldGetAll(&n);
-  SbFrame *frame;
+  PetscBool ok = PETSC_TRUE, other;
 
   (void)info;
   l->nhundred += !slash;
   if (group < 0) return 0;
   l->ierr = SbReserve(l->n + 1, sizeof(*l->frame), &l->size, &l->frame);
   if (l->ierr) return -1;
-  frame = &l->frame[l->n];
   SbH5GetInt(group, "step", &step, &ok);
-  SbH5GetReal(group, "time", &frame->time, &ok);
   SbH5GetInt(group, "mesh", &mesh, &other);
-  SbFormat(sizeof(frame->group), frame->group, "/step/%s", name);
-  frame->step = (PetscInt)step;
-  frame->mesh = (PetscInt)mesh;
-  frame->n = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt bytes;
-
-    (void)SbH5Rows(group, fields[i].name, &bytes);
-    if (bytes) frame->values[frame->n++] = values_of(&fields[i], bytes);
-  }
-  SbContactsRead(group, &frame->npoint, &frame->point_bytes);
+  l->frame[l->n] = (SbFrame){.step = (PetscInt)step, .mesh = (PetscInt)mesh};
+  SbFormat(sizeof(l->frame->group), l->frame[l->n].group, "/step/%s", name);
   (void)H5Gclose(group);
   l->n += ok;
   return 0;
@@ -404,12 +389,10 @@ static PetscBool has_mesh(SbOutput out, hid_t file, PetscInt step)
 /* The step of this run's mesh in an open file: that of its last re-meshing, or 0; ok: the file has it. */
 static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
 {
-  const PetscInt step = SbOutputMeshStep(run);
+  const PetscInt step = has_mesh(out, file, SbOutputMeshStep(run)) ? SbOutputMeshStep(run) : 0;
 
   *ok = has_mesh(out, file, step);
-  if (*ok || !step) return step;
-  *ok = has_mesh(out, file, 0);
-  return 0;
+  return step;
 }
 
 /* Opens the file of the run that is continued; ok is false when there is none, or one of another mesh. */
@@ -433,18 +416,19 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   }
 
   /* its frames; the index has those up to the restart, so that it never lists a frame that is removed */
-  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, list_frame, &list);
+  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, add_frame, &list);
   PetscCall(list.ierr);
   PetscCall(SbSortByKeys(list.n, sizeof(SbFrame), 1, list.frame));
   fr->nnode = list.nhundred;
   for (; n < list.n && list.frame[n].step <= run->step0; n++) {
     const SbFrame *f = &list.frame[n];
+    const hid_t group = fr->index ? H5Gopen2(fr->h5.file, f->group, H5P_DEFAULT) : -1;
 
     fr->last_step = f->step;
-    if (!fr->index) continue;
+    if (group < 0) continue;
     if (!n || f->mesh != f[-1].mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, f->mesh));
-    PetscCall(SbIndexAdd(fr->index, f->time, f->group, 0, f->n, f->values));
-    PetscCall(SbContactsList(out, f->time, f->group, f->npoint, f->point_bytes));
+    PetscCall(list_frame(out, group, f->group));
+    (void)H5Gclose(group);
   }
   if (fr->index) {
     if (!n || list.frame[n - 1].mesh != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
@@ -467,7 +451,6 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputOrder(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, &ok));
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
@@ -482,7 +465,8 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
              "or give another -output_dir",
              out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
   PetscCheck(
-    !ok || (edges == out->quadratic && linear == (out->place && !edges)), out->comm, PETSC_ERR_USER_INPUT,
+    !ok || (edges == out->quadratic && linear == (out->edge_number && !edges)), out->comm,
+    PETSC_ERR_USER_INPUT,
     "-output_quadratic is %s, but the frames in %s have tets of p2 otherwise: go on with the same, or "
     "give another -output_dir",
     out->quadratic ? "true" : "false", path);
@@ -524,7 +508,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     if (out->field[i]->cell) most = PetscMax(most, out->field[i]->ncomp);
     PetscCall(SbFieldPrepare(run, out, out->field[i]));
   }
-  wide = PetscMax(most, out->place ? SB_CELL_NODES + 1 : 4);
+  wide = PetscMax(most, out->edge_number ? SB_CELL_NODES + 1 : 4);
   PetscCall(PetscFree2(fr->owned, fr->slice));
   PetscCall(PetscMalloc2(PetscMax(3 * out->point.nowned, wide * out->cell.nowned), &fr->owned,
                          PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n),
@@ -560,8 +544,10 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesClose(out));
-  PetscCall(SbContactsDestroy(out));
   PetscCall(SbIndexDestroy(&out->frames->index));
+  PetscCall(SbIndexDestroy(&out->contact_index));
+  PetscCall(PetscFree(out->contacts.list.point));
+  PetscCall(PetscFree(out->contacts.point));
   PetscCall(PetscFree2(out->frames->owned, out->frames->slice));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);

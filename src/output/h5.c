@@ -225,29 +225,78 @@ hid_t SbH5TypeInMemory(hid_t type)
          : type == H5T_STD_I32LE  ? H5T_NATIVE_INT32
          : type == H5T_STD_U64LE  ? H5T_NATIVE_UINT64
          : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
-                                  : H5T_NATIVE_FLOAT;
+         : type == H5T_IEEE_F32LE ? H5T_NATIVE_FLOAT
+                                  : type;
 }
 
-PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t type, const void *slice)
+/* An attribute. */
+static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype, hid_t memtype,
+                          const void *value)
+{
+  const hid_t space = H5Screate(H5S_SCALAR);
+  const hid_t attribute = H5Acreate2(where, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT);
+
+  PetscFunctionBeginUser;
+  H5_CALL(h, attribute);
+  H5_CALL(h, H5Awrite(attribute, memtype, value));
+  (void)H5Aclose(attribute);
+  (void)H5Sclose(space);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text)
+{
+  const hid_t type = H5Tcopy(H5T_C_S1);
+
+  PetscFunctionBeginUser;
+  (void)H5Tset_size(type, strlen(text) + 1);
+  PetscCall(put(h, where, name, type, type, text));
+  (void)H5Tclose(type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A dataset, of which this rank has the part `mine` in memory and `part` in the file; unit: NULL for none. */
+static PetscErrorCode write_dataset(SbH5 *h, hid_t where, const char *name, const char *unit, hid_t type,
+                                    hid_t mine, hid_t part, const void *data)
 {
   const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
-  hid_t filespace, memspace, dataset;
+  hid_t dataset;
 
   PetscFunctionBeginUser;
   (void)H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
   (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
   (void)H5Pset_obj_track_times(create, 0); // the same run writes the same bytes
-  select_slice(order, ncomp, &filespace, &memspace);
-  dataset = H5Dcreate2(where, name, type, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
+  dataset = H5Dcreate2(where, name, type, part, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
-  PetscCall(SbH5PutText(h, dataset, "unit", unit));
-  note(h, (PetscBool)(H5Dwrite(dataset, SbH5TypeInMemory(type), memspace, filespace, transfer, slice) < 0));
+  if (unit) PetscCall(SbH5PutText(h, dataset, "unit", unit));
+  note(h, (PetscBool)(H5Dwrite(dataset, SbH5TypeInMemory(type), mine, part, transfer, data) < 0));
   (void)H5Dclose(dataset);
-  (void)H5Sclose(filespace);
-  (void)H5Sclose(memspace);
+  (void)H5Sclose(mine);
+  (void)H5Sclose(part);
   (void)H5Pclose(create);
   (void)H5Pclose(transfer);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
+                              PetscInt ncomp, hid_t type, const void *slice)
+{
+  hid_t filespace, memspace;
+
+  PetscFunctionBeginUser;
+  select_slice(order, ncomp, &filespace, &memspace);
+  PetscCall(write_dataset(h, where, name, unit, type, memspace, filespace, slice));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text)
+{
+  const hid_t type = H5Tcopy(H5T_C_S1);
+
+  PetscFunctionBeginUser;
+  (void)H5Tset_size(type, strlen(text) + 1);
+  PetscCall(write_dataset(h, where, name, NULL, type, H5Screate(H5S_SCALAR), H5Screate(H5S_SCALAR), text));
+  (void)H5Tclose(type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,21 +364,6 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attributes. */
-static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype, hid_t memtype,
-                          const void *value)
-{
-  const hid_t space = H5Screate(H5S_SCALAR);
-  const hid_t attribute = H5Acreate2(where, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT);
-
-  PetscFunctionBeginUser;
-  H5_CALL(h, attribute);
-  H5_CALL(h, H5Awrite(attribute, memtype, value));
-  (void)H5Aclose(attribute);
-  (void)H5Sclose(space);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value)
 {
   PetscFunctionBeginUser;
@@ -341,17 +375,6 @@ PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value)
 {
   PetscFunctionBeginUser;
   PetscCall(put(h, where, name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text)
-{
-  const hid_t type = H5Tcopy(H5T_C_S1);
-
-  PetscFunctionBeginUser;
-  (void)H5Tset_size(type, strlen(text) + 1);
-  PetscCall(put(h, where, name, type, type, text));
-  (void)H5Tclose(type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -379,26 +402,6 @@ void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok)
 void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
 {
   if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value)) *ok = PETSC_FALSE;
-}
-
-PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text)
-{
-  const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), transfer = collective_list();
-  const hid_t create = H5Pcreate(H5P_DATASET_CREATE);
-  hid_t dataset;
-
-  PetscFunctionBeginUser;
-  (void)H5Tset_size(type, strlen(text) + 1);
-  (void)H5Pset_obj_track_times(create, 0);
-  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
-  (void)H5Pclose(create);
-  H5_CALL(h, dataset);
-  note(h, (PetscBool)(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0));
-  (void)H5Dclose(dataset);
-  (void)H5Sclose(space);
-  (void)H5Tclose(type);
-  (void)H5Pclose(transfer);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok)

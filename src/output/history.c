@@ -23,7 +23,6 @@ struct _p_SbHistory {
   char *row;
   size_t size;
   PetscInt last_step;    /* of the last row in the file, or -1 */
-  PetscInt nprobe;       /* columns of probes */
   PetscInt nextra;       /* columns of effects, probes and bodies */
   PetscReal (*mass)[4];  /* [nbody] centre at rest, m, and mass, kg, for columns of bodies */
   PetscReal *mine, *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
@@ -102,7 +101,9 @@ static void put_column(FILE *line[2], const char *unit, const char *format, ...)
 static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
   const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
-  char name[3 * SB_NAME_MAX], *units;
+  static const char *const axes[][6] = {
+    [1] = {""}, [3] = {"x", "y", "z"}, [6] = {"xx", "xy", "xz", "yy", "yz", "zz"}};
+  char *units;
   const char *unit;
   size_t size;
   FILE *line[2] = {h->text, open_memstream(&units, &size)};
@@ -119,10 +120,12 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   }
   for (const SbProbe *probe = out->probe; probe < out->probe + out->nprobe; probe++) {
     for (PetscInt i = 0; i < probe->nfield; i++) {
-      for (PetscInt c = 0; c < probe->field[i]->ncomp; c++) {
-        PetscCall(SbProbesColumn(probe, probe->field[i], c, sizeof(name), name));
-        put_column(line, probe->field[i]->unit, ",%s", name);
-      }
+      const SbField *f = probe->field[i];
+      const char *name = !strcmp(f->name, "displacement") ? "u" : f->name;
+
+      for (PetscInt c = 0; c < f->ncomp; c++)
+        put_column(line, f->unit, ",%s_%s%s%s", probe->name, name, f->ncomp > 1 && name[1] ? "_" : "",
+                   axes[f->ncomp][c]);
     }
   }
   for (PetscInt i = 0; i < nbody * SB_BODY_SUMS; i++)
@@ -139,33 +142,6 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   (void)fprintf(h->text, "\n#%s\n", units + 1);
   free(units);
   (void)fflush(h->text);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Values of the columns of effects. */
-static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbModel model = run->model;
-  SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
-  const PetscReal *residual;
-
-  PetscFunctionBeginUser;
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
-  PetscCall(SbSpaceGetLocalRead(model->space, step->U, &stage.u));
-  if (step->V) PetscCall(SbSpaceGetLocalRead(model->space, step->V, &stage.v));
-  if (step->A) PetscCall(SbSpaceGetLocalRead(model->space, step->A, &stage.a));
-  PetscCall(SbSpaceGetLocalRead(model->space, step->R, &residual));
-  for (PetscInt e = 0; e < model->nhistory; e++) {
-    const SbEffect effect = model->history[e];
-
-    SbEffectCall(effect, history, model->space, &stage, residual, values);
-    values += effect->ncolumn;
-  }
-  PetscCall(SbSpaceRestoreLocalRead(model->space, step->R, &residual));
-  PetscCall(SbSpaceRestoreLocalRead(model->space, step->U, &stage.u));
-  if (step->V) PetscCall(SbSpaceRestoreLocalRead(model->space, step->V, &stage.v));
-  if (step->A) PetscCall(SbSpaceRestoreLocalRead(model->space, step->A, &stage.a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,8 +162,12 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
-  const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
-  PetscReal *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS; /* behind effects and probes */
+  const SbModel model = run->model;
+  const SbSpace s = model->space;
+  const PetscInt nbody = out->history_bodies ? model->nbody : 0;
+  PetscReal *values = h->mine, *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS;
+  SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
+  const PetscReal *residual;
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
@@ -199,13 +179,28 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* this rank's part of the columns of effects, probes and bodies */
   PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
-  if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
-  if (out->nprobe) {
-    PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-    PetscCall(SbProbesAdd(run, out, step, of_bodies - h->nprobe));
-    PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
+  if (model->nhistory || out->nprobe) {
+    PetscCall(SbSpaceGetLocalRead(s, step->U, &stage.u));
+    if (step->V) PetscCall(SbSpaceGetLocalRead(s, step->V, &stage.v));
+    if (step->A) PetscCall(SbSpaceGetLocalRead(s, step->A, &stage.a));
+    if (model->nhistory) {
+      PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+                 "The residual was asked for but not given to the monitors");
+      PetscCall(SbSpaceGetLocalRead(s, step->R, &residual));
+      for (PetscInt e = 0; e < model->nhistory; values += model->history[e++]->ncolumn)
+        SbEffectCall(model->history[e], history, s, &stage, residual, values);
+      PetscCall(SbSpaceRestoreLocalRead(s, step->R, &residual));
+    }
+    if (out->nprobe) {
+      PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
+      PetscCall(SbProbesAdd(run, out, step, &stage, values));
+      PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
+    }
+    PetscCall(SbSpaceRestoreLocalRead(s, step->U, &stage.u));
+    if (step->V) PetscCall(SbSpaceRestoreLocalRead(s, step->V, &stage.v));
+    if (step->A) PetscCall(SbSpaceRestoreLocalRead(s, step->A, &stage.a));
   }
-  if (nbody) PetscCall(SbModelBodySums(run->model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
+  if (nbody) PetscCall(SbModelBodySums(model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
 
   /* sums of all ranks; the run ends when the row before could not be written */
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
@@ -258,12 +253,12 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   PetscCheck(h->text, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   PetscCall(put_header(run, out, h));
   if (out->restarted) {
-    char *text, *line, *end;
-    size_t size;
+    FILE *file = fopen(h->path, "r");
+    char *text = NULL, *line, *end;
+    size_t room = 0;
 
     // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
-    PetscCall(SbFileRead(h->path, &text, &size));
-    if (text && size >= h->size && !strncmp(text, h->row, h->size)) {
+    if (file && getdelim(&text, &room, 0, file) > 0 && !strncmp(text, h->row, h->size)) {
       for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
         const long step = strtol(line, NULL, 10);
 
@@ -273,7 +268,8 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
       SbFileReplace(h->path, text, (size_t)(line - text), message);
       kept = PETSC_TRUE;
     }
-    PetscCall(PetscFree(text));
+    free(text);
+    if (file) (void)fclose(file);
 
     /* a history with other columns stays, under another name */
     if (!kept && !access(h->path, F_OK)) {
@@ -309,8 +305,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
     h->last_step = -1;
     for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
     for (PetscInt p = 0; p < out->nprobe; p++)
-      for (PetscInt i = 0; i < out->probe[p].nfield; i++) h->nprobe += out->probe[p].field[i]->ncomp;
-    h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
+      for (PetscInt i = 0; i < out->probe[p].nfield; i++) h->nextra += out->probe[p].field[i]->ncomp;
+    if (out->history_bodies) h->nextra += SB_BODY_SUMS * model->nbody;
     PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
     PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
     if (!out->rank) PetscCall(open_file(run, out, message));

@@ -1,10 +1,17 @@
 /*
   The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf.
-  Rank 0 keeps the list; xdmf.c and vtkhdf.c make the files of it.
+  Rank 0 keeps the list, of which vtkhdf.c makes the one file; the text of the other grows with it.
+
+  Of XDMF only what both vtkXdmfReader and vtkXdmf3Reader support: one temporal collection of uniform grids,
+  every array named by its full path in the HDF5 file, no references, no hyperslabs.
+
+  Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells. As
+  neither reader takes a grid without points (vtkXdmf3Reader crashes), a frame without any gets a dummy one.
 */
 #include <stdlib.h>
 #include <unistd.h>
-#include "index.h"
+#include "output_impl.h"
+#include "sbmeshio.h"
 
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index)
 {
@@ -18,6 +25,7 @@ PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *no
   SbFormat(sizeof(file), file, "%s.vtkhdf", name);
   PetscCall(SbOutputPath(out, file, sizeof(x->vtkhdf), x->vtkhdf));
   x->points = (PetscBool)(nowhere != NULL);
+  x->corners = 1;
   if (nowhere) PetscCall(PetscArraycpy(x->nowhere, nowhere, 3));
   x->file = open_memstream(&x->text, &x->size);
   PetscCheck(x->file, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", x->xmf);
@@ -34,7 +42,10 @@ PetscErrorCode SbIndexDestroy(SbIndex *index)
 
   PetscFunctionBeginUser;
   if (!x) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < x->narray; i++) PetscCall(PetscFree(x->array[i].piece));
+  for (PetscInt i = 0; i < x->narray; i++) {
+    PetscCall(PetscFree(x->array[i].name));
+    PetscCall(PetscFree(x->array[i].piece));
+  }
   PetscCall(PetscFree(x->array));
   PetscCall(PetscFree(x->part));
   PetscCall(PetscFree(x->frame));
@@ -64,6 +75,7 @@ static PetscErrorCode add_piece(SbIndex x, const SbArray *like, PetscInt block, 
     PetscCall(SbReserve(x->narray + 1, sizeof(SbArray), &x->array_size, &x->array));
     a = &x->array[x->narray++];
     *a = *like;
+    PetscCall(PetscStrallocpy(like->name, (char **)&a->name));
   }
   a->bytes = PetscMax(a->bytes, like->bytes); // after a restart with another precision
   PetscCall(SbReserve(a->npiece + 1, sizeof(SbPiece), &a->size, &a->piece));
@@ -99,9 +111,9 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
   (void)where, (void)info;
   if (!strcmp(name, "vertices") || !strcmp(name, "x") || !strcmp(name, x->corners > 4 ? "cells" : "cells10"))
     return 0;
-  SbFormat(sizeof(a.name), a.name, "%s", !strcmp(name, "cells10") ? "cells" : name);
+  a.name = strncmp(name, "cells", 5) ? name : "Connectivity";
   a.cell = (PetscBool)(strncmp(name, "set_", 4) != 0);
-  if (!strcmp(a.name, "cells")) a.ncomp = (int)x->corners;
+  if (a.name != name) a.ncomp = (int)x->corners;
   l->ierr = add_piece(x, &a, x->npart - 1, l->group, name);
   return l->ierr ? -1 : 0;
 }
@@ -124,24 +136,82 @@ PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, PetscInt step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n rows of an array; for n = 0 the single row given. */
+static void put_item(SbIndex x, const SbArray *a, const SbPiece *piece, PetscInt n, const PetscReal single[])
+{
+  const char *type = a->whole ? "Int" : "Float";
+
+  if (n) {
+    SbXdmfArray(x->file, n, a->ncomp, type, piece->bytes, "fields.h5:%s", piece->path);
+    return;
+  }
+  (void)fprintf(x->file, "<DataItem Dimensions=\"1%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">",
+                a->ncomp > 1 ? " 3" : "", type, piece->bytes);
+  for (int k = 0; k < a->ncomp; k++) (void)fprintf(x->file, "%s%.17g", k ? " " : "", (double)single[k]);
+  (void)fputs("</DataItem>", x->file);
+}
+
+/* Adds the last frame to the text. */
+static void put_grid(SbIndex x)
+{
+  static const PetscReal none[3] = {0., 0., 0.}, nobody[1] = {-1.};
+  const PetscInt f = x->nframe - 1, p = x->frame[f].part, n = x->part[p].npoint, ncell = x->part[p].ncell;
+  const SbArray whole = {.ncomp = (int)x->corners, .whole = PETSC_TRUE}, vector = {.ncomp = 3};
+  SbPiece cells = {.bytes = 4}, places = {.bytes = 8};
+
+  /* points: vertices at rest, or those of contact */
+  SbFormat(sizeof(cells.path), cells.path, "%s/%s", x->part[p].group,
+           x->points        ? "point"
+           : x->corners > 4 ? "cells10"
+                            : "cells");
+  SbFormat(sizeof(places.path), places.path, "%s/x", x->part[p].group);
+  for (PetscInt i = 0; i < x->narray && x->points; i++)
+    if (!strcmp(x->array[i].name, "Points")) places.bytes = x->array[i].piece[f].bytes;
+  (void)fprintf(x->file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n",
+                x->points ? "contacts" : "bodies", (double)x->frame[f].time);
+  (void)fprintf(x->file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\"%s>",
+                x->points        ? "Polyvertex"
+                : x->corners > 4 ? "Tetrahedron_10"
+                                 : "Tetrahedron",
+                PetscMax(ncell, 1), x->points ? " NodesPerElement=\"1\"" : "");
+  put_item(x, &whole, &cells, ncell, none);
+  (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", x->file);
+  put_item(x, &vector, &places, n, x->nowhere);
+  (void)fputs("</Geometry>\n", x->file);
+
+  /* values of the mesh and of the frame */
+  for (PetscInt i = 0; i < x->narray; i++) {
+    const SbArray *a = &x->array[i];
+    const SbPiece *piece = &a->piece[a->npiece - 1];
+    const char *name = strrchr(piece->path, '/') + 1; // "position" of what are points in VTK's own format
+
+    if (piece->block != (a->constant ? p : f) || !strcmp(a->name, "Connectivity") || !strcmp(name, "x"))
+      continue;
+    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">", name,
+                  a->ncomp == 1   ? "Scalar"
+                  : a->ncomp == 3 ? "Vector"
+                                  : "Tensor6",
+                  a->cell ? "Cell" : "Node");
+    put_item(x, a, piece, a->cell ? ncell : n, a->whole ? nobody : none);
+    (void)fputs("</Attribute>\n", x->file);
+  }
+  (void)fputs("</Grid>\n", x->file);
+}
+
 PetscErrorCode SbIndexAdd(SbIndex x, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
-                          const SbIndexValues values[])
+                          const SbArray array[])
 {
   SbArray points = {.name = "Points", .ncomp = 3, .bytes = 8};
   const char *where = NULL;
 
   PetscFunctionBeginUser;
   if (x->points) PetscCall(add_part(x, npoint, npoint, group));
-  for (PetscInt i = 0; i < n; i++) {
-    SbArray a = {
-      .ncomp = values[i].ncomp, .bytes = values[i].bytes, .whole = values[i].whole, .cell = values[i].cell};
-
-    SbFormat(sizeof(a.name), a.name, "%s", values[i].name);
-    if (!strcmp(a.name, x->points ? "x" : "position")) {
-      points.bytes = a.bytes;
-      where = values[i].name;
+  for (const SbArray *a = array; a < array + n; a++) {
+    if (strcmp(a->name, x->points ? "x" : "position")) {
+      PetscCall(add_piece(x, a, x->nframe, group, a->name));
     } else {
-      PetscCall(add_piece(x, &a, x->nframe, group, a.name));
+      points.bytes = a->bytes;
+      where = a->name;
     }
   }
   PetscCall(
@@ -151,13 +221,18 @@ PetscErrorCode SbIndexAdd(SbIndex x, PetscReal time, const char *group, PetscInt
   PetscCall(SbReserve(x->nframe + 1, sizeof(*x->frame), &x->frame_size, &x->frame));
   x->frame[x->nframe].time = time;
   x->frame[x->nframe++].part = x->npart - 1;
-  SbXdmfAdd(x);
+  put_grid(x);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbIndexWrite(SbIndex x, PetscBool last, char message[SB_MESSAGE_MAX])
 {
+  static const char tail[] = "</Grid>\n</Domain>\n</Xdmf>\n";
+
   if (x->points && !x->nframe) return;
-  SbXdmfWrite(x, message);
+  (void)fputs(tail, x->file);
+  (void)fflush(x->file);
+  SbFileReplace(x->xmf, x->text, x->size, message);
+  (void)fseek(x->file, -(long)strlen(tail), SEEK_CUR); // the next grid goes before it
   if (!message[0]) SbVtkhdfWrite(x, last, message);
 }

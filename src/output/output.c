@@ -154,28 +154,23 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The lines of the complete scenario that determine the mechanics, on which a checkpoint must agree. */
+/* The lines of the complete scenario that determine the mechanics, on which a checkpoint must agree; the mesh
+   itself is compared, not the name of its file. */
 static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 {
-  static const char *const prefix[] = {"-bodies",  "-body_",   "-sets", "-set_",
-                                       "-effects", "-effect_", "-mass"};
   size_t n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(strlen(text) + 32, &out->identity));
   n += (size_t)sprintf(out->identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
   for (const char *line = text; *line; line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
+    const size_t name = strcspn(line, " \n");
     int length = (int)strcspn(line, "\n#");
 
     while (length && line[length - 1] == ' ') length--;
-    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefix); i++) {
-      if (strncmp(line, prefix[i], strlen(prefix[i]))) continue;
-      // The mesh itself is compared, not the name of its file.
-      if (!memmem(line, strcspn(line, " \n"), "_mesh", 5) &&
-          !memmem(line, strcspn(line, " \n"), "_remesh_", 8))
-        n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
-      break;
-    }
+    if (SbHasPrefix(line, "-bodies -body_ -sets -set_ -effects -effect_ -mass") &&
+        !memmem(line, name, "_mesh", 5) && !memmem(line, name, "_remesh_", 8))
+      n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -227,8 +222,9 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   if (!strcmp(out->restart, "auto")) {
     char path[PETSC_MAX_PATH_LEN];
 
-    PetscCall(SbCheckpointFind(out, "latest", 0, sizeof(path), path));
-    PetscCall(PetscStrncpy(out->restart, path[0] ? "latest" : "", sizeof(out->restart)));
+    PetscCall(PetscStrncpy(out->restart, "latest", sizeof(out->restart)));
+    PetscCall(SbCheckpointFind(out, path));
+    if (!path[0]) out->restart[0] = 0;
   }
   // The closing table needs the log events.
   PetscCall(PetscLogDefaultBegin());
@@ -272,8 +268,10 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, out->comm));
   if (out->rank) PetscCall(PetscMalloc1(n, &out->identity));
   PetscCallMPI(MPI_Bcast(out->identity, n, MPI_CHAR, 0, out->comm));
-  if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
-  if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
+  if (out->restart[0]) {
+    PetscCall(SbCheckpointLoad(run));
+    PetscCall(SbFramesCheck(run, out));
+  }
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
   /* scenario.opts and run.json */
@@ -306,7 +304,6 @@ PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
   from->output_destroy = NULL;
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbOutputCountNodes(to->model->space, out));
-  PetscCall(SbOutputOrder(to, out));
   PetscCall(SbFramesAttach(to, out));
   PetscCall(SbHistoryAttach(to, out));
   PetscCall(SbCheckpointAttach(to, out));

@@ -14,9 +14,7 @@
 /* Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are
    written, so that the files do not depend on the partition. */
 typedef struct {
-  MPI_Comm comm;
-  PetscSF sf;      /* leaves: the entities owned here, `each` at a time; roots: this rank's slice */
-  PetscInt each;   /* entities that stay together: 1; 4 for the corners of cells */
+  PetscSF sf;      /* leaves: the entities owned here; roots: this rank's slice; NULL: slices only */
   PetscInt N;      /* entities of all ranks */
   PetscInt nowned; /* owned here */
   PetscInt start;  /* the slice is [start, start + n) */
@@ -28,14 +26,7 @@ PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const P
 /* The same for numbers key[nowned] in [0, bound) with gaps, which are closed; N: their count. Collective. */
 PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
                                    SbOrder *order);
-/* An order of `each` entities instead of every one of `order`: a cell's corners for a cell. Destroy both. */
-PetscErrorCode SbOrderRepeat(const SbOrder *order, PetscInt each, SbOrder *repeated);
 PetscErrorCode SbOrderDestroy(SbOrder *order);
-/* slice[n][ncomp] from owned[nowned][ncomp], and back. Collective. */
-PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscReal owned[],
-                             PetscReal slice[]);
-PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscReal slice[],
-                              PetscReal owned[]);
 
 /* HDF5 and files */
 typedef struct {
@@ -90,8 +81,6 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 /* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
 void SbFileReplace(const char *path, const void *text, size_t size, char message[SB_MESSAGE_MAX]);
-/* The whole file; NULL when it cannot be read. One rank. PetscFree. */
-PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
 /* state */
 
@@ -136,7 +125,6 @@ typedef struct {
   SbContactPoints list;  /* of this rank */
   SbContactPoint *point; /* [share.n] of this rank's share, sorted */
   SbOrder share;         /* which rows are this rank's; it has no star forest */
-  PetscReal *column;     /* [share.n][3] of one quantity */
 } SbContacts;
 
 /* progress.c: the line of progress. */
@@ -161,6 +149,7 @@ struct _p_SbOutput {
   char dir[PETSC_MAX_PATH_LEN];
   char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
   char restart[PETSC_MAX_PATH_LEN];
+  int ndamaged; /* newest checkpoints that cannot be read: -restart latest takes the one before them */
   PetscInt nfield;
   PetscLogEvent field_event[SB_FIELD_MAX]; /* SbField_<name> */
   const SbField *field[SB_FIELD_MAX];
@@ -184,17 +173,15 @@ struct _p_SbOutput {
   struct {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
-  SbOrder vertex, cell;
+  SbOrder cell;
   SbOrder node;     /* order of the unknowns: that of the vertices if no body has nodes at faces */
   SbOrder point;    /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
   SbOrder tet;      /* of the tets that points are the corners of: slices only, see split */
   PetscBool *split; /* [cell.n] cells of the slice that are eight of these; NULL: none */
   PetscInt *edge_number; /* [nnode] point at a node at an edge, as if cells shared theirs; NULL without P2 */
-  PetscInt
-    *place; /* [point.nowned] 10 cell + a with -output_discontinuous, else node of P2; NULL without P2 */
-  PetscBool ordered;    /* the orders above exist */
-  PetscBool attached;   /* run.json exists */
-  PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
+  PetscInt *place;       /* [point.nowned] 10 cell + a with -output_discontinuous, else node of P2; or NULL */
+  PetscBool attached;    /* run.json exists */
+  PetscInt *body_nodes;  /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
   char *identity; /* options that determine the mechanics, one per line */
   PetscBool restarted;
@@ -272,27 +259,23 @@ PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
-PetscErrorCode SbContactsDestroy(SbOutput out);
-/* Points of contact after a step, on ranks that write them; n of all, -1: no option; bytes. Collective. */
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes);
+/* Points of contact after a step, on the ranks that write them; bytes: of all in the file. Collective. */
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
-/* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
-void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
-/* Adds a frame of n points to the index, at the path of its group; rank 0. */
-PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
+/* Adds a frame of the file to the index, if there is one; path: of its group. Rank 0. */
+PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
-/* Name of the column of history.csv for a component of a field. */
-PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[]);
 /* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */
-PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
+PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const SbStage *stage,
+                           PetscReal values[]);
 /* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
 /* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable. Collective. */
@@ -302,10 +285,11 @@ uint64_t SbMixReal(uint64_t position, PetscReal value);
 
 /* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
-/* Their checksum in an open file, 0 without any; ok turns false when they cannot be read. Collective. */
-PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
-/* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "": none. Collective. */
-PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
+/* Raises sum by their checksums in an open file; ok turns false when one is missing. Not collective. */
+void SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
+/* Path of the checkpoint that -restart names; of `latest` the newest undamaged one, "": none. Collective. */
+PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN]);
+#define SB_SKIPPED "%s is truncated or damaged: trying the checkpoint before it"
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 /* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
 PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
@@ -313,35 +297,66 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
-/* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf. Rank 0. */
+/* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf, on rank 0. */
+/* Rows of one dataset of fields.h5, in one frame or one mesh. */
+typedef struct {
+  PetscInt block; /* number of the frame; of the part for what does not change with time */
+  int bytes;      /* per number */
+  char path[96];  /* of the dataset */
+} SbPiece;
+/* Datasets [n] or [n][ncomp] of one name. */
+typedef struct {
+  const char *name;
+  int ncomp, bytes;                /* most bytes of its pieces */
+  PetscBool whole, cell, constant; /* whole numbers; per cell; one piece per part, else per frame */
+  PetscInt npiece, size;
+  SbPiece *piece; /* [npiece], blocks ascending */
+} SbArray;
+/* A mesh, or the contact points of one frame. */
+typedef struct {
+  PetscInt npoint, ncell;
+  char group[64];
+} SbPart;
+struct _p_SbIndex {
+  char xmf[PETSC_MAX_PATH_LEN], vtkhdf[PETSC_MAX_PATH_LEN]; /* the two files */
+  PetscBool points;                                         /* contact points, else tets */
+  PetscInt corners;     /* of a tet: 4, or 10 if quadratic; of a point: 1 */
+  PetscReal nowhere[3]; /* where a frame without contact points shows one without force, m */
+  PetscInt npart, part_size, nframe, frame_size, narray, array_size;
+  SbPart *part;
+  struct {
+    PetscReal time; /* s */
+    PetscInt part;
+  } * frame;
+  SbArray *array;
+  FILE *file; /* of XDMF: head and grids so far, in memory: text[size] once it is flushed */
+  char *text;
+  size_t size;
+  PetscInt nwritten; /* vtkhdf.c: frames that the file on disk has */
+  double next;       /* when it is made again, in s of MPI_Wtime() */
+};
 /* nowhere[3]: of contact points, with the dummy point of frames without any, m; NULL: of tets. */
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
-void SbIndexRemove(SbIndex index); /* the files, if they are there */
+void SbIndexRemove(SbIndex index); /* the files, if there are any */
 /* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
 PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
-/* Values of a frame: a dataset [n] or [n][ncomp] of whole numbers, or of floating ones with so many bytes. */
-typedef struct {
-  const char *name;
-  int ncomp, bytes;
-  PetscBool whole, cell; /* cell: per cell, else per point */
-} SbIndexValues;
-/* Adds a frame: its group in fields.h5 and its values. Contact points have positions `x` and their number. */
+/* Adds a frame: its group in fields.h5 and its arrays there. Contact points have positions `x` and a number. */
 PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
-                          const SbIndexValues values[]);
+                          const SbArray array[]);
 /* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
+/* vtkhdf.c: replaces that file when enough frames have come since, or these are the last ones. */
+void SbVtkhdfWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
-/* report.c: times of the phases, from the log events. */
+/* run_json.c: times of the phases, from the log events. */
 typedef struct {
-  struct {
-    const char *name;
-    PetscReal seconds; /* largest of all ranks */
-  } phase[SB_PHASE_COUNT];
-  PetscReal total; /* s */
-  PetscReal cpu;   /* CPU time of the slowest rank, s; less than `total` where others use the cores */
+  PetscReal seconds[SB_PHASE_COUNT]; /* largest of all ranks */
+  PetscReal cpu; /* CPU time of the slowest rank, s; less than `total` where others use the cores */
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
+  PetscReal total;                  /* s */
 } SbPhases;
+extern const char *const SbPhaseNames[SB_PHASE_COUNT];
 /* CPU time of this process since it began, s. */
 #define SB_CPU_SECONDS ((PetscReal)clock() / CLOCKS_PER_SEC)
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
@@ -353,11 +368,11 @@ typedef struct {
 PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files);
 
 /*
-  SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.
+  SbCheckpointLoad - state of a run from the checkpoint that -restart names, or for `latest` the newest
+  readable one of the folder (a warning names others), on any number of ranks. Collective.
 
   Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
-  Input: file - path, or "latest": the newest readable checkpoint of the folder (a warning names others).
   Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its
   mesh, bodies or effects are not those of this run (the message names the first option that differs).
 */
-PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
+PetscErrorCode SbCheckpointLoad(SbRun run);

@@ -54,9 +54,7 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
 SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)
 {
   const SbMesh mesh = run->model->mesh;
-  const PetscInt place = out->place           ? out->place[i]
-                         : out->discontinuous ? SB_CELL_NODES * (i / 4) + i % 4
-                                              : i;
+  const PetscInt place = out->place ? out->place[i] : i;
   const PetscInt cell = place / SB_CELL_NODES, a = place % SB_CELL_NODES;
 
   if (!out->discontinuous) return i < mesh->nvert_owned ? (SbPlace){i, -1, -1} : (SbPlace){-1, place, -1};
@@ -92,8 +90,7 @@ static PetscInt vertex_node(SbSpace s, const SbPoints *p, PetscInt vertex)
 {
   const PetscInt corner = s->vertices ? 0 : p->corner[p->start[vertex]];
 
-  if (s->vertices) return vertex;
-  return SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
+  return s->vertices ? vertex : SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
 }
 
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3])
@@ -136,37 +133,29 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces at nodes: r itself, or its prescribed components only. */
-typedef struct {
-  SbSpace s;
-  const PetscReal *r;
-  PetscBool prescribed;
-} Forces;
-
 /* value += factor times the force at a node */
-static void add_force(const Forces *f, PetscInt node, PetscReal factor, PetscReal value[3])
+static void add_force(const PetscReal r[], PetscInt node, PetscReal factor, PetscReal value[3])
 {
-  for (int k = 0; k < 3; k++)
-    if (!f->prescribed || f->s->fixed[node] & (1 << k)) value[k] += factor * f->r[3 * node + k];
+  for (int k = 0; k < 3; k++) value[k] += factor * r[3 * node + k];
 }
 
-/* Adds a cell's share of the forces at its nodes to one of its corners. */
-static void add_corner_force(const Forces *f, const PetscReal valence[], PetscInt corner, PetscReal value[3])
+/* Adds a cell's share of the forces r at its nodes to one of its corners. */
+static void add_corner_force(SbSpace s, const PetscReal r[], const PetscReal valence[], PetscInt corner,
+                             PetscReal value[3])
 {
-  const SbSpace s = f->s;
   const PetscInt *node = s->cell_node + 4 * (corner / 4);
 
   if (SbSpaceCellElement(s, corner / 4)->nodes_per[0]) {
-    add_force(f, node[corner % 4], 1. / valence[node[corner % 4]], value);
-  } else {
-    // node a lies opposite vertex a: this corner belongs to the faces of the others
-    for (int a = 0; a < 4; a++) {
-      const PetscInt support = s->dirichlet_node ? s->dirichlet_node[corner - corner % 4 + a] : -1;
+    add_force(r, node[corner % 4], 1. / valence[node[corner % 4]], value);
+    return;
+  }
+  // node a lies opposite vertex a: this corner belongs to the faces of the others
+  for (int a = 0; a < 4; a++) {
+    const PetscInt support = s->dirichlet_node ? s->dirichlet_node[corner - corner % 4 + a] : -1;
 
-      if (a == corner % 4) continue;
-      add_force(f, node[a], 1. / (3. * valence[node[a]]), value);
-      if (support >= 0) add_force(f, support, 1. / 3., value);
-    }
+    if (a == corner % 4) continue;
+    add_force(r, node[a], 1. / (3. * valence[node[a]]), value);
+    if (support >= 0) add_force(r, support, 1. / 3., value);
   }
 }
 
@@ -174,24 +163,28 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
 {
   const SbSpace s = run->model->space;
   const SbPoints *p = &out->points;
-  const PetscInt n = out->point.nowned;
-  Forces f = {.s = s, .prescribed = prescribed};
+  const PetscReal *all;
+  PetscReal *r;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(values, 3 * n));
-  PetscCall(SbSpaceGetLocalRead(s, R, &f.r));
-  for (PetscInt i = 0; i < n; i++) {
+  PetscCall(PetscArrayzero(values, 3 * out->point.nowned));
+  PetscCall(PetscMalloc1(3 * s->nnode, &r));
+  PetscCall(SbSpaceGetLocalRead(s, R, &all));
+  for (PetscInt i = 0; i < 3 * s->nnode; i++)
+    r[i] = !prescribed || s->fixed[i / 3] & (1 << i % 3) ? all[i] : 0.;
+  PetscCall(SbSpaceRestoreLocalRead(s, R, &all));
+  for (PetscInt i = 0; i < out->point.nowned; i++) {
     const SbPlace at = SbPointsPlace(run, out, i);
     const PetscInt node = at.vertex < 0 ? at.node : at.corner < 0 ? vertex_node(s, p, at.vertex) : -1;
 
     if (at.corner >= 0)
-      add_corner_force(&f, p->valence, at.corner, values + 3 * i);
+      add_corner_force(s, r, p->valence, at.corner, values + 3 * i);
     else if (node >= 0)
-      add_force(&f, node, out->discontinuous ? 1. / p->valence[node] : 1., values + 3 * i);
+      add_force(r, node, out->discontinuous ? 1. / p->valence[node] : 1., values + 3 * i);
     else
       for (PetscInt k = p->start[at.vertex]; k < p->start[at.vertex + 1]; k++)
-        add_corner_force(&f, p->valence, p->corner[k], values + 3 * i);
+        add_corner_force(s, r, p->valence, p->corner[k], values + 3 * i);
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, R, &f.r));
+  PetscCall(PetscFree(r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

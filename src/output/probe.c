@@ -98,21 +98,6 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[])
-{
-  static const char *const tensor[] = {"xx", "xy", "xz", "yy", "yz", "zz"}, *const axis[] = {"x", "y", "z"};
-
-  PetscFunctionBeginUser;
-  if (f->ncomp == 1)
-    PetscCall(PetscSNPrintf(name, size, "%s_%s", probe->name, f->name));
-  else if (!strcmp(f->name, "displacement"))
-    PetscCall(PetscSNPrintf(name, size, "%s_u%s", probe->name, axis[c]));
-  else
-    PetscCall(
-      PetscSNPrintf(name, size, "%s_%s_%s", probe->name, f->name, f->ncomp == 3 ? axis[c] : tensor[c]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Numbers of nodes at edges, SbSpace.node_orig, begin here. */
 static PetscInt first_edge(const SbSpace s)
 {
@@ -147,10 +132,9 @@ static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, SbProbe *probe
   for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
     const PetscInt node = i - mesh->nvert_owned;
     const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
-    PetscReal d[3], d2;
+    const PetscReal d2 =
+      SbDistance2(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, probe->found ? probe->x : probe->at);
 
-    SbSubtract(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, probe->found ? probe->x : probe->at, d);
-    d2 = SbDot3(d, d);
     if (node >= 0 && number < first_edge(s)) continue;
     if (probe->found && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != probe->body) continue;
     if (d2 < mine || (d2 == mine && number < original)) {
@@ -283,8 +267,7 @@ static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
                         "the nearest one, from %.2g of its size outside",
                         probe->name, (double)best));
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
-  for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
+  SbQuadraticBasis(L, Q);
   PetscCall(add_cell(s, probe, cell, 1., L, Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +278,6 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
   const SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
-  if (out->nprobe) PetscCall(SbPointsPrepare(run, out, PETSC_FALSE));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     SbProbe *probe = &out->probe[p];
     PetscBool cells = PETSC_FALSE;
@@ -343,48 +325,36 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[])
+PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const SbStage *stage,
+                           PetscReal values[])
 {
-  const SbSpace s = run->model->space;
-  const Vec vector[3] = {step->U, step->V, step->A};
-  const PetscReal *x[3] = {NULL, NULL, NULL};
-
   PetscFunctionBeginUser;
-  /* quantities of tets */
   out->state_valid = PETSC_FALSE;
-  for (PetscInt p = 0, c = 0; p < out->nprobe; p++) {
-    const SbProbe *probe = &out->probe[p];
-
-    for (PetscInt i = 0; i < probe->nfield; c += probe->field[i++]->ncomp)
-      if (probe->field[i]->cell)
-        PetscCall(SbFieldAddCells(probe->field[i], run, step, &probe->cells, values + c));
-  }
-
-  /* vectors: at the vertex, or over the nodes; positions are displacements and where that is at rest */
-  for (int i = 0; i < 3; i++)
-    if (vector[i]) PetscCall(SbSpaceGetLocalRead(s, vector[i], &x[i]));
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    const SbProbe *probe = &out->probe[p];
-
+  for (const SbProbe *probe = out->probe; probe < out->probe + out->nprobe; probe++) {
     for (PetscInt i = 0; i < probe->nfield; values += probe->field[i++]->ncomp) {
-      const size_t from = probe->field[i]->from;
-      const PetscReal *here = x[from == offsetof(SbStep, V) ? 1 : from == offsetof(SbStep, A) ? 2 : 0];
-      const PetscBool position = (PetscBool)!strcmp(probe->field[i]->name, "position");
+      const SbField *f = probe->field[i];
+      const PetscReal *x = f->from == offsetof(SbStep, V)   ? stage->v
+                           : f->from == offsetof(SbStep, A) ? stage->a
+                                                            : stage->u;
+      const PetscBool position = (PetscBool)!strcmp(f->name, "position");
 
-      if (probe->field[i]->cell) continue;
-      if (probe->local >= 0) SbPointsVertex(run, out, probe->local, here, values);
+      if (f->cell) {
+        PetscCall(SbFieldAddCells(f, run, step, &probe->cells, values));
+        continue;
+      }
+      /* at the vertex, or over the nodes; positions are displacements and where that is at rest */
+      if (probe->local >= 0) SbPointsVertex(run, out, probe->local, x, values);
       for (int k = 0; k < 3; k++) {
         if (position && probe->local >= 0) values[k] += probe->x[k];
         for (PetscInt a = 0; a < probe->nodes.n; a++) {
           const PetscInt at = 3 * probe->nodes.item[a].number + k;
 
-          values[k] += probe->nodes.item[a].weight * (here[at] + (position ? s->node_x[at] : 0.));
+          values[k] +=
+            probe->nodes.item[a].weight * (x[at] + (position ? run->model->space->node_x[at] : 0.));
         }
       }
     }
   }
-  for (int i = 0; i < 3; i++)
-    if (vector[i]) PetscCall(SbSpaceRestoreLocalRead(s, vector[i], &x[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -162,7 +162,6 @@ PetscErrorCode SbReportHeader(SbRun run)
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
-    PetscReal off[3];
 
     if (probe->kind != SB_PROBE_POINT) {
       PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
@@ -173,10 +172,9 @@ PetscErrorCode SbReportHeader(SbRun run)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    SbSubtract(probe->x, probe->at, off);
     PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
                     (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-                    (double)PetscSqrtReal(SbDot3(off, off))));
+                    (double)PetscSqrtReal(SbDistance2(probe->x, probe->at))));
   }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -242,10 +240,10 @@ PetscErrorCode SbReportSummary(SbRun run)
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds", "share",
                           "ms per step", "us per step, tet"));
     for (int i = 0; i < SB_PHASE_COUNT; i++) {
-      const PetscReal seconds = phases.phase[i].seconds;
+      const PetscReal seconds = phases.seconds[i];
 
       if ((i == SB_PHASE_CONTACT || i == SB_PHASE_SEARCH) && !(seconds > 0)) continue; /* none in the scene */
-      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", phases.phase[i].name, (double)seconds,
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", SbPhaseNames[i], (double)seconds,
                             (double)(phases.total > 0. ? 100. * seconds / phases.total : 0.)));
       if (steps > 0. && i > SB_PHASE_SETUP)
         PetscCall(PetscPrintf(PETSC_COMM_SELF, " %14.3f %18.4f", (double)(1e3 * seconds / steps),

@@ -22,7 +22,7 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt *cell10;     /* [ncell][10] with nodes at the edges 01 12 02 03 13 23, -1: none; NULL without P2 */
+  PetscInt *cell10;     /* [ncell][10] with nodes at the edges (SbTetEdge), -1: none; NULL without P2 */
 } Other;
 
 /* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there. PetscFree. */
@@ -66,8 +66,13 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   for (PetscInt i = 0; *ok && body && i < nparent; i++) body[parent[i]] = body[i];
   if (nten) o->ncell = nten;
   for (PetscInt c = 0; *ok && c < nten; c++) {
-    PetscCall(PetscArraycpy(o->cell + 4 * c, o->cell10 + 10 * c, 4));
-    if (o->cell10[10 * c + 4] >= 0) *ok = are_points(o->cell10 + 10 * c + 4, 6, o->npoint);
+    PetscInt *point = o->cell10 + 10 * c;
+    const PetscInt middle12 = point[5]; /* the file has the edges 01 12 02 03 13 23 */
+
+    PetscCall(PetscArraymove(point + 5, point + 6, 2));
+    point[7] = middle12;
+    PetscCall(PetscArraycpy(o->cell + 4 * c, point, 4));
+    if (point[4] >= 0) *ok = are_points(point + 4, 6, o->npoint);
   }
   *ok = (PetscBool)(*ok && are_points(o->cell, 4 * o->ncell, o->npoint));
 
@@ -91,7 +96,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   SbH5Frames frames = {.wanted = -1};
   PetscInt which = -1, n = 0, nu;
   int64_t mesh = 0;
-  PetscBool ok = PETSC_TRUE;
+  PetscBool ok;
 
   PetscFunctionBeginUser;
   /* RUN[,STEP]: a folder or its fields.h5 */
@@ -116,8 +121,8 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
              (long long)frames.wanted, (long long)frames.last);
 
   /* the mesh of that frame, which may be one of a re-meshing */
-  if (H5Aexists(o->frame, "mesh") > 0) SbH5GetInt(o->frame, "mesh", &mesh, &ok);
-  o->mesh = H5Gopen2(o->file, SbOutputMeshName((PetscInt)mesh, name), H5P_DEFAULT);
+  SbH5GetInt(o->frame, "mesh", &mesh, &ok);
+  o->mesh = SbH5OpenGroup(o->file, SbOutputMeshName((PetscInt)mesh, name));
 
   /* number of the body of this name, or of the one that it is a copy of; the only body, if there is one */
   if (o->mesh >= 0) {
@@ -165,8 +170,6 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 {
   const SbSpace s = run->model->space;
   PetscReal far = 0.;
-  static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
-  static const int place[6] = {0, 2, 3, 1, 4, 5}; /* in that order, of the edges 01 02 03 12 13 23 */
   SbLocator locator;
   PetscScalar *u, *v;
   PetscReal *off = NULL;
@@ -180,22 +183,26 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 
     for (int k = 0; k < 3 && point[4] >= 0; k++)
       off[3 * i + k] =
-        o->x[3 * point[4 + place[i % 6]] + k] - 0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
+        o->x[3 * point[4 + i % 6] + k] - 0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
   }
   PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, off, &locator));
   PetscCall(VecGetArray(run->U, &u));
   PetscCall(VecGetArray(run->V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal weight[10];
-    PetscInt cell, n;
+    PetscReal L[4], Q[SB_CELL_NODES];
+    const PetscReal *weight = L;
     const PetscInt *point;
+    PetscInt cell, n = 4;
 
     if (s->node_body[i] != b) continue;
-    far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, weight));
-    n = o->cell10 && o->cell10[10 * cell + 4] >= 0 ? 10 : 4;
-    point = n == 10 ? o->cell10 + 10 * cell : o->cell + 4 * cell;
-    for (int e = 0; e < n - 4; e++) weight[4 + e] = 4. * weight[edge[e][0]] * weight[edge[e][1]];
-    for (int a = 0; a < 4 && n == 10; a++) weight[a] *= 2. * weight[a] - 1.;
+    far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, L));
+    point = o->cell + 4 * cell;
+    if (o->cell10 && o->cell10[10 * cell + 4] >= 0) {
+      point = o->cell10 + 10 * cell;
+      n = SB_CELL_NODES;
+      SbQuadraticBasis(L, Q);
+      weight = Q;
+    }
     for (int k = 0; k < 3; k++) {
       u[3 * i + k] = 0.;
       if (o->v) v[3 * i + k] = 0.;
@@ -229,20 +236,19 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
   const SbOutput out = (SbOutput)run->output;
   const SbSpace s = run->model->space;
   const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell, edge = support + 4 * s->mesh->Ncell;
-  PetscInt nsupport = 0;
+  PetscInt nsupport = 0, *number;
   PetscBool weak = PETSC_FALSE;
-  PetscReal *number;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < run->model->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
-  PetscCall(PetscMalloc1(s->nnode_owned + out->node.n, &number));
-  for (PetscInt i = 0; i < out->node.n; i++) number[s->nnode_owned + i] = out->node.start + i;
-  PetscCall(SbOrderScatter(&out->node, 1, number + s->nnode_owned, number));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
+  PetscCall(PetscMalloc1(out->node.n, &number));
+  for (PetscInt i = 0; i < out->node.n; i++) number[i] = out->node.start + i;
+  PetscCall(SbForestBroadcast(out->node.sf, 1, MPIU_INT, number, row));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
     nsupport += s->node_orig[i] >= support && s->node_orig[i] < edge;
+    if (s->node_orig[i] >= edge) row[i] += n - out->node.N;
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nsupport, 1, MPIU_INT, MPI_SUM, out->comm));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    row[i] = (PetscInt)number[i] + (s->node_orig[i] >= edge ? n - out->node.N : 0);
   for (PetscInt i = 0; n != out->node.N && s->dirichlet_node && i < 4 * s->mesh->ncell; i++)
     if (s->dirichlet_node[i] >= 0 && s->dirichlet_node[i] < s->nnode_owned)
       row[s->dirichlet_node[i]] = row[s->cell_node[i]];
@@ -319,7 +325,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
       if (!has) continue;
       PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &order, 3, slice, &ok));
       if (!ok) break;
-      PetscCall(SbOrderScatter(&order, 3, slice, owned));
+      PetscCall(SbForestBroadcast(order.sf, 3, MPIU_REAL, slice, owned));
       PetscCall(VecGetArray(target[k], &x));
       for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
         if (s->node_body[i / 3] == b) x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];

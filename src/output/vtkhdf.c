@@ -13,7 +13,7 @@
   Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and
   PolyData. Symmetric tensors have the order xx yy zz xy yz xz there.
 */
-#include "index.h"
+#include "output_impl.h"
 
 #define BETWEEN 20
 
@@ -36,7 +36,7 @@ static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
 }
 
 /* The virtual dataset of an array: all frames or parts in sequence; corners of cells as one list. */
-static void write_array(SbIndex v, hid_t where, const char *name, const SbArray *a, PetscBool *ok)
+static void write_array(SbIndex v, hid_t where, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
   const hid_t type = a->whole ? H5T_STD_I32LE : a->bytes == 8 ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
@@ -75,37 +75,30 @@ static void write_array(SbIndex v, hid_t where, const char *name, const SbArray 
     at += each * n;
   }
   (void)H5Sselect_all(space);
-  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
+  dataset = H5Dcreate2(where, a->name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
   if (dataset < 0) *ok = PETSC_FALSE;
   if (dataset >= 0) (void)H5Dclose(dataset);
   (void)H5Sclose(space);
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of
-   type uint8 all values are data[0]. */
+/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. */
 static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t type,
                           const void *values, PetscBool *ok)
 {
   const hsize_t size[2] = {(hsize_t)n, (hsize_t)m}, chunk[1] = {(hsize_t)PetscMin(n, 1 << 16)};
   const hid_t space = H5Screate_simple(m ? 2 : 1, size, NULL), list = H5Pcreate(H5P_DATASET_CREATE);
-  const PetscBool same = (PetscBool)(type == H5T_STD_U8LE);
-  const hid_t memtype = same                     ? H5T_NATIVE_UINT8
-                        : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
-                                                 : H5T_NATIVE_INT64;
+  const hid_t memtype = type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT64;
   hid_t dataset;
 
   (void)H5Pset_obj_track_times(list, 0);
-  if (same) {
-    (void)H5Pset_fill_value(list, memtype, values);
-  } else if (!m && n > 1024 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
+  if (!m && n > 1024 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
     (void)H5Pset_chunk(list, 1, chunk);
     (void)H5Pset_shuffle(list);
     (void)H5Pset_deflate(list, 1);
   }
   dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
-  if (dataset < 0 || (!same && H5Dwrite(dataset, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0))
-    *ok = PETSC_FALSE;
+  if (dataset < 0 || H5Dwrite(dataset, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) *ok = PETSC_FALSE;
   if (dataset >= 0) (void)H5Dclose(dataset);
   (void)H5Pclose(list);
   (void)H5Sclose(space);
@@ -115,38 +108,33 @@ static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m,
 static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 {
   static const char *const kind[4] = {"Vertices", "Lines", "Polygons", "Strips"};
-  const uint8_t linear = 10, quadratic = 24; /* VTK's numbers of tets */
   PetscInt n = 0, ncell = 0, most = 0;
 
   for (PetscInt p = 0; p < v->npart; p++) {
     ncell += v->part[p].ncell;
     most = PetscMax(most, v->part[p].ncell);
   }
-  if (!v->points) {
-    for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].ncell;
-    write_numbers(root, "NumberOfCells", v->npart, 0, H5T_STD_I64LE, work, ok);
-    for (PetscInt p = 0; p < v->npart; p++) work[p] *= v->corners;
-    write_numbers(root, "NumberOfConnectivityIds", v->npart, 0, H5T_STD_I64LE, work, ok);
-    write_numbers(root, "Types", ncell, 0, H5T_STD_U8LE, v->corners > 4 ? &quadratic : &linear, ok);
-    for (PetscInt p = 0; p < v->npart; p++)
-      for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = v->corners * (int64_t)c;
-    /* with the integer type of the corners: ParaView 5.13 accepts no other */
-    write_numbers(root, "Offsets", n, 0, H5T_STD_I32LE, work, ok);
-    return;
-  }
-
-  /* one vertex per point: all frames share the numbers 0, 1, 2, ... */
-  for (int k = 0; k < 4; k++) {
-    const hid_t group = H5Gcreate2(root, kind[k], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  for (int k = 0; k < (v->points ? 4 : 1); k++) {
+    const hid_t group = v->points ? H5Gcreate2(root, kind[k], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT) : root;
 
     for (PetscInt p = 0; p < v->npart; p++) work[p] = k ? 0 : v->part[p].ncell;
     write_numbers(group, "NumberOfCells", v->npart, 0, H5T_STD_I64LE, work, ok);
+    for (PetscInt p = 0; p < v->npart; p++) work[p] *= v->corners;
     write_numbers(group, "NumberOfConnectivityIds", v->npart, 0, H5T_STD_I64LE, work, ok);
+    if (!v->points) continue;
+    /* one vertex per point: all frames share the numbers 0, 1, 2, ... */
     for (PetscInt c = 0; c <= most; c++) work[c] = c;
     write_numbers(group, "Connectivity", k ? 0 : most, 0, H5T_STD_I64LE, work, ok);
     write_numbers(group, "Offsets", k ? 1 : most + 1, 0, H5T_STD_I64LE, work, ok);
     (void)H5Gclose(group);
   }
+  if (v->points) return;
+  for (PetscInt c = 0; c < ncell; c++) work[c] = v->corners > 4 ? 24 : 10; // VTK's numbers of tets
+  write_numbers(root, "Types", ncell, 0, H5T_STD_U8LE, work, ok);
+  for (PetscInt p = 0; p < v->npart; p++)
+    for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = v->corners * (int64_t)c;
+  /* with the integer type of the corners: ParaView 5.13 accepts no other */
+  write_numbers(root, "Offsets", n, 0, H5T_STD_I32LE, work, ok);
 }
 
 /* Times of the frames, the part that each of them shows, and where its points, cells and arrays begin. */
@@ -184,7 +172,7 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
     const SbArray *a = &v->array[i];
     int64_t at = 0;
 
-    if (!strcmp(a->name, "cells")) continue;
+    if (!strcmp(a->name, "Connectivity")) continue;
     for (PetscInt f = 0; f < v->nframe; f++) {
       if (a->constant) {
         at = 0;
@@ -203,55 +191,17 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
   (void)H5Gclose(group);
 }
 
-/* The whole file, open in memory. */
-static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
+void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
 {
-  const hid_t root = H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  const hid_t type = H5Tcopy(H5T_C_S1);
   const char *kind = v->points ? "PolyData" : "UnstructuredGrid";
   const hsize_t two = 2;
   const int64_t version[2] = {2, 0};
-  hid_t data[2];
-
-  /* what it is */
-  (void)H5Tset_size(type, strlen(kind));
-  (void)H5Tset_strpad(type, H5T_STR_NULLPAD);
-  write_attribute(root, "Version", H5T_STD_I64LE, H5T_NATIVE_INT64, H5Screate_simple(1, &two, NULL), version,
-                  ok);
-  write_attribute(root, "Type", type, type, H5Screate(H5S_SCALAR), kind, ok);
-  (void)H5Tclose(type);
-
-  /* parts, cells, arrays, steps */
-  for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].npoint;
-  write_numbers(root, "NumberOfPoints", v->npart, 0, H5T_STD_I64LE, work, ok);
-  write_cells(v, root, work, ok);
-  data[0] = H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  data[1] = H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  for (PetscInt i = 0; i < v->narray; i++) {
-    const SbArray *a = &v->array[i];
-
-    if (!strcmp(a->name, "Points"))
-      write_array(v, root, "Points", a, ok);
-    else if (!strcmp(a->name, "cells"))
-      write_array(v, root, "Connectivity", a, ok);
-    else
-      write_array(v, data[a->cell], a->name, a, ok);
-  }
-  write_steps(v, root, work, ok);
-  (void)H5Gclose(data[0]);
-  (void)H5Gclose(data[1]);
-  (void)H5Gclose(root);
-}
-
-void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
-{
-  size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
+  size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1, size = 0;
   PetscBool ok = PETSC_TRUE;
   int64_t *work;
-  size_t size = 0;
   const double begun = MPI_Wtime();
   void *text = NULL;
-  hid_t file, list;
+  hid_t file, list, root, type, data[2];
 
   if (v->nframe == v->nwritten || (!last && begun < v->next)) return;
   for (PetscInt p = 0; p < v->npart; p++) nwork += (size_t)v->part[p].ncell + 1;
@@ -262,7 +212,30 @@ void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
   (void)H5Pset_fapl_core(list, 1 << 16, 0);
   file = work ? H5Fcreate(v->vtkhdf, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
   if (file >= 0) {
-    write_file(v, file, work, &ok);
+    /* what it is */
+    root = H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    type = H5Tcopy(H5T_C_S1);
+    (void)H5Tset_size(type, strlen(kind));
+    (void)H5Tset_strpad(type, H5T_STR_NULLPAD);
+    write_attribute(root, "Version", H5T_STD_I64LE, H5T_NATIVE_INT64, H5Screate_simple(1, &two, NULL),
+                    version, &ok);
+    write_attribute(root, "Type", type, type, H5Screate(H5S_SCALAR), kind, &ok);
+    (void)H5Tclose(type);
+
+    /* parts, cells, arrays, steps */
+    for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].npoint;
+    write_numbers(root, "NumberOfPoints", v->npart, 0, H5T_STD_I64LE, work, &ok);
+    write_cells(v, root, work, &ok);
+    data[0] = H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    data[1] = H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    for (const SbArray *a = v->array; a < v->array + v->narray; a++)
+      write_array(v, strcmp(a->name, "Points") && strcmp(a->name, "Connectivity") ? data[a->cell] : root, a,
+                  &ok);
+    write_steps(v, root, work, &ok);
+    (void)H5Gclose(data[0]);
+    (void)H5Gclose(data[1]);
+    (void)H5Gclose(root);
+
     (void)H5Fflush(file, H5F_SCOPE_GLOBAL);
     size = (size_t)PetscMax(H5Fget_file_image(file, NULL, 0), 0);
     text = malloc(size + 1);

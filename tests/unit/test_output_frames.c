@@ -15,17 +15,17 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
   char name[128];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(3 * out->vertex.n, &x, 6 * PetscMax(out->vertex.n, out->cell.n), &field));
-  PetscCall(SbH5ReadSlice(h, "/mesh/x", &out->vertex, 3, x, &ok));
+  PetscCall(PetscMalloc2(3 * out->point.n, &x, 6 * PetscMax(out->point.n, out->cell.n), &field));
+  PetscCall(SbH5ReadSlice(h, "/mesh/x", &out->point, 3, x, &ok));
   SB_CHECK(ok, "no /mesh/x");
   for (int k = 0; k < 3; k++) {
     static const char *const names[] = {"displacement", "velocity", "acceleration"};
 
     SbFormat(sizeof(name), name, "%s/%s", group, names[k]);
-    PetscCall(SbH5ReadSlice(h, name, &out->vertex, 3, field, &ok));
+    PetscCall(SbH5ReadSlice(h, name, &out->point, 3, field, &ok));
     SB_CHECK(ok, "no %s", name);
     worst = 0.;
-    for (PetscInt i = 0; i < out->vertex.n; i++) {
+    for (PetscInt i = 0; i < out->point.n; i++) {
       PetscReal m[3][3];
 
       motion(x + 3 * i, t, m[0], m[1], m[2]);
@@ -60,8 +60,8 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
 /* The cells of the file, by its vertex numbers, fill the box; each belongs to body 0 or 1. */
 static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
 {
-  const PetscInt nvert = out->vertex.N;
-  SbOrder all = out->vertex; // every rank reads all vertices
+  const PetscInt nvert = out->point.N;
+  SbOrder all = out->point; // every rank reads all vertices
   PetscReal *x, *cell, *body, sum = 0., least = 1.;
   PetscBool ok[3];
 
@@ -144,11 +144,11 @@ static PetscErrorCode test_reaction(void)
   SB_CHECK(scene.run->want_residual, "the residual is not asked for");
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
   PetscCall(fixture_fields(dir, &h));
-  PetscCall(PetscMalloc2(3 * out->vertex.n, &x, 3 * out->vertex.n, &r));
-  PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->vertex, 3, x, &ok));
-  PetscCall(SbH5ReadSlice(&h, "/step/0000/000000/reaction", &out->vertex, 3, r, &ok));
+  PetscCall(PetscMalloc2(3 * out->point.n, &x, 3 * out->point.n, &r));
+  PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok));
+  PetscCall(SbH5ReadSlice(&h, "/step/0000/000000/reaction", &out->point, 3, r, &ok));
   SB_CHECK(ok, "no reaction");
-  for (PetscInt i = 0; i < 3 * out->vertex.n; i++)
+  for (PetscInt i = 0; i < 3 * out->point.n; i++)
     fine = (PetscBool)(fine && r[i] == (x[i - i % 3] < 1e-9 ? 0.5 : 0.));
   SB_CHECK(fine, "reactions are not those of the held vertices");
   PetscCall(PetscFree2(x, r));
