@@ -348,7 +348,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   }
   // find the nodes of elements and sets
   s->token = s->end;
-  if (!a.deck.nnode.n) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
+  if (!im->nvert) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
   PetscCall(SbDeckBuild(&a.deck));
   // convert element sides to triangles
   for (PetscInt k = 0; k < a.nside.n; k++) {

@@ -182,6 +182,9 @@ static PetscErrorCode read_nodes(Gmsh *g)
       PetscCall(SbScanInt(s, 8, "number of a node", &im->vert_number[i]));
     for (; n > 0; v++, n--) {
       if (g->version != 41) PetscCall(SbScanInt(s, 4, "number of a node", &im->vert_number[v]));
+      if (SbNumbersFind(&im->nodes, im->vert_number[v]) >= 0)
+        SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->vert_number[v]);
+      PetscCall(SbNumbersAdd(&im->nodes, im->vert_number[v]));
       PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
       for (int k = 0; parametric && k < dim; k++)
         PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
@@ -191,9 +194,6 @@ static PetscErrorCode read_nodes(Gmsh *g)
   if (g->version == 40) im->nvert = v;
   if (v < im->nvert)
     SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
-  if (im->nodes.repeated)
-    SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->nodes.twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -390,7 +390,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
     if (!there || !strncasecmp(b.line.text, "ENDDATA", 7)) break;
     PetscCall(read_entry(&b));
   }
-  if (!b.deck.nnode.n) {
+  if (!im->nvert) {
     b.scan->token = b.scan->end;
     SB_SCAN_ERROR(b.scan, "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
   }
@@ -398,7 +398,6 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   PetscCall(SbImportJoinGroups(im));
   /* name the groups of properties that elements use */
   for (PetscInt i = 0; i < b.nname.n; i++)
-    for (PetscInt dim = 1; dim < 4; dim++)
-      PetscCall(SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name));
+    for (PetscInt dim = 1; dim < 4; dim++) SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,20 +29,22 @@ static PetscErrorCode groups(const SbImport *mesh)
 
   PetscFunctionBeginUser;
   for (int d = 3; d >= 0; d--) {
-    PetscBool found = PETSC_TRUE, titled = PETSC_FALSE;
+    PetscBool titled = PETSC_FALSE;
 
-    for (PetscInt g = 0; found; g++) {
-      SbMeshGroup group;
+    for (PetscInt g = 0; g < mesh->ngroup; g++) {
+      const SbGroup *group = &mesh->group[g];
       char number[32];
+      PetscReal size;
+      PetscInt n;
 
-      PetscCall(SbMeshFileGroup(mesh, g, &group, &found));
-      if (!found || group.dim != d) continue;
+      if (group->dim != d) continue;
+      PetscCall(SbMeshFileGroup(mesh, g, &n, &size));
       if (!titled) (void)printf("%s\n", title[d]);
       titled = PETSC_TRUE;
-      (void)printf("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]);
-      if (d) (void)printf(", %.6g %s", (double)group.size, unit[d]);
+      (void)printf("  %-26s %12s %s", group->name, SbToolNumber(n, number), item[d]);
+      if (d) (void)printf(", %.6g %s", (double)size, unit[d]);
       /* formats with names only have no group numbers */
-      if (group.tag > 0 && group.tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group.tag);
+      if (group->tag > 0 && group->tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group->tag);
       (void)printf("\n");
     }
   }
@@ -87,7 +89,6 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshStatistics facts;
-  PetscInt nvert, n[4];
   char number[32], label[32];
   const PetscReal *b = facts.body.bbox;
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
@@ -95,10 +96,10 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   PetscInt64 most = 1;
 
   PetscFunctionBeginUser;
-  SbMeshFileCount(mesh, &nvert, n);
-  (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(nvert, number));
+  (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(mesh->nvert, number));
   for (int d = 3; d >= 0; d--)
-    if (d == 3 || n[d]) (void)printf("  %-26s %12s\n", what[d], SbToolNumber(n[d], number));
+    if (d == 3 || mesh->item[d].n)
+      (void)printf("  %-26s %12s\n", what[d], SbToolNumber(mesh->item[d].n, number));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));

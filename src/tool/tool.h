@@ -2,7 +2,7 @@
   tool.h - shared declarations of supple-mesh: command line and commands.
 */
 #pragma once
-#include "sbmeshfile.h"
+#include "sbmeshio.h"
 
 /* Command line of supple-mesh, parsed. */
 typedef struct {
