@@ -77,13 +77,12 @@ const SbToolCommand SbToolCommands[] = {
 
 PetscErrorCode SbToolRun(SbTool *tool)
 {
-  const SbToolCommand *command = SbToolCommands;
   SbImport mesh = {.progress = SbToolProgress, .progress_ctx = tool};
   char phase[PETSC_MAX_PATH_LEN + 16];
 
   PetscFunctionBeginUser;
-  while (strcmp(command->name, tool->command)) command++;
-  PetscCheck(strcmp(command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck(strcmp(tool->command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF,
+             PETSC_ERR_USER,
              "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
              ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
              tool->in);
@@ -91,9 +90,9 @@ PetscErrorCode SbToolRun(SbTool *tool)
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
   SB_TOOL_PHASE(tool, phase, SbImportRead(&tool->body, &mesh));
-  if (command->run != SbToolInfo && !tool->quiet && mesh.note[0])
+  if (tool->command->run != SbToolInfo && !tool->quiet && mesh.note[0])
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, mesh.note));
-  PetscCall(command->run(tool, &mesh));
+  PetscCall(tool->command->run(tool, &mesh));
   if (tool->view[0]) PetscCall(SbToolView(tool, &mesh));
   PetscCall(SbImportDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);

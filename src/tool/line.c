@@ -43,13 +43,6 @@ static const char *const readers[] = {
 _Static_assert(PETSC_STATIC_ARRAY_LENGTH(readers) == PETSC_STATIC_ARRAY_LENGTH(rows),
                "one entry for each row");
 
-PetscErrorCode SbToolRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolHelp(void)
 {
   PetscFunctionBeginUser;
@@ -151,6 +144,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   PetscInt format, backend, surface;
 
   PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
   // one process, a command, and the number of files that it takes
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
@@ -172,7 +166,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
     PetscCall(PetscOptionsValidKey(argv[i], &is_option));
     if (is_option) PetscCall(check_option(argv[i] + 1, command->name));
   }
-  tool->command = command->name;
+  tool->command = command;
   tool->in = line->word[1];
   tool->out = command->nfile > 1 ? line->word[2] : NULL;
   PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
