@@ -13,7 +13,6 @@ PetscBool SbMeshFileIsSurface(const char *path);
 /* Simplices of group i of a mesh, and their length, area or volume; m, m^2, m^3; 0 for points. */
 PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, PetscInt *n, PetscReal *size);
 
-/* size and shape */
 #define SB_ANGLE_BINS 18 /* of ten degrees */
 #define SB_RATIO_BINS 8
 extern const PetscReal SbRatioBinEdges[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
@@ -34,7 +33,6 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshStatistics *facts);
 
-/* repair */
 typedef struct {
   PetscReal merge_tolerance; /* vertices at most so far apart became one, m */
   PetscInt nwelded;          /* vertices that went into another one */
@@ -57,12 +55,9 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 
-/* refine.c */
-
 /* Cuts every tet into eight, every triangle into four, every line into two; groups are carried over. */
 PetscErrorCode SbMeshFileRefine(SbImport *import);
 
-/* writing */
 typedef enum {
   SB_MESH_AUTO, /* by the name: .msh is text of version 4.1 */
   SB_MESH_MSH41,

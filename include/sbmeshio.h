@@ -24,7 +24,7 @@ PetscInt SbNumbersFind(const SbNumbers *numbers, int64_t number);
 /* scan.c: a file in memory */
 typedef struct {
   const char *where; /* begins every message */
-  char *data;        /* whole file and a terminating zero */
+  char *data;        /* whole file and a terminating zero; PetscFree() */
   const char *end;
   const char *at;    /* next byte */
   const char *token; /* the last token, for messages */
@@ -35,7 +35,6 @@ typedef struct {
 } SbScan;
 
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
-PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
 /* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages, that of

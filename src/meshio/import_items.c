@@ -33,10 +33,8 @@ PetscErrorCode SbImportGrow(SbImport *im, SbCount *count, size_t unit, void *arr
 {
   PetscFunctionBeginUser;
   if (count->n == count->capacity) {
-    const PetscInt grown = PetscMax(64, 2 * count->capacity);
-
-    PetscCall(SbImportScratch(im, (size_t)grown * unit, array));
-    count->capacity = grown;
+    count->capacity = PetscMax(64, 2 * count->capacity);
+    PetscCall(SbImportScratch(im, (size_t)count->capacity * unit, array));
   }
   count->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,7 +43,7 @@ PetscErrorCode SbImportGrow(SbImport *im, SbCount *count, size_t unit, void *arr
 PetscErrorCode SbImportForget(SbImport *im)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbScanClose(&im->scan));
+  PetscCall(PetscFree(im->scan.data));
   PetscCall(SbNumbersDestroy(&im->nodes));
   PetscCall(SbNumbersDestroy(&im->elements));
   while (im->scratch) {

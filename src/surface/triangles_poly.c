@@ -132,7 +132,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
     if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
     if (!ierr) ierr = read_points(p, count[0]);
     p->s = s;
-    PetscCall(SbScanClose(&scan));
+    PetscCall(PetscFree(scan.data));
     PetscCall(ierr);
   }
   PetscCall(read_counts(s, "number of facets", 2, count));

@@ -51,15 +51,17 @@ static PetscErrorCode groups(const SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints a line of a histogram: at most 40 signs, at least one if n > 0. */
-static void bar(const char *label, PetscInt64 n, PetscInt64 most)
+/* Prints a histogram; a bar has at most 40 signs, at least one if n > 0. */
+static void bars(int nbin, const char label[][32], const PetscInt64 n[])
 {
-  char signs[41], number[32];
-  const int length = n ? (int)PetscMax(1, 40 * n / most) : 0;
+  const char *signs = "########################################";
+  PetscInt64 most = 1;
+  char number[32];
 
-  memset(signs, '#', sizeof(signs));
-  signs[length] = 0;
-  (void)printf("  %-14s %14s %s\n", label, SbToolNumber(n, number), signs);
+  for (int i = 0; i < nbin; i++) most = PetscMax(most, n[i]);
+  for (int i = 0; i < nbin; i++)
+    (void)printf("  %-14s %14s %.*s\n", label[i], SbToolNumber(n[i], number),
+                 n[i] ? (int)PetscMax(1, 40 * n[i] / most) : 0, signs);
 }
 
 /* Memory in bytes of a run of one step on one rank, by element. */
@@ -89,11 +91,10 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshStatistics facts;
-  char number[32], label[32];
+  char number[32], label[SB_ANGLE_BINS][32]; /* of both histograms */
   const PetscReal *b = facts.body.bbox;
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   static const char *const what[4] = {"points of groups", "lines of groups", "triangles of groups", "tets"};
-  PetscInt64 most = 1;
 
   PetscFunctionBeginUser;
   (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(mesh->nvert, number));
@@ -119,24 +120,16 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   // shape quality of the tets
   (void)printf("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
                (double)facts.body.min_dihedral, (double)facts.max_dihedral);
-  for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, facts.angle[i]);
-  for (int i = 0; i < SB_ANGLE_BINS; i++) {
-    (void)snprintf(label, sizeof(label), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
+  for (int i = 0; i < SB_ANGLE_BINS; i++)
+    (void)snprintf(label[i], sizeof(label[i]), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
                    180 / SB_ANGLE_BINS * (i + 1));
-    bar(label, facts.angle[i], most);
-  }
+  bars(SB_ANGLE_BINS, (const char(*)[32])label, facts.angle);
   (void)printf("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
                (double)facts.body.max_radius_ratio);
-  most = 1;
-  for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, facts.ratio[i]);
-  for (int i = 0; i < SB_RATIO_BINS; i++) {
-    if (i + 1 < SB_RATIO_BINS)
-      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBinEdges[i],
-                     (double)SbRatioBinEdges[i + 1]);
-    else
-      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBinEdges[i]);
-    bar(label, facts.ratio[i], most);
-  }
+  for (int i = 0; i < SB_RATIO_BINS; i++)
+    (void)snprintf(label[i], sizeof(label[i]), i + 1 < SB_RATIO_BINS ? "%4.4g to %.4g" : "%4.4g and more",
+                   (double)SbRatioBinEdges[i], (double)SbRatioBinEdges[PetscMin(i + 1, SB_RATIO_BINS - 1)]);
+  bars(SB_RATIO_BINS, (const char(*)[32])label, facts.ratio);
   // memory of a run
   (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
                "matrix MiB", "memory MiB");
