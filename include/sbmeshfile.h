@@ -1,5 +1,5 @@
 /*
-  sbmeshfile.h - layer 2: a mesh file, on one rank: read, measured, repaired, refined, written (supple-mesh).
+  sbmeshfile.h - layer 2: a mesh that SbImportRead() has read, on one rank: measured, repaired, refined, written (supple-mesh).
 
   Not collective. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, a line that names the file and what to do.
 */
@@ -8,41 +8,11 @@
 
 typedef struct _p_SbImport SbImport; /* vertices, simplices of every dimension and their groups */
 
-/* Progress callback: `done` of `total` items, named by `what` ("tets read"); total 0: not known. */
-typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
-
-/*
-  SbMeshFileRead - reads a mesh of any kind that -body_<name>_mesh takes; nothing in it is checked or changed.
-
-  Input:
-    body          - name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet
-    progress, ctx - called with how far it is; progress may be NULL
-  Output:
-    import        - to be freed by SbMeshFileDestroy()
-*/
-PetscErrorCode SbMeshFileRead(const SbBody *body, SbMeshProgress progress, void *ctx, SbImport **import);
-PetscErrorCode SbMeshFileDestroy(SbImport **import);
-
-/* How many simplices of each dimension it holds; n[0] counts points that belong to groups, not vertices. */
-void SbMeshFileCount(const SbImport *import, PetscInt *nvert, PetscInt n[4]);
-
 /* Whether a file holds a surface by its name: reading it fills it with tets, as body->tet says. */
 PetscBool SbMeshFileIsSurface(const char *path);
-/* What the reader repaired; "" when nothing. Borrowed. */
-const char *SbMeshFileNote(const SbImport *import);
+/* Simplices of group i of a mesh, and their length, area or volume; m, m^2, m^3; 0 for points. */
+PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, PetscInt *n, PetscReal *size);
 
-/* groups */
-typedef struct {
-  char name[2 * SB_NAME_MAX];
-  PetscInt dim;   /* 0 points, 1 curves, 2 surfaces, 3 volumes */
-  int64_t tag;    /* number in the file */
-  PetscInt n;     /* simplices of this dimension in it */
-  PetscReal size; /* their length, area or volume; m, m^2, m^3; 0 for points */
-} SbMeshGroup;
-/* Group i; *group is left alone when there is none, and *found says so. */
-PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, SbMeshGroup *group, PetscBool *found);
-
-/* size and shape */
 #define SB_ANGLE_BINS 18 /* of ten degrees */
 #define SB_RATIO_BINS 8
 extern const PetscReal SbRatioBinEdges[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
@@ -63,7 +33,6 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshStatistics *facts);
 
-/* repair */
 typedef struct {
   PetscReal merge_tolerance; /* vertices at most so far apart became one, m */
   PetscInt nwelded;          /* vertices that went into another one */
@@ -86,12 +55,9 @@ typedef struct {
 */
 PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 
-/* refine.c */
-
 /* Cuts every tet into eight, every triangle into four, every line into two; groups are carried over. */
 PetscErrorCode SbMeshFileRefine(SbImport *import);
 
-/* writing */
 typedef enum {
   SB_MESH_AUTO, /* by the name: .msh is text of version 4.1 */
   SB_MESH_MSH41,

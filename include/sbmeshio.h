@@ -10,28 +10,21 @@
 
 /* numbers.c: from numbers of a file to indices in memory */
 typedef struct {
-  int64_t number;
-  PetscInt vert;
-} SbNumbered;
-typedef struct {
-  PetscInt n;
-  int64_t first, ntable;
-  PetscInt *table;    /* [ntable] index of number first + i, or -1; NULL when the numbers are far apart */
-  SbNumbered *sorted; /* [n] then this */
-  PetscBool repeated; /* a number occurs twice */
-  int64_t twice;      /* this one */
+  PetscInt n, capacity, nslot; /* nslot: a power of two; 0 while the numbers are consecutive */
+  int64_t *number;             /* [n] */
+  PetscInt *slot;              /* [nslot] indices by a hash of their number, or -1 */
 } SbNumbers;
 
-/* Prepares the way from number[n] to 0 ... n - 1; zeroed, or made before: then it is made again. */
-PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index);
-PetscErrorCode SbNumbersDestroy(SbNumbers *index);
-/* Index of a number, -1 when there is none. */
-PetscInt SbNumbersFind(const SbNumbers *index, int64_t number);
+/* Adds a number, whose index is n. Zeroed before the first one. */
+PetscErrorCode SbNumbersAdd(SbNumbers *numbers, int64_t number);
+PetscErrorCode SbNumbersDestroy(SbNumbers *numbers);
+/* Index of a number, the last one when it was added twice, -1 when there is none. */
+PetscInt SbNumbersFind(const SbNumbers *numbers, int64_t number);
 
 /* scan.c: a file in memory */
 typedef struct {
   const char *where; /* begins every message */
-  char *data;        /* whole file and a terminating zero */
+  char *data;        /* whole file and a terminating zero; PetscFree() */
   const char *end;
   const char *at;    /* next byte */
   const char *token; /* the last token, for messages */
@@ -42,7 +35,6 @@ typedef struct {
 } SbScan;
 
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
-PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
 /* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages, that of
@@ -102,6 +94,9 @@ enum {
   SB_GMSH_NTYPES = 32
 };
 
+/* Progress callback: `done` of `total` items, named by `what` ("tets read"); total 0: not known. */
+typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
+
 /* Simplices of one dimension. */
 typedef struct {
   PetscInt n, capacity;
@@ -141,8 +136,7 @@ struct _p_SbImport {
   PetscInt *tags_start; /* [ntags + 1] */
   PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
   PetscInt capacity[3]; /* of group, tags_start, tags_group */
-  PetscInt nslot;       /* a power of two */
-  PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
+  SbNumbers groups;     /* by 4 tag + dim */
   SbCount nmiddle;
   SbMiddle *middle;  /* [nmiddle] edges of 10-node tets; once read those off the middle, once, ascending */
   PetscBool surface; /* input: all triangles are read, and tets are optional */
@@ -166,7 +160,8 @@ struct _p_SbImport {
   PetscInt npinched;    /* surface edges with more than two facets */
 };
 
-/* Chooses the reader by the name of the mesh, reads, transforms. Not collective. */
+/* Reads a mesh of any kind that -body_<name>_mesh takes, and places it; nothing in it is checked. Of the body:
+   name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or -1. */

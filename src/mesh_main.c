@@ -20,7 +20,6 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN);
-  PetscCall(SbToolRegister());
   if (line.help) {
     PetscCall(SbToolHelp());
   } else if (line.version) {

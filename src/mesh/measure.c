@@ -38,27 +38,23 @@ static PetscReal measure(const SbImport *im, int dim, const PetscInt v[])
   return PetscAbsReal(sum);
 }
 
-PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *group, PetscBool *found)
+PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, PetscInt *n, PetscReal *size)
 {
-  const SbItems *item;
+  const int dim = (int)im->group[i].dim;
+  const SbItems *item = &im->item[dim];
   PetscBool *in;
-  int dim;
 
   PetscFunctionBeginUser;
-  *found = (PetscBool)(i >= 0 && i < im->ngroup);
-  if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
-  dim = (int)im->group[i].dim;
-  item = &im->item[dim];
-  *group = (SbMeshGroup){.dim = dim, .tag = im->group[i].tag};
-  PetscCall(PetscStrncpy(group->name, im->group[i].name, sizeof(group->name)));
+  *n = 0;
+  *size = 0;
   PetscCall(PetscCalloc1(im->ntags, &in));
   for (PetscInt t = 0; t < im->ntags; t++)
     for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++)
       if (im->tags_group[k] == i) in[t] = PETSC_TRUE;
   for (PetscInt k = 0; k < item->n; k++) {
     if (!in[item->tags[k]]) continue;
-    group->n++;
-    group->size += measure(im, dim, item->vert + (dim + 1) * (size_t)k);
+    ++*n;
+    *size += measure(im, dim, item->vert + (dim + 1) * (size_t)k);
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -23,28 +23,6 @@ typedef struct {
   PetscInt nvert, n[4]; /* numbers of vertices, and of items by dimension */
 } Header;
 
-/* Addresses and sizes in bytes of the arrays of a body, in the same order for sender and receiver. */
-typedef struct {
-  void **array;
-  size_t bytes;
-} Part;
-enum { NPART = 2 + 3 * 4 };
-
-static void list_parts(SbImport *im, const Header *h, Part part[NPART])
-{
-  int n = 0;
-
-  part[n++] = (Part){(void **)&im->x, 3 * (size_t)h->nvert * sizeof(*im->x)};
-  part[n++] = (Part){(void **)&im->vert_number, (size_t)h->nvert * sizeof(*im->vert_number)};
-  for (int d = 0; d < 4; d++) {
-    const size_t m = (size_t)h->n[d];
-
-    part[n++] = (Part){(void **)&im->item[d].vert, m * (size_t)(d + 1) * sizeof(PetscInt)};
-    part[n++] = (Part){(void **)&im->item[d].tags, m * sizeof(PetscInt)};
-    part[n++] = (Part){(void **)&im->item[d].number, m * sizeof(int64_t)};
-  }
-}
-
 void SbChildIsolate(pid_t parent, PetscReal seconds)
 {
   const PetscReal most = PetscMin(seconds, 1e9), whole = PetscFloorReal(most);
@@ -69,18 +47,16 @@ static void child(FILE *file, const SbGmshJob *job)
 {
   Header h = {.nvert = 0};
   SbImport im = {.nvert = 0};
-  Part part[NPART];
+  SbImportPart part[SB_IMPORT_NPART];
 
   (void)snprintf(im.where, sizeof(im.where), "%s", job->where);
   (void)PetscPushErrorHandler(SbCatchError, &h.caught);
   h.caught.code = (int)SbGmshCall(job, &im);
-  if (!h.caught.code) {
-    h.nvert = im.nvert;
-    for (int d = 0; d < 4; d++) h.n[d] = im.item[d].n;
-  }
+  h.nvert = im.nvert;
+  for (int d = 0; d < 4; d++) h.n[d] = im.item[d].n;
   (void)fwrite(&h, sizeof(h), 1, file);
-  list_parts(&im, &h, part);
-  for (int i = 0; i < NPART; i++)
+  SbImportParts(&im, part);
+  for (int i = 0; i < SB_IMPORT_NMESH && !h.caught.code; i++)
     if (part[i].bytes) (void)fwrite(*part[i].array, part[i].bytes, 1, file);
   _exit(fflush(file) || ferror(file) ? 1 : 0);
 }
@@ -93,7 +69,7 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   int status = 0, killer;
   pid_t pid;
   Header h;
-  Part part[NPART];
+  SbImportPart part[SB_IMPORT_NPART];
   PetscBool complete;
 
   PetscFunctionBeginUser;
@@ -111,14 +87,16 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
     (PetscBool)(pid > 0 && WIFEXITED(status) && !WEXITSTATUS(status) && fread(&h, sizeof(h), 1, file) == 1);
   // replace the arrays of `im` by the result
   if (complete && !h.caught.code) {
-    list_parts(im, &h, part);
-    for (int i = 0; i < NPART && complete; i++) {
+    im->nvert = h.nvert;
+    for (int d = 0; d < 4; d++) im->item[d].n = im->item[d].capacity = h.n[d];
+    SbImportParts(im, part);
+    for (int i = 0; i < SB_IMPORT_NMESH && complete; i++) {
       PetscCall(PetscFree(*part[i].array));
       PetscCall(PetscMalloc(part[i].bytes, part[i].array));
       complete = (PetscBool)(!part[i].bytes || fread(*part[i].array, part[i].bytes, 1, file) == 1);
     }
-    im->nvert = complete ? h.nvert : 0;
-    for (int d = 0; d < 4; d++) im->item[d].n = im->item[d].capacity = complete ? h.n[d] : 0;
+    if (!complete) im->nvert = 0;
+    for (int d = 0; d < 4 && !complete; d++) im->item[d].n = im->item[d].capacity = 0;
   }
   (void)fclose(file);
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for gmsh (%s)", im->where,

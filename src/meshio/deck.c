@@ -9,18 +9,28 @@
 
 PetscErrorCode SbDeckAddNode(SbDeck *d, int64_t label, PetscReal **x)
 {
+  SbImport *im = d->im;
+
   PetscFunctionBeginUser;
-  PetscCheck(d->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: has more nodes than this build can number", d->im->where);
-  PetscCall(SbImportGrow(d->im, &d->nnode, sizeof(*d->node), &d->node));
-  d->node[d->nnode.n - 1] = (SbDeckNode){.label = label, .at = d->im->scan.token};
-  *x = d->node[d->nnode.n - 1].x;
+  PetscCheck(im->nvert < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has more nodes than this build can number", im->where);
+  if (SbNumbersFind(&im->nodes, label) >= 0)
+    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)label, d->cure);
+  PetscCall(SbNumbersAdd(&im->nodes, label));
+  PetscCall(SbReserve(im->nvert + 1, 3 * sizeof(*im->x), &d->capacity[0], &im->x));
+  PetscCall(SbReserve(im->nvert + 1, sizeof(*im->vert_number), &d->capacity[1], &im->vert_number));
+  im->vert_number[im->nvert] = label;
+  *x = im->x + 3 * im->nvert++;
+  PetscCall(PetscArrayzero(*x, 3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbDeckAddElement(SbDeck *d, const SbDeckElement *element)
 {
   PetscFunctionBeginUser;
+  if (d->unique && SbNumbersFind(&d->im->elements, element->label) >= 0)
+    SB_SCAN_ERROR(&d->im->scan, "element %lld is given twice; %s", (long long)element->label, d->cure);
+  PetscCall(SbNumbersAdd(&d->im->elements, element->label));
   d->im->count[element->type]++;
   PetscCall(SbImportGrow(d->im, &d->nelement, sizeof(*element), &d->element));
   d->element[d->nelement.n - 1] = *element;
@@ -80,7 +90,7 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
     PetscInt at = (PetscInt)i;
 
     if (all) {
-      label = set->of_nodes ? d->node[i].label : d->element[i].label;
+      label = numbers->number[i];
       if (label < r->first || label > r->last || (label - r->first) % r->step) continue;
     } else
       at = SbNumbersFind(numbers, label);
@@ -126,31 +136,17 @@ PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
 PetscErrorCode SbDeckBuild(SbDeck *d)
 {
   SbImport *im = d->im;
-  int64_t *label = NULL;
   PetscInt *point = NULL, group; /* [nvert] item of each node that is in a set, -1: none */
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));
-  // nodes become vertices; duplicate labels are an error
-  PetscCall(SbImportSetVertices(im, d->nnode.n));
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    PetscCall(PetscArraycpy(im->x + 3 * v, d->node[v].x, 3));
-    im->vert_number[v] = d->node[v].label;
-  }
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
-  for (PetscInt v = 0; v < im->nvert && im->nodes.repeated; v++)
-    if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
-  if (im->nodes.repeated)
-    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
   // simplices, with the groups of their properties
-  PetscCall(SbImportScratch(im, (size_t)d->nelement.n * sizeof(*label), &label));
   for (PetscInt e = 0; e < d->nelement.n; e++) {
     SbDeckElement *element = &d->element[e];
     const int dim = SbGmshTypes[element->type].dim;
     const PetscBool ten = (PetscBool)(element->type == SB_GMSH_TET10);
     PetscInt vert[10] = {0}, tags = 0;
 
-    label[e] = element->label;
     element->item = -1;
     if (!SbGmshIsSimplex(element->type)) continue;
     im->scan.token = element->at;
@@ -167,9 +163,6 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
     PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
     if (ten) PetscCall(SbImportAddMiddles(im, vert));
   }
-  PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
-  if (im->elements.repeated && d->unique)
-    SB_SCAN_ERROR(&im->scan, "element %lld is given twice; %s", (long long)im->elements.twice, d->cure);
   // sets become groups of their members; each node of a set becomes a point item
   PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
   for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;
@@ -184,7 +177,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
         if (d->element[at].item < 0) continue;
       } else if (point[at] < 0) {
         point[at] = im->item[0].n;
-        PetscCall(SbImportAddItem(im, 0, &at, 0, d->node[at].label));
+        PetscCall(SbImportAddItem(im, 0, &at, 0, im->vert_number[at]));
       }
       PetscCall(SbImportGroup(im, dim, SB_DECK_TAG + s, d->set[s].name, &group));
       PetscCall(SbImportAddMember(im, dim, dim ? d->element[at].item : point[at], group));

@@ -126,34 +126,24 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 /* Deep copy of an import, before it is placed. */
 static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
 {
-#define COPY(array, n)                                     \
-  do {                                                     \
-    if (!from->array) break;                               \
-    PetscCall(PetscMalloc1((size_t)(n), &to->array));      \
-    PetscCall(PetscArraycpy(to->array, from->array, (n))); \
-  } while (0)
+  SbImportPart part[SB_IMPORT_NPART];
+
   PetscFunctionBeginUser;
   *to = *from;
-  COPY(x, 3 * from->nvert);
-  COPY(vert_number, from->nvert);
-  COPY(middle, from->nmiddle.n);
-  to->nmiddle.capacity = from->nmiddle.n;
-  for (int d = 0; d < 4; d++) {
-    COPY(item[d].vert, (d + 1) * from->item[d].n);
-    COPY(item[d].tags, from->item[d].n);
-    COPY(item[d].number, from->item[d].n);
-    to->item[d].capacity = from->item[d].n;
+  SbImportParts(to, part);
+  for (int i = 0; i < SB_IMPORT_NPART; i++) {
+    const void *array = *part[i].array;
+
+    PetscCall(PetscMalloc(part[i].bytes, part[i].array));
+    PetscCall(PetscMemcpy(*part[i].array, array, part[i].bytes));
   }
+  to->nmiddle.capacity = from->nmiddle.n;
+  for (int d = 0; d < 4; d++) to->item[d].capacity = from->item[d].n;
   to->capacity[0] = from->ngroup;
   to->capacity[1] = from->ntags + 1;
   to->capacity[2] = from->tags_start[from->ntags];
-  COPY(group, to->capacity[0]);
-  COPY(tags_start, to->capacity[1]);
-  COPY(tags_group, to->capacity[2]);
-  to->slot = NULL;
-  to->nslot = 0;
+  to->groups.capacity = from->groups.n;
   PetscFunctionReturn(PETSC_SUCCESS);
-#undef COPY
 }
 
 PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *im)

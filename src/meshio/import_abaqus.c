@@ -28,39 +28,23 @@ typedef struct {
 typedef struct {
   SbDeck deck;
   SbScan *scan;
-  const char *line_end; /* end of the current line */
   SbCount nside, nsurface;
   Side *side;
   char (*surface)[SB_GROUP_MAX];
 } Abaqus;
 
 /* Goes to the next line that is not a comment; false at the end of the file. */
-static PetscBool next_line(Abaqus *a)
+static PetscBool next_line(SbScan *s)
 {
-  SbScan *s = a->scan;
-
-  while (s->at < s->end) {
-    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
-
-    a->line_end = end ? end : s->end;
-    while (s->at < a->line_end && isspace((unsigned char)*s->at)) s->at++;
-    s->token = s->at;
-    if (s->at < a->line_end && !(s->at[0] == '*' && s->at[1] == '*')) return PETSC_TRUE;
-    s->at = end ? end + 1 : s->end;
-  }
-  return PETSC_FALSE;
-}
-
-static void leave_line(Abaqus *a)
-{
-  a->scan->at = a->line_end < a->scan->end ? a->line_end + 1 : a->scan->end;
+  for (SbScanNext(s); s->at[0] == '*' && s->at[1] == '*'; SbScanNext(s)) SbScanEndOfLine(s);
+  return (PetscBool)(s->at < s->end);
 }
 
 /* Goes to the next data line of the keyword; false at the next keyword and at the end of the file. */
 static PetscBool data_line(Abaqus *a)
 {
-  leave_line(a);
-  return (PetscBool)(next_line(a) && *a->scan->at != '*');
+  SbScanEndOfLine(a->scan);
+  return (PetscBool)(next_line(a->scan) && *a->scan->at != '*');
 }
 
 /* Next comma-separated value on this line, trimmed; false if there is none. */
@@ -69,12 +53,10 @@ static PetscBool next_word(Abaqus *a, char word[WORD])
   SbScan *s = a->scan;
   size_t n = 0;
 
-  while (s->at < a->line_end && isspace((unsigned char)*s->at)) s->at++;
-  s->token = s->at;
-  if (s->at >= a->line_end) return PETSC_FALSE;
-  for (; s->at < a->line_end && *s->at != ','; s->at++)
+  if (!SbScanMore(s, '\n')) return PETSC_FALSE;
+  for (; s->at < s->end && *s->at != '\n' && *s->at != ','; s->at++)
     if (n + 1 < WORD && *s->at != '"') word[n++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
-  if (s->at < a->line_end) s->at++;
+  s->at += *s->at == ',';
   while (n && word[n - 1] == ' ') n--;
   word[n] = 0;
   return PETSC_TRUE;
@@ -253,7 +235,7 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
   PetscFunctionBeginUser;
   if (!parameter(a, line, "NAME", name)) SB_SCAN_ERROR(a->scan, "a surface without a name");
   if (parameter(a, line, "TYPE", kind) && strcasecmp(kind, "ELEMENT")) {
-    leave_line(a);
+    SbScanEndOfLine(a->scan);
     PetscFunctionReturn(PETSC_SUCCESS); /* node-based or analytical surfaces have no facets */
   }
   PetscCall(SbImportGrow(a->deck.im, &a->nsurface, sizeof(*a->surface), &a->surface));
@@ -313,7 +295,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  while (next_line(&a)) {
+  while (next_line(s)) {
     const char *line = s->at;
 
     // data lines of ignored keywords; after *INSTANCE they are a transformation
@@ -322,7 +304,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
         SB_SCAN_ERROR(s,
                       "the instance is moved or turned; take these lines out and move the body by %s and %s",
                       SbImportOption(im, "rotate", rotate), SbImportOption(im, "translate", translate));
-      leave_line(&a);
+      SbScanEndOfLine(s);
       continue;
     }
     // keywords that define the mesh
@@ -343,12 +325,12 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       if (!strcasecmp(word, "*PART") && ++npart > 1)
         SB_SCAN_ERROR(s, "a second *PART; supple reads one part: give each body a file of its own");
       in_instance = (PetscBool)!strcasecmp(word, "*INSTANCE");
-      leave_line(&a);
+      SbScanEndOfLine(s);
     }
   }
   // find the nodes of elements and sets
   s->token = s->end;
-  if (!a.deck.nnode.n) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
+  if (!im->nvert) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
   PetscCall(SbDeckBuild(&a.deck));
   // convert element sides to triangles
   for (PetscInt k = 0; k < a.nside.n; k++) {

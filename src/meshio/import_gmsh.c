@@ -20,7 +20,6 @@ typedef struct {
 typedef struct {
   SbImport *im;
   int version; /* file version: 1, 2, 40 or 41 */
-  int width;   /* bytes of the number of a node or an element in a binary file */
   PetscBool binary;
   PetscInt nentity;
   Entity *entity; /* [nentity] */
@@ -44,7 +43,6 @@ static PetscErrorCode read_format(Gmsh *g)
   if (!g->version)
     SB_SCAN_ERROR(s, "format version '%s'; supple reads 1 to 4.1 (gmsh FILE -save -format msh41 converts)",
                   version);
-  g->width = g->version == 41 ? 8 : 4;
   PetscCall(SbScanText(s, "file type 0 or 1", &kind));
   PetscCall(SbScanText(s, "data size", &size));
   if (kind != 0 && kind != 1)
@@ -182,6 +180,9 @@ static PetscErrorCode read_nodes(Gmsh *g)
       PetscCall(SbScanInt(s, 8, "number of a node", &im->vert_number[i]));
     for (; n > 0; v++, n--) {
       if (g->version != 41) PetscCall(SbScanInt(s, 4, "number of a node", &im->vert_number[v]));
+      if (SbNumbersFind(&im->nodes, im->vert_number[v]) >= 0)
+        SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->vert_number[v]);
+      PetscCall(SbNumbersAdd(&im->nodes, im->vert_number[v]));
       PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
       for (int k = 0; parametric && k < dim; k++)
         PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
@@ -191,9 +192,6 @@ static PetscErrorCode read_nodes(Gmsh *g)
   if (g->version == 40) im->nvert = v;
   if (v < im->nvert)
     SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
-  if (im->nodes.repeated)
-    SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->nodes.twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,6 +201,7 @@ static PetscErrorCode read_elements(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
   const PetscBool blocks = (PetscBool)(g->version > 2);
+  const int width = g->version == 41 ? 8 : 4; /* bytes of the number of a node or an element */
   int64_t nblock, total, left, dim = 0, entity = 0, type, n = 1, ntag = 2, number = 0, nnode;
   int64_t last_tag = 0, last_dim = -1;
   PetscInt tags, last_tags = 0; /* of the last group: usually that of the next element too */
@@ -238,7 +237,7 @@ static PetscErrorCode read_elements(Gmsh *g)
     for (int64_t i = 0; i < n; i++) {
       PetscInt vert[64];
 
-      if (blocks || s->binary) PetscCall(SbScanInt(s, g->width, "number of an element", &number));
+      if (blocks || s->binary) PetscCall(SbScanInt(s, width, "number of an element", &number));
       if (!blocks) {
         int64_t tag = 0, other;
 
@@ -263,7 +262,7 @@ static PetscErrorCode read_elements(Gmsh *g)
       for (int k = 0; k < SbGmshTypes[type].nnode; k++) {
         int64_t node;
 
-        PetscCall(SbScanInt(s, g->width, "node of an element", &node));
+        PetscCall(SbScanInt(s, width, "node of an element", &node));
         vert[k] = SbNumbersFind(&g->im->nodes, node);
         if (vert[k] < 0)
           SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
@@ -280,7 +279,7 @@ static PetscErrorCode read_elements(Gmsh *g)
 
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {
-  Gmsh g = {.im = im, .width = 4};
+  Gmsh g = {.im = im};
   SbScan *s = &im->scan;
   char name[64], end[64], closing[72];
 

@@ -557,7 +557,7 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
 {
   const char *dot = strrchr(body->mesh, '.');
   hid_t file, set, space;
-  hsize_t size[2] = {0, 0};
+  hssize_t n;
 
   *ncell = 0;
   if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5")) return;
@@ -565,12 +565,11 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
   if (file < 0) return;
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;
-  space = set >= 0 ? H5Dget_space(set) : -1;
-  if (space >= 0 && H5Sget_simple_extent_ndims(space) == 2)
-    (void)H5Sget_simple_extent_dims(space, size, NULL);
-  if (size[0] <= (hsize_t)PETSC_MAX_INT / 8) *ncell = (PetscInt)size[0];
-  if (space >= 0) (void)H5Sclose(space);
-  if (set >= 0) (void)H5Dclose(set);
+  space = H5Dget_space(set);
+  n = H5Sget_simple_extent_npoints(space); /* negative without the array */
+  if (n > 0 && n <= PETSC_MAX_INT / 2) *ncell = (PetscInt)(n / 4);
+  (void)H5Sclose(space);
+  (void)H5Dclose(set);
   (void)H5Fclose(file);
 }
 

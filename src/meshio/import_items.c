@@ -33,10 +33,8 @@ PetscErrorCode SbImportGrow(SbImport *im, SbCount *count, size_t unit, void *arr
 {
   PetscFunctionBeginUser;
   if (count->n == count->capacity) {
-    const PetscInt grown = PetscMax(64, 2 * count->capacity);
-
-    PetscCall(SbImportScratch(im, (size_t)grown * unit, array));
-    count->capacity = grown;
+    count->capacity = PetscMax(64, 2 * count->capacity);
+    PetscCall(SbImportScratch(im, (size_t)count->capacity * unit, array));
   }
   count->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,7 +43,7 @@ PetscErrorCode SbImportGrow(SbImport *im, SbCount *count, size_t unit, void *arr
 PetscErrorCode SbImportForget(SbImport *im)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbScanClose(&im->scan));
+  PetscCall(PetscFree(im->scan.data));
   PetscCall(SbNumbersDestroy(&im->nodes));
   PetscCall(SbNumbersDestroy(&im->elements));
   while (im->scratch) {
@@ -301,45 +299,22 @@ void SbImportNoteMiddles(SbImport *im, PetscInt n, PetscReal largest)
                    (long long)n, (double)largest);
 }
 
-/* Hash slot of a group, or the free slot for it. */
-static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
+/* Number of a group among those of all dimensions. */
+static int64_t number_of(PetscInt dim, int64_t tag)
 {
-  const uint64_t hash = ((uint64_t)tag * 4 + (uint64_t)dim) * 0x9e3779b97f4a7c15u;
-  PetscInt s = (PetscInt)(hash >> 33) & (im->nslot - 1);
-
-  for (; im->slot[s] >= 0; s = (s + 1) & (im->nslot - 1)) {
-    const SbGroup *group = &im->group[im->slot[s]];
-
-    if (group->dim == dim && group->tag == tag) break;
-  }
-  return s;
-}
-
-/* Rebuilds the hash table for all groups and one more, at most half full. */
-static PetscErrorCode hash_groups(SbImport *im)
-{
-  PetscFunctionBeginUser;
-  if (2 * (im->ngroup + 1) <= im->nslot) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(im->slot));
-  for (im->nslot = 64; im->nslot < 4 * (im->ngroup + 1);) im->nslot *= 2;
-  PetscCall(PetscMalloc1(im->nslot, &im->slot));
-  for (PetscInt s = 0; s < im->nslot; s++) im->slot[s] = -1;
-  for (PetscInt g = 0; g < im->ngroup; g++) im->slot[find_slot(im, im->group[g].dim, im->group[g].tag)] = g;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (int64_t)((uint64_t)tag * 4 + (uint64_t)dim);
 }
 
 const char *const SbGroupKinds[4] = {"point", "curve", "surface", "volume"};
 
 PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
 {
-  PetscInt s, g;
+  PetscInt g = SbNumbersFind(&im->groups, number_of(dim, tag));
 
   PetscFunctionBeginUser;
-  PetscCall(hash_groups(im));
-  s = find_slot(im, dim, tag);
-  g = im->slot[s];
   if (g < 0) {
-    g = im->slot[s] = im->ngroup++;
+    g = im->ngroup++;
+    PetscCall(SbNumbersAdd(&im->groups, number_of(dim, tag)));
     PetscCall(SbReserve(g + 1, sizeof(SbGroup), &im->capacity[0], &im->group));
     im->group[g] = (SbGroup){.dim = dim, .tag = tag, .alone = -1};
     (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", SbGroupKinds[dim], (long long)tag);
@@ -349,15 +324,11 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportNameGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name)
+void SbImportNameGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name)
 {
-  PetscInt g;
+  const PetscInt g = SbNumbersFind(&im->groups, number_of(dim, tag));
 
-  PetscFunctionBeginUser;
-  PetscCall(hash_groups(im));
-  g = im->slot[find_slot(im, dim, tag)];
-  if (g >= 0) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (g >= 0) (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s", name);
 }
 
 /* Appends a tag set. */
@@ -504,18 +475,37 @@ const char *SbImportOption(const SbImport *im, const char *key, char name[SB_IMP
   return name;
 }
 
+void SbImportParts(SbImport *im, SbImportPart part[SB_IMPORT_NPART])
+{
+  SbNumbers *groups = &im->groups;
+  int n = 0;
+
+  part[n++] = (SbImportPart){(void **)&im->x, 3 * (size_t)im->nvert * sizeof(*im->x)};
+  part[n++] = (SbImportPart){(void **)&im->vert_number, (size_t)im->nvert * sizeof(*im->vert_number)};
+  for (SbItems *item = im->item; item < im->item + 4; item++) {
+    const size_t m = (size_t)item->n, nodes = (size_t)(item - im->item) + 1;
+
+    part[n++] = (SbImportPart){(void **)&item->vert, m * nodes * sizeof(*item->vert)};
+    part[n++] = (SbImportPart){(void **)&item->tags, m * sizeof(*item->tags)};
+    part[n++] = (SbImportPart){(void **)&item->number, m * sizeof(*item->number)};
+  }
+  part[n++] = (SbImportPart){(void **)&im->middle, (size_t)im->nmiddle.n * sizeof(*im->middle)};
+  part[n++] = (SbImportPart){(void **)&im->group, (size_t)im->ngroup * sizeof(*im->group)};
+  part[n++] = (SbImportPart){(void **)&im->tags_start, (size_t)(im->ntags + 1) * sizeof(PetscInt)};
+  part[n++] = (SbImportPart){(void **)&im->tags_group,
+                             (size_t)(im->tags_start ? im->tags_start[im->ntags] : 0) * sizeof(PetscInt)};
+  part[n++] = (SbImportPart){(void **)&groups->number, (size_t)groups->n * sizeof(*groups->number)};
+  part[n++] = (SbImportPart){(void **)&groups->slot, (size_t)groups->nslot * sizeof(*groups->slot)};
+}
+
 PetscErrorCode SbImportDestroy(SbImport *im)
 {
+  SbImportPart part[SB_IMPORT_NPART];
+
   PetscFunctionBeginUser;
   PetscCall(SbImportForget(im));
-  PetscCall(PetscFree(im->x));
-  PetscCall(PetscFree(im->vert_number));
-  PetscCall(PetscFree(im->middle));
-  for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im->item[d]));
-  PetscCall(PetscFree(im->group));
-  PetscCall(PetscFree(im->tags_start));
-  PetscCall(PetscFree(im->tags_group));
-  PetscCall(PetscFree(im->slot));
+  SbImportParts(im, part);
+  for (int i = 0; i < SB_IMPORT_NPART; i++) PetscCall(PetscFree(*part[i].array));
   PetscCall(PetscMemzero(im, sizeof(*im)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -59,7 +59,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   SbScanNext(s);
   // a neutral file of Netgen, which has the same extension, begins with a number
   if (s->at < s->end && isdigit((unsigned char)*s->at)) {
-    PetscCall(SbScanClose(s));
+    PetscCall(PetscFree(s->data));
     PetscCall(SbImportRead_NetgenNeutral(path, im));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

@@ -25,20 +25,17 @@ typedef struct {
   char name[SB_GROUP_MAX];
 } Name;
 
-/* A line, tabs expanded, without its comment. */
 typedef struct {
-  char text[LINE];
-  size_t length;
-  PetscBool commas;    /* fields are separated by commas */
-  int field, per_line; /* last field read; number of value fields on the line */
-} Line;
+  char word[WORD];
+  const char *at; /* its line, for messages */
+} Field;
 
 typedef struct {
   SbDeck deck;
   SbScan *scan;
-  Line line;       /* the current one */
-  PetscBool ended; /* next_field() found no more field of the entry */
-  SbCount nname;
+  SbCount nfield, nname;
+  Field *field;               /* [nfield] of the current entry; field 0 is its name */
+  PetscInt next;              /* field to be read */
   Name *name;                 /* [nname] names of properties */
   char pending[SB_GROUP_MAX]; /* name that a Patran comment gives to the next property */
 } Nastran;
@@ -94,102 +91,75 @@ static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Field k of this line, trimmed; field 0 is the name. */
-static void get_field(const Nastran *b, int k, char word[WORD])
+/* Copies the field at p, up to a comma or `width` columns, without blanks around it; returns the next one. */
+static const char *take_field(const char *p, size_t width, char word[WORD])
 {
-  const char *from = b->line.text, *to;
-  size_t n = 0;
+  const size_t n = PetscMin(strcspn(p, ","), width), blank = PetscMin(strspn(p, " "), n);
+  size_t end = n;
 
-  if (b->line.commas) {
-    for (int i = 0; i < k; i++) from += strcspn(from, ",") + (strchr(from, ',') != NULL);
-    to = from + strcspn(from, ",");
-  } else {
-    const size_t width = !k || b->line.per_line == 8 ? 8 : 16, first = k ? 8 + (size_t)(k - 1) * width : 0;
-
-    to = from + PetscMin(first + width, b->line.length);
-    from += PetscMin(first, b->line.length);
-  }
-  while (from < to && isspace((unsigned char)*from)) from++;
-  while (to > from && isspace((unsigned char)to[-1])) to--;
-  for (; from < to && n + 1 < WORD; from++) word[n++] = *from;
-  word[n] = 0;
+  while (end > blank && p[end - 1] == ' ') end--;
+  (void)snprintf(word, WORD, "%.*s", (int)(end - blank), p + blank);
+  return p + n + (p[n] == ',');
 }
 
-/* Goes to the next line that is neither a comment nor empty; false at the end of the file. */
-static PetscErrorCode next_line(Nastran *b, PetscBool *there)
+/* Reads the fields of the next entry, which has none at the end of the file. */
+static PetscErrorCode next_entry(Nastran *b)
 {
   SbScan *s = b->scan;
-  Line *line = &b->line;
-  char name[WORD];
-  PetscBool cut; /* the line was longer than the buffer */
+  const char *after = s->at; /* end of the lines of this entry */
 
   PetscFunctionBeginUser;
-  for (*there = cut = PETSC_FALSE; s->at < s->end && !*there;) {
-    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at)), *from;
-    size_t n;
+  b->nfield.n = 0;
+  b->next = 1;
+  /* most often another entry begins on the next line with its name, in the first column */
+  while (s->at < s->end && !(b->nfield.n && isalpha((unsigned char)*s->at))) {
+    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at)), *from, *p;
+    char text[LINE], word[WORD];
+    size_t n, width;
+    int per_line;
 
     s->token = s->at;
     if (!end) end = s->end;
-    if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
+    if (*s->at == '$' && !b->nfield.n) PetscCall(read_comment(b, s->at, end));
     // text without the comment; tabs become blanks up to the next multiple of 8 columns
     for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) do
-        line->text[n++] = isprint((unsigned char)*from) ? *from : ' ';
+        text[n++] = isprint((unsigned char)*from) ? *from : ' ';
       while (*from == '\t' && n % 8 && n + 1 < LINE);
-    cut = (PetscBool)(from < end && *from != '$');
-    line->text[n] = 0;
-    line->length = n;
-    *there = (PetscBool)(line->text[strspn(line->text, " ")] != 0);
+    text[n] = 0;
     s->at = end < s->end ? end + 1 : s->end;
-  }
-  if (!*there) PetscFunctionReturn(PETSC_SUCCESS);
-  line->commas = (PetscBool)(strchr(line->text, ',') != NULL);
-  if (line->commas && cut)
-    SB_SCAN_ERROR(s, "the line is longer than %d characters; go on with the entry on a next line", LINE - 1);
-  line->field = 0;
-  get_field(b, 0, name);
-  line->per_line = strchr(name, '*') ? 4 : 8;
-  if (line->commas) get_field(b, line->per_line + 2, name);
-  if (line->commas && name[0])
-    SB_SCAN_ERROR(s, "the line has more than %d fields; go on with the entry on a next line",
-                  line->per_line + 2);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscBool continues(const Nastran *b)
-{
-  char name[WORD];
-
-  get_field(b, 0, name);
-  return (PetscBool)(!name[0] || name[0] == '+' || name[0] == '*');
-}
-
-/* Next field of the entry, on this line or a continuation; b->ended and "" at the end of the entry. */
-static PetscErrorCode next_field(Nastran *b, char word[WORD])
-{
-  SbScan *s = b->scan;
-
-  PetscFunctionBeginUser;
-  word[0] = 0;
-  b->ended = PETSC_TRUE;
-  if (b->line.field == b->line.per_line) {
-    const char *at = s->at, *token = s->token;
-    const Line line = b->line;
-    PetscBool there;
-
-    if (at < s->end && isalpha((unsigned char)*at))
-      PetscFunctionReturn(PETSC_SUCCESS); /* fast path: another entry begins on the next line */
-    PetscCall(next_line(b, &there));
-    if (!there || !continues(b)) {
-      /* the next line belongs to another entry: keep this one, at its end */
-      b->line = line;
-      s->at = at;
-      s->token = token;
-      PetscFunctionReturn(PETSC_SUCCESS);
+    if (!text[strspn(text, " ")]) continue;
+    // the name, which is empty or begins with + or * where the entry goes on
+    width = strchr(text, ',') ? LINE : 8;
+    p = take_field(text, width, word);
+    if (b->nfield.n && word[0] && word[0] != '+' && word[0] != '*') break;
+    if (width == LINE && from < end && *from != '$')
+      SB_SCAN_ERROR(s, "the line is longer than %d characters; go on with the entry on a next line",
+                    LINE - 1);
+    per_line = strchr(word, '*') ? 4 : 8;
+    for (int k = b->nfield.n > 0; k <= per_line; k++) {
+      if (k) p = take_field(p, width == LINE ? LINE : (size_t)(64 / per_line), word);
+      PetscCall(SbImportGrow(b->deck.im, &b->nfield, sizeof(*b->field), &b->field));
+      b->field[b->nfield.n - 1].at = s->token;
+      (void)memcpy(b->field[b->nfield.n - 1].word, word, WORD);
     }
+    // behind the values there is a mark of the next line
+    if (width == LINE) (void)take_field(take_field(p, LINE, word), LINE, word);
+    if (width == LINE && word[0])
+      SB_SCAN_ERROR(s, "the line has more than %d fields; go on with the entry on a next line", per_line + 2);
+    after = s->at;
   }
-  get_field(b, ++b->line.field, word);
-  b->ended = PETSC_FALSE;
+  if (!b->nfield.n) PetscFunctionReturn(PETSC_SUCCESS);
+  s->at = after;
+  s->token = b->field[0].at;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Next field of the entry; "" at its end. */
+static const char *next_field(Nastran *b)
+{
+  if (b->next >= b->nfield.n) return "";
+  b->scan->token = b->field[b->next].at;
+  return b->field[b->next++].word;
 }
 
 /* Parses an integer; an empty field is 0. */
@@ -207,11 +177,8 @@ static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, 
 /* Reads an integer; `needed`: it must not be missing. */
 static PetscErrorCode next_number(Nastran *b, PetscBool needed, const char *what, int64_t *value)
 {
-  char word[WORD];
-
   PetscFunctionBeginUser;
-  PetscCall(next_field(b, word));
-  PetscCall(to_number(b, word, what, value));
+  PetscCall(to_number(b, next_field(b), what, value));
   if (needed && !*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -232,10 +199,10 @@ static PetscErrorCode read_grid(Nastran *b)
   PetscCall(SbDeckAddNode(&b->deck, label, &x));
   // formats 1.5, 1.5E-3, 1.5D-3, 1.5-3; an empty field is 0
   for (int i = 0; i < 3; i++) {
-    char word[WORD], full[WORD + 1], *end;
+    const char *word = next_field(b);
+    char full[WORD + 1], *end;
     size_t n = 0;
 
-    PetscCall(next_field(b, word));
     for (const char *p = word; *p && n < WORD; p++) {
       if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
         full[n++] = 'E';
@@ -262,7 +229,6 @@ static const struct {
 static PetscErrorCode read_element(Nastran *b, int kind)
 {
   SbDeckElement e = {.property = 0, .at = b->scan->token};
-  char word[WORD];
   PetscBool more = PETSC_FALSE;
   int64_t node;
 
@@ -275,11 +241,11 @@ static PetscErrorCode read_element(Nastran *b, int kind)
     if (k < 4) e.node[k] = node;
   }
   /* edge nodes; the last fields of shells and lines have other meanings */
-  for (int k = 4;
-       kinds[kind].linear != kinds[kind].higher && (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
+  for (int k = 4; b->next < b->nfield.n && kinds[kind].linear != kinds[kind].higher &&
+                  (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
        k++) {
-    PetscCall(next_field(b, word));
-    if (b->ended) break;
+    const char *word = next_field(b);
+
     if (!word[0] || word[0] == '+' || strchr(word, '.')) continue;
     more = PETSC_TRUE;
     if (kinds[kind].higher == SB_GMSH_TET10)
@@ -306,16 +272,15 @@ static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, in
 /* Reads a list of nodes, or first THRU last, after the set number and `nskip` fields. */
 static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 {
-  char word[WORD];
   PetscBool thru = PETSC_FALSE;
   int64_t number = 0, node, last = 0;
 
   PetscFunctionBeginUser;
   PetscCall(next_number(b, PETSC_TRUE, "number of a set", &number));
-  for (int i = 0; i < nskip; i++) PetscCall(next_field(b, word));
-  for (;;) {
-    PetscCall(next_field(b, word));
-    if (b->ended) break;
+  b->next += nskip;
+  while (b->next < b->nfield.n) {
+    const char *word = next_field(b);
+
     if (!strcasecmp(word, "THRU")) {
       thru = PETSC_TRUE;
     } else if (word[0] && strcasecmp(word, "SKIN") != 0) {
@@ -330,17 +295,15 @@ static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 
 static PetscErrorCode read_entry(Nastran *b)
 {
-  char name[WORD], word[WORD];
+  char *name = b->field[0].word;
   int64_t number = 0, node;
 
   PetscFunctionBeginUser;
-  if (continues(b)) PetscFunctionReturn(PETSC_SUCCESS); /* continuation of a skipped entry */
-  get_field(b, 0, name);
   name[strcspn(name, "*")] = 0;
   if (!strcasecmp(name, "GRID")) PetscCall(read_grid(b));
   // default coordinate system of points
   if (!strcasecmp(name, "GRDSET")) {
-    PetscCall(next_field(b, word));
+    b->next++;
     PetscCall(next_number(b, PETSC_FALSE, "coordinate system of the nodes", &number));
     if (number)
       SB_SCAN_ERROR(b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
@@ -352,7 +315,7 @@ static PetscErrorCode read_entry(Nastran *b)
     for (int i = 0; i < 2; i++) {
       PetscCall(next_number(b, PETSC_FALSE, "node of a set", &node));
       if (node) PetscCall(add_range(b, "spc", number, node, node));
-      for (int k = 0; k < 2; k++) PetscCall(next_field(b, word));
+      b->next += 2;
     }
   }
   if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, "spc", 1));
@@ -372,7 +335,6 @@ static PetscErrorCode read_entry(Nastran *b)
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 {
   Nastran b = {.scan = &im->scan, .deck = {.im = im, .compare = strcasecmp, .cure = "renumber the nodes"}};
-  PetscBool there;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, b.scan));
@@ -386,11 +348,11 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
     break;
   }
   for (;;) {
-    PetscCall(next_line(&b, &there));
-    if (!there || !strncasecmp(b.line.text, "ENDDATA", 7)) break;
+    PetscCall(next_entry(&b));
+    if (!b.nfield.n || !strncasecmp(b.field[0].word, "ENDDATA", 7)) break;
     PetscCall(read_entry(&b));
   }
-  if (!b.deck.nnode.n) {
+  if (!im->nvert) {
     b.scan->token = b.scan->end;
     SB_SCAN_ERROR(b.scan, "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
   }
@@ -398,7 +360,6 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   PetscCall(SbImportJoinGroups(im));
   /* name the groups of properties that elements use */
   for (PetscInt i = 0; i < b.nname.n; i++)
-    for (PetscInt dim = 1; dim < 4; dim++)
-      PetscCall(SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name));
+    for (PetscInt dim = 1; dim < 4; dim++) SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -135,7 +135,7 @@ static PetscErrorCode read_names(SbImport *im, const char *section, PetscInt dim
 
     PetscCall(SbScanText(s, "number of a name", &number));
     PetscCall(SbScanRestOfLine(s, sizeof(name), name));
-    if (name[0]) PetscCall(SbImportNameGroup(im, dim, number, name));
+    if (name[0]) SbImportNameGroup(im, dim, number, name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -146,7 +146,7 @@ PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *im)
     /* error messages name this file */
     PetscCall(SbImportScratch(im, sizeof(im->where) + 8, &where));
     (void)snprintf(where, sizeof(im->where) + 8, "%.*s%s", lead, im->where, name);
-    PetscCall(SbScanClose(&im->scan));
+    PetscCall(PetscFree(im->scan.data));
     PetscCall(SbScanOpen(where, name, &im->scan));
     im->scan.comment = '#';
     PetscCall(read_file(im, f));

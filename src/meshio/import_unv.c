@@ -111,7 +111,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
     // a data set: its number, then its records
     PetscCall(SbScanText(s, "number of a data set", &id));
     SbScanEndOfLine(s);
-    if (id == 2412 && !d.nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
+    if (id == 2412 && !im->nvert) SB_SCAN_ERROR(s, "elements before the nodes");
     for (;;) {
       // the data set ends at a delimiter; the end of the file is an error
       while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
@@ -135,7 +135,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
     }
     SbScanEndOfLine(s);
   }
-  if (!d.nnode.n) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
+  if (!im->nvert) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
   PetscCall(SbDeckBuild(&d));
   PetscCall(SbImportJoinGroups(im));
   PetscFunctionReturn(PETSC_SUCCESS);

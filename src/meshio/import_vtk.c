@@ -12,9 +12,9 @@ typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
-  PetscBool points, cells, on_cells; /* on_cells: the arrays that follow are cell data */
-  int64_t ntuple;                    /* number of tuples of the arrays that follow */
-  const char *cells_at;              /* position of the cells, for messages */
+  PetscBool on_cells;   /* the arrays that follow are cell data */
+  int64_t ntuple;       /* number of tuples of the arrays that follow */
+  const char *cells_at; /* position of the cells, for messages; NULL: not read yet */
 } Vtk;
 
 /* Reads n numbers of this type into an array that it allocates; value NULL: skips them. */
@@ -54,8 +54,7 @@ static PetscErrorCode read_cells(Vtk *v)
   const char *at;
 
   PetscFunctionBeginUser;
-  if (v->cells) SB_SCAN_ERROR(s, "second section CELLS");
-  v->cells = PETSC_TRUE;
+  if (v->cells_at) SB_SCAN_ERROR(s, "second section CELLS");
   v->cells_at = s->token;
   PetscCall(SbScanCount(s, "cells", 1, 1, &n));
   PetscCall(SbScanCount(s, "numbers in the list of cells", 1, 1, &size));
@@ -130,8 +129,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   PetscFunctionBeginUser;
   while (k < PETSC_STATIC_ARRAY_LENGTH(tuples) && strcasecmp(section, tuples[k].name)) k++;
   if (!strcasecmp(section, "POINTS")) {
-    if (v->points) SB_SCAN_ERROR(s, "second section POINTS");
-    v->points = PETSC_TRUE;
+    if (v->im->x) SB_SCAN_ERROR(s, "second section POINTS");
     PetscCall(SbScanCount(s, "points", 3, 3, &n));
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
@@ -140,13 +138,13 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     PetscCall(read_cells(v));
   } else if (!strcasecmp(section, "CELL_TYPES")) {
     PetscCall(SbScanText(s, "number of types of cells", &n));
-    if (!v->cells || n != v->grid.ncell)
+    if (!v->cells_at || n != v->grid.ncell)
       SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
     PetscCall(read_array(v, "types of cells", n, (SbNumberType){'i', 4}, &v->grid.type));
   } else if (on_cells || !strcasecmp(section, "POINT_DATA")) {
     // cells or points to which the following arrays belong
     n = on_cells ? v->grid.ncell : v->im->nvert;
-    if (!v->points || !v->cells) SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
+    if (!v->im->x || !v->cells_at) SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
     PetscCall(SbScanText(s, "number of data", &v->ntuple));
     if (v->ntuple != n)
       SB_SCAN_ERROR(s, "data for %lld %s; there are %lld", (long long)v->ntuple,
@@ -223,11 +221,11 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
   if (strcasecmp(word, "UNSTRUCTURED_GRID"))
     SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
   while (SbScanWord(s, sizeof(name), name)) PetscCall(read_section(&v, name));
-  if (!v.points || !v.cells || !v.grid.type)
+  if (!im->x || !v.cells_at || !v.grid.type)
     SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
-                  !v.points  ? "POINTS"
-                  : !v.cells ? "CELLS"
-                             : "CELL_TYPES");
+                  !im->x        ? "POINTS"
+                  : !v.cells_at ? "CELLS"
+                                : "CELL_TYPES");
   s->token = v.cells_at;
   PetscCall(SbVtkGridFill(&v.grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);

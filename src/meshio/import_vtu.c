@@ -89,47 +89,32 @@ static PetscErrorCode attribute_number(Vtu *v, Tag tag, const char *name, int64_
 /* Decoder of raw or base64 bytes. */
 typedef struct {
   const char *at, *end;
-  PetscBool text;
-  unsigned char held[3];
-  int nheld, from;
+  PetscBool text, fill; /* fill: the last digit of a group of four was = */
+  uint32_t bits;
+  int nbit, ndigit; /* bits not taken yet; digits of the group */
 } Bytes;
 
-/* Decodes four base64 characters to at most three bytes; false at the end, or where it is no base64. */
-static PetscBool next_quad(Bytes *b)
-{
-  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  uint32_t bits = 0;
-  int n = 0, padding = 0;
-
-  for (; n < 4; n++, b->at++) {
-    const char *found;
-
-    while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
-    if (b->at >= b->end) return PETSC_FALSE;
-    found = *b->at ? strchr(digits, *b->at) : NULL;
-    if (found ? padding > 0 : *b->at != '=' || n < 2) return PETSC_FALSE;
-    padding += !found;
-    bits = bits << 6 | (found ? (uint32_t)(found - digits) : 0);
-  }
-  for (int i = 0; i < 3; i++) b->held[i] = (unsigned char)(bits >> (16 - 8 * i));
-  b->nheld = 3 - padding;
-  b->from = 0;
-  return PETSC_TRUE;
-}
-
-/* Takes n bytes; false if there are fewer. */
+/* Takes n bytes; false if there are fewer, or where it is no base64. */
 static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
 {
-  if (!b->text) {
-    if ((size_t)(b->end - b->at) < n) return PETSC_FALSE;
-    memcpy(out, b->at, n);
-    b->at += n;
-    return PETSC_TRUE;
-  }
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+  if (!b->text && (size_t)(b->end - b->at) < n) return PETSC_FALSE;
   for (size_t i = 0; i < n; i++) {
-    while (b->from >= b->nheld)
-      if (!next_quad(b)) return PETSC_FALSE;
-    out[i] = b->held[b->from++];
+    for (; b->text && b->nbit < 8; b->at++) {
+      const char *digit;
+
+      while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
+      if (b->at >= b->end) return PETSC_FALSE;
+      digit = *b->at ? strchr(digits, *b->at) : NULL;
+      if (digit ? b->fill : *b->at != '=' || b->ndigit < 2) return PETSC_FALSE;
+      b->bits = b->bits << 6 | (digit ? (uint32_t)(digit - digits) : 0);
+      b->nbit = digit ? b->nbit + 6 : 0;
+      b->ndigit = (b->ndigit + 1) % 4;
+      b->fill = (PetscBool)(!digit && b->ndigit);
+    }
+    if (b->text) b->nbit -= 8;
+    out[i] = (unsigned char)(b->text ? b->bits >> b->nbit : (uint32_t)*b->at++);
   }
   return PETSC_TRUE;
 }

@@ -5,10 +5,17 @@
 #pragma once
 #include "sbgmsh.h"
 
+/* The arrays of a body: vertices and simplices, then nodes of edges and groups. */
+enum { SB_IMPORT_NMESH = 14, SB_IMPORT_NPART = 20 };
+typedef struct {
+  void **array;
+  size_t bytes;
+} SbImportPart;
+void SbImportParts(SbImport *import, SbImportPart part[SB_IMPORT_NPART]);
 /* Frees what only the reader needs: the text of the file and scratch arrays. */
 PetscErrorCode SbImportForget(SbImport *import);
 /* Names the group (dim, tag), if it exists. */
-PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
+void SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 
 /* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error messages. */
 PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);
@@ -65,14 +72,9 @@ PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[]);
 
 /* deck.c: nodes and elements by labels */
 typedef struct {
-  int64_t label;
-  PetscReal x[3];
-  const char *at; /* position in the file, for messages */
-} SbDeckNode;
-typedef struct {
   int64_t label, property, node[10]; /* property: number of its group, -1: none */
   int type;                          /* gmsh's element type */
-  const char *at;
+  const char *at;                    /* position in the file, for messages */
   PetscInt item; /* index of its item in the import, after conversion; -1: not a simplex */
 } SbDeckElement;
 /* Range of labels first, first + step, ... last, or all members of another set. */
@@ -94,8 +96,8 @@ typedef struct {
   const char *cure;                           /* advice in the message about a duplicate label */
   PetscBool unique;                           /* duplicate element labels are an error too */
   PetscBool strict;                           /* undefined nodes of sets and tets are an error */
-  SbCount nnode, nelement, nset, nfound;
-  SbDeckNode *node;       /* [nnode] */
+  SbCount nelement, nset, nfound;
+  PetscInt capacity[2];   /* of im->x, im->vert_number */
   SbDeckElement *element; /* [nelement] */
   SbDeckSet *set;         /* [nset] */
   PetscInt *found;        /* [nfound] result of SbDeckFind(): indices of nodes or elements */
@@ -105,7 +107,7 @@ typedef struct {
 } SbDeck;
 #define SB_DECK_TAG ((int64_t)1 << 40) /* number of the group of set 0, larger than any property number */
 
-/* Adds a node at the last token; the caller sets its coordinates, which are 0. */
+/* Adds a node to `im`; the caller sets its coordinates, which are 0. */
 PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);
 PetscErrorCode SbDeckAddElement(SbDeck *deck, const SbDeckElement *element);
 /* Finds or creates the set of this name. */
@@ -113,19 +115,17 @@ PetscErrorCode SbDeckFindSet(SbDeck *deck, PetscBool of_nodes, const char *name,
 /* Adds to a set the labels first, first + step, ... last, or the members of the set `other`; -1: none. */
 PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, PetscInt other, int64_t first, int64_t last,
                               int64_t step);
-/* Converts the deck to vertices, items, and groups for SbImportJoinGroups(). Undefined members: `strict`. */
+/* Converts the deck to items, and groups for SbImportJoinGroups(). Undefined members: `strict`. */
 PetscErrorCode SbDeckBuild(SbDeck *deck);
 /* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
 /* write_gmsh.c, write_h5.c: one file */
 extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
-PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
+PetscErrorCode SbWrite_Gmsh(const SbImport *import, SbMeshFormat format, FILE *file);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
-/* Closes a file; an error if errno has been set since it was 0. */
-PetscErrorCode SbWriteEnd(FILE *file, const char *path);
-/* Writes the .xmf file for ParaView of a mesh that was written to `h5`. */
-PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char *h5);
+/* The .xmf for ParaView of a mesh that was written to `h5`. */
+void SbWrite_Xdmf(const SbImport *import, const char *h5, FILE *file);
 
 /* gmsh_library.c: the work of SbGmshRun() in the child process. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);

@@ -1,78 +1,51 @@
 /*
-  numbers.c - map from the numbers of nodes or elements in a file to their indices in memory.
+  numbers.c - map from the numbers of nodes, elements or groups in a file to their indices in memory.
 
-  A table if the numbers are dense, else pairs sorted by number.
+  Consecutive numbers need nothing but the first one, others a hash table, at most half full.
 */
-#include <stdlib.h>
 #include "meshio_impl.h"
 
-static int compare_numbers(const void *a, const void *b)
+/* Slot of a number, or the free one for it. */
+static PetscInt *find_slot(const SbNumbers *s, int64_t number)
 {
-  const int64_t p = ((const SbNumbered *)a)->number, q = ((const SbNumbered *)b)->number;
+  PetscInt k = (PetscInt)((uint64_t)number * 0x9e3779b97f4a7c15u >> 33) & (s->nslot - 1);
 
-  return (p > q) - (p < q);
+  while (s->slot[k] >= 0 && s->number[s->slot[k]] != number) k = (k + 1) & (s->nslot - 1);
+  return &s->slot[k];
 }
 
-PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index)
+PetscErrorCode SbNumbersAdd(SbNumbers *s, int64_t number)
 {
-  int64_t lo = n ? number[0] : 0, hi = lo;
-
   PetscFunctionBeginUser;
-  PetscCall(SbNumbersDestroy(index));
-  for (PetscInt v = 1; v < n; v++) {
-    lo = PetscMin(lo, number[v]);
-    hi = PetscMax(hi, number[v]);
+  PetscCall(SbReserve(s->n + 1, sizeof(*s->number), &s->capacity, &s->number));
+  s->number[s->n++] = number;
+  if (!s->nslot && (uint64_t)number - (uint64_t)s->number[0] == (uint64_t)s->n - 1)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (2 * s->n > s->nslot) {
+    for (s->nslot = 64; s->nslot < 4 * s->n;) s->nslot *= 2;
+    PetscCall(PetscFree(s->slot));
+    PetscCall(PetscMalloc1(s->nslot, &s->slot));
+    for (PetscInt k = 0; k < s->nslot; k++) s->slot[k] = -1;
+    for (PetscInt i = 0; i < s->n; i++) *find_slot(s, s->number[i]) = i;
   }
-  index->n = n;
-  index->first = lo;
-  if ((uint64_t)hi - (uint64_t)lo < 16 * (uint64_t)n + 1024) {
-    index->ntable = hi - lo + 1;
-    // dense numbers: a table
-    PetscCall(PetscMalloc1((size_t)index->ntable, &index->table));
-    for (int64_t i = 0; i < index->ntable; i++) index->table[i] = -1;
-    for (PetscInt v = 0; v < n; v++) {
-      PetscInt *slot = index->table + (number[v] - index->first);
-
-      if (*slot >= 0) {
-        index->repeated = PETSC_TRUE;
-        index->twice = number[v];
-      }
-      *slot = v;
-    }
-  } else {
-    // sparse numbers: sorted pairs
-    PetscCall(PetscMalloc1(n, &index->sorted));
-    for (PetscInt v = 0; v < n; v++) index->sorted[v] = (SbNumbered){number[v], v};
-    qsort(index->sorted, (size_t)n, sizeof(*index->sorted), compare_numbers);
-    for (PetscInt v = 1; v < n; v++) {
-      if (index->sorted[v].number != index->sorted[v - 1].number) continue;
-      index->repeated = PETSC_TRUE;
-      index->twice = index->sorted[v].number;
-    }
-  }
+  *find_slot(s, number) = s->n - 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbNumbersDestroy(SbNumbers *index)
+PetscErrorCode SbNumbersDestroy(SbNumbers *s)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(index->table));
-  PetscCall(PetscFree(index->sorted));
-  PetscCall(PetscMemzero(index, sizeof(*index)));
+  PetscCall(PetscFree(s->number));
+  PetscCall(PetscFree(s->slot));
+  PetscCall(PetscMemzero(s, sizeof(*s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt SbNumbersFind(const SbNumbers *index, int64_t number)
+PetscInt SbNumbersFind(const SbNumbers *s, int64_t number)
 {
-  const SbNumbered key = {number, 0};
-  const SbNumbered *found;
+  uint64_t at;
 
-  if (index->table) {
-    const uint64_t i = (uint64_t)number - (uint64_t)index->first;
-
-    return number < index->first || i >= (uint64_t)index->ntable ? -1 : index->table[i];
-  }
-  if (!index->sorted) return -1;
-  found = (const SbNumbered *)bsearch(&key, index->sorted, (size_t)index->n, sizeof(key), compare_numbers);
-  return found ? found->vert : -1;
+  if (s->nslot) return *find_slot(s, number);
+  at = s->n ? (uint64_t)number - (uint64_t)s->number[0] : 0;
+  return at < (uint64_t)s->n ? (PetscInt)at : -1;
 }

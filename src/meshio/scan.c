@@ -57,13 +57,6 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanClose(SbScan *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(s->data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 const char *SbScanPosition(const SbScan *s, char position[64])
 {
   size_t n = 1;

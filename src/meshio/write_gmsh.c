@@ -11,22 +11,16 @@
 
   Numbers count from 1. A double is written as text with 17 digits, so that it is read back exactly.
 */
-#include <errno.h>
 #include "meshio_impl.h"
 #include "sbgeometry.h"
 
 typedef struct {
   const SbImport *im;
   FILE *file;
-  PetscBool binary;
-  PetscBool (*used)[4];   /* [ntags] whether items of each dimension have the tag set */
-  int home_dim;           /* dimension of the entity that has the nodes */
-  PetscInt home;          /* tag set of that entity */
+  PetscBool binary, version22;
   int64_t *number;        /* [ngroup] numbers of the groups in the file */
   PetscInt64 total, done; /* numbers of items to write and written, for progress reports */
-  PetscInt nnode;
-  SbImportEdges edges; /* edges of a mesh with curved edges, else empty */
-  PetscReal *x;        /* [nnode][3] coordinates: vertices, then edge nodes */
+  SbImportEdges edges;    /* edges of a mesh with curved edges, else empty */
 } Out;
 
 /* gmsh's element types by order and dimension. */
@@ -61,12 +55,13 @@ static void put_real(Out *out, PetscReal value, char after)
     (void)fprintf(out->file, "%.17g%c", x, after);
 }
 
-static PetscErrorCode report_progress(Out *out)
+/* Writes four integers on a line, in binary three of these bytes and one of 8. */
+static void put_row(Out *out, int bytes, int64_t a, int64_t b, int64_t c, int64_t d)
 {
-  PetscFunctionBeginUser;
-  if (out->im->progress && !(out->done++ & 0xffff))
-    PetscCall(out->im->progress("elements", out->done, out->total, out->im->progress_ctx));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  put(out, bytes, a, ' ');
+  put(out, bytes, b, ' ');
+  put(out, bytes, c, ' ');
+  put(out, 8, d, '\n');
 }
 
 /* Writes the nodes of an item of dimension d. */
@@ -133,182 +128,88 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   if (!out->binary) (void)fputc('\n', out->file);
 }
 
-/* Number of consecutive items from i on with the same tag set. */
-static PetscInt run_length(const SbItems *item, PetscInt i)
-{
-  PetscInt n = 1;
-
-  while (i + n < item->n && item->tags[i + n] == item->tags[i]) n++;
-  return n;
-}
-
-static PetscErrorCode write_elements_41(Out *out)
-{
-  int64_t nrun = 0, number = 1;
-
-  PetscFunctionBeginUser;
-  for (int d = 0; d < 4; d++) {
-    const SbItems *item = &out->im->item[d];
-
-    for (PetscInt i = 0; i < item->n; i += run_length(item, i)) nrun++;
-  }
-  (void)fprintf(out->file, "$Elements\n");
-  put(out, 8, nrun, ' ');
-  put(out, 8, out->total, ' ');
-  put(out, 8, 1, ' ');
-  put(out, 8, out->total, '\n');
-  for (int d = 0; d < 4; d++) {
-    const SbItems *item = &out->im->item[d];
-
-    for (PetscInt i = 0, n; i < item->n; i += n) {
-      n = run_length(item, i);
-      // a block of items of one tag set
-      put(out, 4, d, ' ');
-      put(out, 4, item->tags[i] + 1, ' ');
-      put(out, 4, gmsh_type[out->edges.nedge > 0][d], ' ');
-      put(out, 8, n, '\n');
-      for (PetscInt k = i; k < i + n; k++) {
-        put(out, 8, number++, ' ');
-        put_nodes(out, d, item->vert + (size_t)(d + 1) * (size_t)k, 8);
-        PetscCall(report_progress(out));
-      }
-    }
-  }
-  (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode write_elements_22(Out *out)
+static PetscErrorCode write_elements(Out *out)
 {
   const SbImport *im = out->im;
-  int64_t n = 0, number = 1;
+  const PetscBool v22 = out->version22;
+  int64_t nblock = 0, n = 0, number = 1;
 
   PetscFunctionBeginUser;
-  for (int d = 0; d < 4; d++)
-    for (PetscInt i = 0; i < im->item[d].n; i++) n += PetscMax(1, count_groups(im, im->item[d].tags[i], d));
-  PetscCheck(n <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  for (int d = 0; d < 4; d++) {
+    const PetscInt *tags = im->item[d].tags;
+
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
+      nblock += !i || tags[i] != tags[i - 1];
+      n += v22 ? PetscMax(1, count_groups(im, tags[i], d)) : 1;
+    }
+  }
+  PetscCheck(!v22 || n <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: %lld elements are more than a file of version 2.2 can number; write version 4.1", im->where,
              (long long)n);
-  (void)fprintf(out->file, "$Elements\n%lld\n", (long long)n);
+  (void)fprintf(out->file, v22 ? "$Elements\n%lld\n" : "$Elements\n", (long long)n);
+  if (!v22) put_row(out, 8, nblock, n, 1, n);
   for (int d = 0; d < 4; d++) {
-    for (PetscInt i = 0; i < im->item[d].n; i++) {
-      const PetscInt *v = im->item[d].vert + (size_t)(d + 1) * (size_t)i, tags = im->item[d].tags[i];
+    const SbItems *item = &im->item[d];
+    const int type = gmsh_type[out->edges.nedge > 0][d];
+
+    for (PetscInt i = 0, end = 0; i < item->n; i++) {
+      const PetscInt tags = item->tags[i];
       PetscInt k = im->tags_start[tags], g = next_group(im, tags, d, &k);
 
-      // an element, once for each of its groups, or once with group 0. In binary each has a header
+      // 4.1: a block of items of one tag set
+      if (!v22 && i == end) {
+        while (end < item->n && item->tags[end] == tags) end++;
+        put_row(out, 4, d, tags + 1, type, end - i);
+      }
+      // an element, in 2.2 once for each of its groups, or once with group 0. In binary each has a header
       do {
-        if (!out->binary) put(out, 4, number, ' ');
-        put(out, 4, gmsh_type[out->edges.nedge > 0][d], ' ');
-        if (out->binary) put(out, 4, 1, ' ');
-        put(out, 4, 2, ' ');
-        if (out->binary) put(out, 4, number, ' ');
-        put(out, 4, g < 0 ? 0 : out->number[g], ' ');
-        put(out, 4, tags + 1, ' ');
-        put_nodes(out, d, v, 4);
+        if (!v22 || !out->binary) put(out, v22 ? 4 : 8, number, ' ');
+        if (v22) {
+          put(out, 4, type, ' ');
+          if (out->binary) put(out, 4, 1, ' ');
+          put(out, 4, 2, ' ');
+          if (out->binary) put(out, 4, number, ' ');
+          put(out, 4, g < 0 ? 0 : out->number[g], ' ');
+          put(out, 4, tags + 1, ' ');
+        }
+        put_nodes(out, d, item->vert + (size_t)(d + 1) * (size_t)i, v22 ? 4 : 8);
         number++;
         g = g < 0 ? -1 : next_group(im, tags, d, &k);
-      } while (g >= 0);
-      PetscCall(report_progress(out));
+      } while (v22 && g >= 0);
+      if (im->progress && !(out->done++ & 0xffff))
+        PetscCall(im->progress("elements", out->done, out->total, im->progress_ctx));
     }
   }
   (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_all(Out *out, PetscBool version22)
+PetscErrorCode SbWrite_Gmsh(const SbImport *im, SbMeshFormat format, FILE *file)
 {
-  const SbImport *im = out->im;
-  const int32_t one = 1;
-  PetscInt nname = 0;
-
-  PetscFunctionBeginUser;
-  (void)fprintf(out->file, "$MeshFormat\n%s %d 8\n", version22 ? "2.2" : "4.1", (int)out->binary);
-  if (out->binary) {
-    (void)fwrite(&one, 4, 1, out->file);
-    (void)fputc('\n', out->file);
-  }
-  (void)fprintf(out->file, "$EndMeshFormat\n");
-  // names of the groups, except default names
-  for (PetscInt g = 0; g < im->ngroup; g++) nname += has_name(out, g);
-  if (nname) (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)nname);
-  for (PetscInt g = 0; g < im->ngroup; g++)
-    if (has_name(out, g))
-      (void)fprintf(out->file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out->number[g],
-                    im->group[g].name);
-  if (nname) (void)fprintf(out->file, "$EndPhysicalNames\n");
-  if (version22) {
-    (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)out->nnode);
-    for (PetscInt v = 0; v < out->nnode; v++) {
-      put(out, 4, v + 1, ' ');
-      for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
-    }
-    (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
-    PetscCall(write_elements_22(out));
-  } else {
-    PetscInt n[4] = {0, 0, 0, 0};
-
-    // entities: one for each tag set of each dimension
-    for (int d = 0; d < 4; d++)
-      for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[t][d];
-    (void)fprintf(out->file, "$Entities\n");
-    for (int d = 0; d < 4; d++) put(out, 8, n[d], d < 3 ? ' ' : '\n');
-    for (int d = 0; d < 4; d++)
-      for (PetscInt t = 0; t < im->ntags; t++)
-        if (out->used[t][d]) write_entity(out, d, t);
-    (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
-    // one block of nodes: all numbers, then all coordinates
-    (void)fprintf(out->file, "$Nodes\n");
-    put(out, 8, 1, ' ');
-    put(out, 8, out->nnode, ' ');
-    put(out, 8, 1, ' ');
-    put(out, 8, out->nnode, '\n');
-    put(out, 4, out->home_dim, ' ');
-    put(out, 4, out->home + 1, ' ');
-    put(out, 4, 0, ' ');
-    put(out, 8, out->nnode, '\n');
-    for (PetscInt v = 0; v < out->nnode; v++) put(out, 8, v + 1, '\n');
-    for (PetscInt v = 0; v < out->nnode; v++)
-      for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
-    (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
-    PetscCall(write_elements_41(out));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbWriteEnd(FILE *file, const char *path)
-{
-  int error = ferror(file) ? errno : 0;
-
-  PetscFunctionBeginUser;
-  if (fclose(file) && !error) error = errno;
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
-             strerror(error));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat format)
-{
-  const PetscBool version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY);
   int64_t highest[4] = {0, 0, 0, 0};
   Out out = {.im = im,
-             .home_dim = 3,
+             .file = file,
+             .version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY),
              .binary = (PetscBool)(format == SB_MESH_MSH41_BINARY || format == SB_MESH_MSH22_BINARY)};
-  PetscErrorCode ierr;
+  const int32_t one = 1;
+  PetscInt n[4] = {0, 0, 0, 0}, nname = 0, nnode, home = 0;
+  PetscBool(*used)[4]; /* [ntags] whether items of each dimension have the tag set */
+  PetscReal *x;        /* [nnode][3] vertices, and a node of each edge if there are curved ones */
+  int home_dim = 3;
 
   PetscFunctionBeginUser;
-  out.file = fopen(path, "wb");
-  PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
-             strerror(errno));
-  (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
   if (im->nmiddle.n) PetscCall(SbImportEdgesCreate(im, &out.edges));
-  out.nnode = im->nvert + out.edges.nedge;
-  PetscCall(PetscCalloc3(im->ntags, &out.used, im->ngroup, &out.number, 3 * (size_t)out.nnode, &out.x));
+  nnode = im->nvert + out.edges.nedge;
+  PetscCall(PetscCalloc3(im->ntags, &used, im->ngroup, &out.number, 3 * (size_t)nnode, &x));
+  PetscCall(PetscArraycpy(x, im->x, 3 * (size_t)im->nvert));
+  if (im->nmiddle.n) SbImportEdgeNodes(im, &out.edges, x + 3 * im->nvert);
   // tag sets of each dimension; nodes belong to the first entity of the highest dimension
   for (int d = 0; d < 4; d++) {
-    for (PetscInt i = 0; i < im->item[d].n; i++) out.used[im->item[d].tags[i]][d] = PETSC_TRUE;
+    for (PetscInt i = 0; i < im->item[d].n; i++) used[im->item[d].tags[i]][d] = PETSC_TRUE;
+    for (PetscInt t = 0; t < im->ntags; t++) n[d] += used[t][d];
     if (im->item[d].n) {
-      out.home_dim = d;
-      out.home = im->item[d].tags[0];
+      home_dim = d;
+      home = im->item[d].tags[0];
     }
     out.total += im->item[d].n;
   }
@@ -325,16 +226,43 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
         out.number[g] = ++highest[p->dim];
     }
   }
-  // nodes: the vertices and, if there are curved edges, a node for each edge
-  PetscCall(PetscArraycpy(out.x, im->x, 3 * (size_t)im->nvert));
-  if (im->nmiddle.n) SbImportEdgeNodes(im, &out.edges, out.x + 3 * im->nvert);
-  errno = 0;
-  ierr = write_all(&out, version22);
-  if (ierr)
-    (void)fclose(out.file);
-  else
-    ierr = SbWriteEnd(out.file, path);
-  PetscCall(PetscFree3(out.used, out.number, out.x));
+  (void)fprintf(file, "$MeshFormat\n%s %d 8\n", out.version22 ? "2.2" : "4.1", (int)out.binary);
+  if (out.binary) {
+    (void)fwrite(&one, 4, 1, file);
+    (void)fputc('\n', file);
+  }
+  (void)fprintf(file, "$EndMeshFormat\n");
+  // names of the groups, except default names
+  for (PetscInt g = 0; g < im->ngroup; g++) nname += has_name(&out, g);
+  if (nname) (void)fprintf(file, "$PhysicalNames\n%lld\n", (long long)nname);
+  for (PetscInt g = 0; g < im->ngroup; g++)
+    if (has_name(&out, g))
+      (void)fprintf(file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out.number[g],
+                    im->group[g].name);
+  if (nname) (void)fprintf(file, "$EndPhysicalNames\n");
+  // 4.1: entities, one for each tag set of each dimension
+  if (!out.version22) {
+    (void)fprintf(file, "$Entities\n");
+    put_row(&out, 8, n[0], n[1], n[2], n[3]);
+    for (int d = 0; d < 4; d++)
+      for (PetscInt t = 0; t < im->ntags; t++)
+        if (used[t][d]) write_entity(&out, d, t);
+    (void)fprintf(file, "%s$EndEntities\n", out.binary ? "\n" : "");
+  }
+  // nodes; in 4.1 one block: all numbers, then all coordinates
+  (void)fprintf(file, out.version22 ? "$Nodes\n%lld\n" : "$Nodes\n", (long long)nnode);
+  if (!out.version22) {
+    put_row(&out, 8, 1, nnode, 1, nnode);
+    put_row(&out, 4, home_dim, home + 1, 0, nnode);
+    for (PetscInt v = 0; v < nnode; v++) put(&out, 8, v + 1, '\n');
+  }
+  for (PetscInt v = 0; v < nnode; v++) {
+    if (out.version22) put(&out, 4, v + 1, ' ');
+    for (int i = 0; i < 3; i++) put_real(&out, x[3 * v + i], i < 2 ? ' ' : '\n');
+  }
+  (void)fprintf(file, "%s$EndNodes\n", out.binary ? "\n" : "");
+  PetscCall(write_elements(&out));
+  PetscCall(PetscFree3(used, out.number, x));
   PetscCall(SbImportEdgesDestroy(&out.edges));
-  PetscFunctionReturn(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -154,14 +154,10 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
   (void)fputs("</Attribute>\n</Grid>\n", file);
 }
 
-PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5)
+void SbWrite_Xdmf(const SbImport *im, const char *h5, FILE *file)
 {
   const char *slash = strrchr(h5, '/'), *name = slash ? slash + 1 : h5;
-  FILE *file;
 
-  PetscFunctionBeginUser;
-  file = fopen(path, "w");
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path, strerror(errno));
   (void)fprintf(file, "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n");
   // names of the groups of each tag set
   for (PetscInt t = 1; t < im->ntags; t++) {
@@ -176,6 +172,4 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
   if (im->item[3].n) write_grid(file, im, 3, name);
   if (im->item[2].n) write_grid(file, im, 2, name);
   (void)fprintf(file, "</Domain>\n</Xdmf>\n");
-  PetscCall(SbWriteEnd(file, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

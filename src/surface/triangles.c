@@ -58,7 +58,7 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
         SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));
     for (PetscInt v = 0; v < im->nvert; v++) PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
   }
-  PetscCall(SbScanClose(&im->scan));
+  PetscCall(PetscFree(im->scan.data));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
   PetscFunctionReturn(PETSC_SUCCESS);

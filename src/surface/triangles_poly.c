@@ -36,21 +36,20 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
 static PetscErrorCode read_points(Poly *p, int64_t n)
 {
   SbNumbers *index = &p->f->im->nodes;
-  int64_t *number = NULL;
+  int64_t number;
 
   PetscFunctionBeginUser;
-  PetscCall(SbImportScratch(p->f->im, (size_t)n * sizeof(*number), &number));
   for (int64_t i = 0; i < n; i++) {
     PetscReal x[3];
 
-    PetscCall(SbScanText(p->s, "number of a point", &number[i]));
+    PetscCall(SbScanText(p->s, "number of a point", &number));
+    PetscCheck(SbNumbersFind(index, number) < 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s: point %lld is there twice", p->f->where, (long long)number);
+    PetscCall(SbNumbersAdd(index, number));
     PetscCall(SbScanPoint(p->s, "coordinate of a point", 0, x));
     SbScanEndOfLine(p->s);
     PetscCall(SbTrianglesAddVertex(p->f, x));
   }
-  PetscCall(SbNumbersCreate((PetscInt)n, number, index));
-  PetscCheck(!index->repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: point %lld is there twice",
-             p->f->where, (long long)index->twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,7 +132,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
     if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
     if (!ierr) ierr = read_points(p, count[0]);
     p->s = s;
-    PetscCall(SbScanClose(&scan));
+    PetscCall(PetscFree(scan.data));
     PetscCall(ierr);
   }
   PetscCall(read_counts(s, "number of facets", 2, count));

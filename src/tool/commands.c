@@ -7,7 +7,6 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 {
   char phase[PETSC_MAX_PATH_LEN + 16];
   static const char *const what[4] = {"points", "lines", "triangles", "tets"};
-  PetscInt nvert, n[4];
   char number[32];
 
   PetscFunctionBeginUser;
@@ -16,11 +15,10 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 
   /* message "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
   if (!tool->quiet) {
-    SbMeshFileCount(mesh, &nvert, n);
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(nvert, number)));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(mesh->nvert, number)));
     for (int d = 3; d >= 0; d--)
-      if (n[d] || d == 3)
-        PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(n[d], number), what[d]));
+      if (mesh->item[d].n || d == 3)
+        PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(mesh->item[d].n, number), what[d]));
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,25 +77,23 @@ const SbToolCommand SbToolCommands[] = {
 
 PetscErrorCode SbToolRun(SbTool *tool)
 {
-  const SbToolCommand *command = SbToolCommands;
-  SbImport *mesh = NULL;
+  SbImport mesh = {.progress = SbToolProgress, .progress_ctx = tool};
   char phase[PETSC_MAX_PATH_LEN + 16];
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  while (strcmp(command->name, tool->command)) command++;
-  PetscCheck(strcmp(command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck(strcmp(tool->command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF,
+             PETSC_ERR_USER,
              "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
              ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
              tool->in);
   // read the mesh, with a progress message
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
-  SB_TOOL_PHASE(tool, phase, SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh));
-  if (command->run != SbToolInfo && !tool->quiet && SbMeshFileNote(mesh)[0])
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, SbMeshFileNote(mesh)));
-  ierr = command->run(tool, mesh);
-  if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);
-  PetscCall(SbMeshFileDestroy(&mesh));
-  PetscFunctionReturn(ierr);
+  SB_TOOL_PHASE(tool, phase, SbImportRead(&tool->body, &mesh));
+  if (tool->command->run != SbToolInfo && !tool->quiet && mesh.note[0])
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, mesh.note));
+  PetscCall(tool->command->run(tool, &mesh));
+  if (tool->view[0]) PetscCall(SbToolView(tool, &mesh));
+  PetscCall(SbImportDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,35 +29,39 @@ static PetscErrorCode groups(const SbImport *mesh)
 
   PetscFunctionBeginUser;
   for (int d = 3; d >= 0; d--) {
-    PetscBool found = PETSC_TRUE, titled = PETSC_FALSE;
+    PetscBool titled = PETSC_FALSE;
 
-    for (PetscInt g = 0; found; g++) {
-      SbMeshGroup group;
+    for (PetscInt g = 0; g < mesh->ngroup; g++) {
+      const SbGroup *group = &mesh->group[g];
       char number[32];
+      PetscReal size;
+      PetscInt n;
 
-      PetscCall(SbMeshFileGroup(mesh, g, &group, &found));
-      if (!found || group.dim != d) continue;
+      if (group->dim != d) continue;
+      PetscCall(SbMeshFileGroup(mesh, g, &n, &size));
       if (!titled) (void)printf("%s\n", title[d]);
       titled = PETSC_TRUE;
-      (void)printf("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]);
-      if (d) (void)printf(", %.6g %s", (double)group.size, unit[d]);
+      (void)printf("  %-26s %12s %s", group->name, SbToolNumber(n, number), item[d]);
+      if (d) (void)printf(", %.6g %s", (double)size, unit[d]);
       /* formats with names only have no group numbers */
-      if (group.tag > 0 && group.tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group.tag);
+      if (group->tag > 0 && group->tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group->tag);
       (void)printf("\n");
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints a line of a histogram: at most 40 signs, at least one if n > 0. */
-static void bar(const char *label, PetscInt64 n, PetscInt64 most)
+/* Prints a histogram; a bar has at most 40 signs, at least one if n > 0. */
+static void bars(int nbin, const char label[][32], const PetscInt64 n[])
 {
-  char signs[41], number[32];
-  const int length = n ? (int)PetscMax(1, 40 * n / most) : 0;
+  const char *signs = "########################################";
+  PetscInt64 most = 1;
+  char number[32];
 
-  memset(signs, '#', sizeof(signs));
-  signs[length] = 0;
-  (void)printf("  %-14s %14s %s\n", label, SbToolNumber(n, number), signs);
+  for (int i = 0; i < nbin; i++) most = PetscMax(most, n[i]);
+  for (int i = 0; i < nbin; i++)
+    (void)printf("  %-14s %14s %.*s\n", label[i], SbToolNumber(n[i], number),
+                 n[i] ? (int)PetscMax(1, 40 * n[i] / most) : 0, signs);
 }
 
 /* Memory in bytes of a run of one step on one rank, by element. */
@@ -87,18 +91,16 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshStatistics facts;
-  PetscInt nvert, n[4];
-  char number[32], label[32];
+  char number[32], label[SB_ANGLE_BINS][32]; /* of both histograms */
   const PetscReal *b = facts.body.bbox;
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   static const char *const what[4] = {"points of groups", "lines of groups", "triangles of groups", "tets"};
-  PetscInt64 most = 1;
 
   PetscFunctionBeginUser;
-  SbMeshFileCount(mesh, &nvert, n);
-  (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(nvert, number));
+  (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(mesh->nvert, number));
   for (int d = 3; d >= 0; d--)
-    if (d == 3 || n[d]) (void)printf("  %-26s %12s\n", what[d], SbToolNumber(n[d], number));
+    if (d == 3 || mesh->item[d].n)
+      (void)printf("  %-26s %12s\n", what[d], SbToolNumber(mesh->item[d].n, number));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));
@@ -118,24 +120,16 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   // shape quality of the tets
   (void)printf("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
                (double)facts.body.min_dihedral, (double)facts.max_dihedral);
-  for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, facts.angle[i]);
-  for (int i = 0; i < SB_ANGLE_BINS; i++) {
-    (void)snprintf(label, sizeof(label), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
+  for (int i = 0; i < SB_ANGLE_BINS; i++)
+    (void)snprintf(label[i], sizeof(label[i]), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
                    180 / SB_ANGLE_BINS * (i + 1));
-    bar(label, facts.angle[i], most);
-  }
+  bars(SB_ANGLE_BINS, (const char(*)[32])label, facts.angle);
   (void)printf("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
                (double)facts.body.max_radius_ratio);
-  most = 1;
-  for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, facts.ratio[i]);
-  for (int i = 0; i < SB_RATIO_BINS; i++) {
-    if (i + 1 < SB_RATIO_BINS)
-      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBinEdges[i],
-                     (double)SbRatioBinEdges[i + 1]);
-    else
-      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBinEdges[i]);
-    bar(label, facts.ratio[i], most);
-  }
+  for (int i = 0; i < SB_RATIO_BINS; i++)
+    (void)snprintf(label[i], sizeof(label[i]), i + 1 < SB_RATIO_BINS ? "%4.4g to %.4g" : "%4.4g and more",
+                   (double)SbRatioBinEdges[i], (double)SbRatioBinEdges[PetscMin(i + 1, SB_RATIO_BINS - 1)]);
+  bars(SB_RATIO_BINS, (const char(*)[32])label, facts.ratio);
   // memory of a run
   (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
                "matrix MiB", "memory MiB");

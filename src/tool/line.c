@@ -43,13 +43,6 @@ static const char *const readers[] = {
 _Static_assert(PETSC_STATIC_ARRAY_LENGTH(readers) == PETSC_STATIC_ARRAY_LENGTH(rows),
                "one entry for each row");
 
-PetscErrorCode SbToolRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolHelp(void)
 {
   PetscFunctionBeginUser;
@@ -120,37 +113,17 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_option(const char *name, const char *command)
-{
-  const SbOption *row = find_row(name);
-  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)], *reader = row ? readers[row - rows] : "";
-  char near[256];
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
-  if (!row) {
-    if (SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
-                          "start_in_debugger skip_petscrc citations"))
-      PetscFunctionReturn(PETSC_SUCCESS);
-    SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
-            near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
-  }
-  PetscCheck(!reader[0] || strstr(reader, command), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-%s does nothing in supple-mesh %s; it is for %s", name, command, reader);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
 {
   const SbToolCommand *command;
-  const char *list[16];
+  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
   char all[256] = "";
   PetscInt n = 0;
   PetscMPIInt size;
   PetscInt format, backend, surface;
 
   PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
   // one process, a command, and the number of files that it takes
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
@@ -166,13 +139,26 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   PetscCheck(line->nword - 1 == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
              command->nfile > 1 ? "s" : "", line->nword - 1, command->name, command->files);
+  // options: of this command, or of PETSc
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
   for (int i = 1; i < argc; i++) {
+    const char *name = argv[i] + 1, *reader;
+    const SbOption *row = find_row(name);
     PetscBool is_option;
 
     PetscCall(PetscOptionsValidKey(argv[i], &is_option));
-    if (is_option) PetscCall(check_option(argv[i] + 1, command->name));
+    if (!is_option ||
+        (!row && SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap "
+                                   "no_signal_handler start_in_debugger skip_petscrc citations")))
+      continue;
+    if (!row) SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(all), all);
+    PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
+               all[0] ? "; did you mean -" : "; supple-mesh -help lists them", all, all[0] ? "?" : "");
+    reader = readers[row - rows];
+    PetscCheck(!reader[0] || strstr(reader, command->name), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-%s does nothing in supple-mesh %s; it is for %s", name, command->name, reader);
   }
-  tool->command = command->name;
+  tool->command = command;
   tool->in = line->word[1];
   tool->out = command->nfile > 1 ? line->word[2] : NULL;
   PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));

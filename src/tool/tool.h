@@ -2,7 +2,7 @@
   tool.h - shared declarations of supple-mesh: command line and commands.
 */
 #pragma once
-#include "sbmeshfile.h"
+#include "sbmeshio.h"
 
 /* Command line of supple-mesh, parsed. */
 typedef struct {
@@ -12,11 +12,12 @@ typedef struct {
 } SbToolLine;
 
 typedef struct _SbTool {
-  const char *command, *in, *out; /* out: NULL if the command writes no mesh */
-  SbBody body;                    /* body of the file `in`: name, step, scale, rotate, translate, tet */
-  PetscInt levels;                /* option -levels */
-  SbMeshFormat format;            /* option -format */
-  char view[PETSC_MAX_PATH_LEN];  /* option -view; "": no picture */
+  const struct _SbToolCommand *command;
+  const char *in, *out;          /* out: NULL if the command writes no mesh */
+  SbBody body;                   /* body of the file `in`: name, step, scale, rotate, translate, tet */
+  PetscInt levels;               /* option -levels */
+  SbMeshFormat format;           /* option -format */
+  char view[PETSC_MAX_PATH_LEN]; /* option -view; "": no picture */
   PetscBool quiet;
   PetscLogDouble start, last; /* wall time of the beginning of the phase and of the last report, s */
   PetscBool terminal, open;   /* standard error is a terminal; the line there is to be overwritten */
@@ -29,12 +30,11 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line);
 /* Checks command, number of files and options, and reads the options. */
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool);
 PetscErrorCode SbToolHelp(void);
-PetscErrorCode SbToolRegister(void);
 
 /* commands.c: runs the command. */
 PetscErrorCode SbToolRun(SbTool *tool);
 /* Table of commands, ends with NULL; nfile: number of files; help: one line. */
-typedef struct {
+typedef struct _SbToolCommand {
   const char *name, *files, *help;
   int nfile;
   PetscErrorCode (*run)(SbTool *tool, SbImport *mesh);

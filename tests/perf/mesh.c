@@ -72,13 +72,13 @@ static PetscErrorCode phase_end(Phase *p, const char *name)
 
 static PetscErrorCode read_only(const SbBody *body)
 {
-  SbImport *im = NULL;
+  SbImport im = {0};
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCall(SbMeshFileRead(body, NULL, NULL, &im));
-  PetscCall(SbMeshFileDestroy(&im));
+  if (!rank) PetscCall(SbImportRead(body, &im));
+  PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,14 +27,25 @@ static inline PetscErrorCode test_path(const char *name, char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static inline PetscErrorCode test_free(SbImport **im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportDestroy(*im));
+  PetscCall(PetscFree(*im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport **im)
 {
   SbBody body = test_body("b", path);
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   body.mesh_step = step;
-  PetscCall(SbMeshFileRead(&body, NULL, NULL, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(im));
+  ierr = SbImportRead(&body, *im);
+  if (ierr) PetscCall(test_free(im));
+  PetscFunctionReturn(ierr);
 }
 
 /* Writes and reads again. */

@@ -23,7 +23,7 @@ static PetscErrorCode replay(int reader, const char *scratch, const char *path)
     SB_CHECK(!broken, "%s: %s: '%s' (code %d)", path, broken, text, (int)code);
     nfile++;
   }
-  PetscCall(SbScanClose(&scan));
+  PetscCall(PetscFree(scan.data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,7 +65,7 @@ static PetscErrorCode test_sound(const char *scratch)
     PetscCall(SbScanOpen("sound", path, &scan));
     code = fuzz_read(reader, scratch, scan.data, (size_t)(scan.end - scan.data), text);
     SB_CHECK(!code, "%s: %s", path, text);
-    PetscCall(SbScanClose(&scan));
+    PetscCall(PetscFree(scan.data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

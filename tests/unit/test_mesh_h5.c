@@ -13,7 +13,7 @@ static PetscErrorCode write_mesh(const char *mesh, const char *path)
   PetscFunctionBeginUser;
   PetscCall(test_read(mesh, 0, &im));
   PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -114,7 +114,7 @@ static PetscErrorCode test_output(void)
              (int)cases[i].step, im->x[0]);
     test_groups_of(im, 3, 0, sizeof(text), text);
     SB_CHECK(!strcmp(text, "3 2 liver"), "the tet is of '%s'", text);
-    PetscCall(SbMeshFileDestroy(&im));
+    PetscCall(test_free(&im));
   }
   SB_CHECK_ERROR(test_read(path, 7, &im), PETSC_ERR_FILE_UNEXPECTED, "step 7|3|120|-1");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -144,7 +144,7 @@ static PetscErrorCode test_discontinuous(void)
   SB_CHECK(im->nvert == 5 && im->item[3].n == 2, "%d vertices", (int)im->nvert);
   SB_CHECK(im->item[3].vert[4] == 1 && im->item[3].vert[7] == 4, "vertices of the second tet");
   SB_CHECK(im->x[3] == 1.25 && im->x[4] == 0, "x = %g", im->x[3]);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,7 +203,7 @@ static PetscErrorCode test_cut(void)
     SB_CHECK(im->nmiddle.n == 1 && PetscAbsReal(im->middle[0].off[2] - 0.1) < 1e-15,
              "%d nodes off the middle", (int)im->nmiddle.n);
     SB_CHECK(im->item[3].vert[4] == 4 && im->item[3].number[1] == 2, "the tet of ten nodes");
-    PetscCall(SbMeshFileDestroy(&im));
+    PetscCall(test_free(&im));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -237,7 +237,7 @@ static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *
     PetscCall(test_read(path, 0, &im));
     PetscCall(SbMeshFileMeasure(im, &facts));
     SB_CHECK(strstr(facts.body.note, note) != NULL, "'%s' in '%s'", note, facts.body.note);
-    PetscCall(SbMeshFileDestroy(&im));
+    PetscCall(test_free(&im));
   } else {
     SB_CHECK_ERROR(test_read(path, 0, &im), code, words);
   }

@@ -28,7 +28,7 @@ static PetscErrorCode test_box(void)
   SB_CHECK(f.angle[4] == 2 * f.body.ncell, "%lld angles from 40 to 50", (long long)f.angle[4]);
   SB_CHECK(tets == f.body.ncell && f.ratio[1] == f.body.ncell, "%lld tets, %lld of ratio 1.25 to 1.5",
            (long long)tets, (long long)f.ratio[1]);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,25 +40,26 @@ static PetscErrorCode test_groups(void)
     PetscReal size;
   } known[] = {{"left", 3, 24, 1}, {"both ends", 2, 8, 2}, {"edge", 1, 0, 1}};
   SbImport *im;
-  SbMeshGroup group;
-  PetscBool found = PETSC_TRUE;
-  PetscInt seen = 0;
+  PetscInt seen = 0, n;
+  PetscReal size;
 
   PetscFunctionBeginUser;
   PetscCall(test_read("tests/data/two_cubes_41.msh", 0, &im));
-  for (PetscInt i = 0; found; i++) {
-    PetscCall(SbMeshFileGroup(im, i, &group, &found));
-    for (int k = 0; k < 3 && found; k++) {
-      if (strcmp(group.name, known[k].name)) continue;
+  for (PetscInt i = 0; i < im->ngroup; i++) {
+    const SbGroup *group = &im->group[i];
+
+    PetscCall(SbMeshFileGroup(im, i, &n, &size));
+    for (int k = 0; k < 3; k++) {
+      if (strcmp(group->name, known[k].name)) continue;
       seen++;
       if (known[k].n)
-        SB_CHECK(group.dim == known[k].dim && group.n == known[k].n, "%s: %d of dimension %d", group.name,
-                 (int)group.n, (int)group.dim);
-      SB_CHECK_NEAR(group.size, known[k].size, 1e-12, group.name);
+        SB_CHECK(group->dim == known[k].dim && n == known[k].n, "%s: %d of dimension %d", group->name, (int)n,
+                 (int)group->dim);
+      SB_CHECK_NEAR(size, known[k].size, 1e-12, group->name);
     }
   }
   SB_CHECK(seen == 3, "%d groups seen", (int)seen);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,7 +83,6 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
   const PetscReal exact[7] = {3 * PETSC_PI / 4, 1.25 * PETSC_PI / 4, 2 + 3 * PETSC_PI, PETSC_PI,
                               PETSC_PI / 2,     3 * PETSC_PI / 4,    PETSC_PI / 2};
   PetscReal largest, value[7] = {0};
-  PetscBool found = PETSC_TRUE;
   PetscInt tags[2];
   SbMeshStatistics f;
   char path[64];
@@ -120,12 +120,13 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
   }
   for (PetscInt v = 0; v < im->nvert; v++) cylinder(im->x + 3 * v);
   PetscCall(SbImportMiddles(im, NULL, &largest));
-  for (PetscInt g = 0; found; g++) {
-    SbMeshGroup group;
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    PetscReal size;
+    PetscInt count;
 
-    PetscCall(SbMeshFileGroup(im, g, &group, &found));
-    for (int k = 0; k < 7 && found; k++)
-      if (!strcmp(group.name, names[k])) value[k] = group.size;
+    PetscCall(SbMeshFileGroup(im, g, &count, &size));
+    for (int k = 0; k < 7; k++)
+      if (!strcmp(im->group[g].name, names[k])) value[k] = size;
   }
   PetscCall(SbMeshFileMeasure(im, &f));
   value[0] = f.body.volume;
@@ -135,7 +136,7 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "  %d cells, %s, %s: %.6g, error %.2e\n", (int)n,
                           curved ? "curved" : "straight", names[k], value[k], error[k]));
   }
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,6 +160,6 @@ int main(int argc, char **argv)
   /* errors of a run are errors here too */
   PetscCall(test_read("tests/data/bad_twice.msh", 0, &im));
   SB_CHECK_ERROR(SbMeshFileMeasure(im, &f), PETSC_ERR_USER_INPUT, "body 'b'|tests/data/bad_twice.msh|1");
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   SB_TEST_END();
 }

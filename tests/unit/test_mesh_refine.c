@@ -25,7 +25,7 @@ static PetscErrorCode test_edges(void)
   SB_CHECK(SbImportEdgesFind(&edges, 0, im->nvert - 1) == -1, "corners that no edge joins");
   PetscCall(SbImportEdgesDestroy(&edges));
   PetscCall(SbFacesDestroy(&faces));
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,8 +74,8 @@ static PetscErrorCode test_children(const char *path)
   }
   SB_CHECK(worst < 1e-13, "%s: volumes differ by %g", path, worst);
   SB_CHECK(least > 1 - 1e-12, "%s: a child has %g of its share", path, least);
-  PetscCall(SbMeshFileDestroy(&im));
-  PetscCall(SbMeshFileDestroy(&fine));
+  PetscCall(test_free(&im));
+  PetscCall(test_free(&fine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,7 +96,7 @@ static PetscErrorCode test_shapes(void)
   SB_CHECK(im->item[3].n == 32768, "%d tets", (int)im->item[3].n);
   SB_CHECK(facts.body.max_radius_ratio < 1.5 * first, "radius ratio %g after %g", facts.body.max_radius_ratio,
            first);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +124,7 @@ static PetscErrorCode test_curved(const char *path)
   }
   SB_CHECK(PetscAbsReal(volume - straight) > 1e-4 * straight, "%s: volume %g with edges as with none", path,
            volume);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -147,7 +147,7 @@ int main(int argc, char **argv)
   SB_CHECK(fine.body.nvert == coarse.body.nvert + coarse.nedge, "%d vertices", (int)fine.body.nvert);
   SB_CHECK_NEAR(fine.body.volume, coarse.body.volume, 1e-13, "volume");
   SB_CHECK_NEAR(fine.area, coarse.area, 1e-12, "area");
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscCall(test_shapes());
   PetscCall(test_curved("tests/data/two_cubes_41.msh"));
   PetscCall(test_curved("box:1,2,3:2"));

@@ -61,21 +61,21 @@ static PetscErrorCode test_weld(void)
            (int)facts.body.npart);
   SB_CHECK_NEAR(facts.body.volume, 1, 1e-10, "volume");
   SB_CHECK_NEAR(r.merge_tolerance, 1e-9 * sqrt(3.), 1e-11, "tolerance");
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
 
   PetscCall(test_read("box:1,1,1:4", 0, &im));
   PetscCall(tear(im, 0));
   PetscCall(repaired(im, 0, &r, &facts));
   SB_CHECK(r.nwelded == 0 && facts.body.npart == 384, "%d welded, %d parts", (int)r.nwelded,
            (int)facts.body.npart);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
 
   /* a tolerance above the cell size: tets collapse, and the remaining mesh is valid */
   PetscCall(test_read("box:1,1,1:4", 0, &im));
   PetscCall(repaired(im, 0.3, &r, &facts));
   SB_CHECK(r.nwelded > 0 && r.ncollapsed > 0 && facts.body.ncell > 0, "%d welded, %d collapsed",
            (int)r.nwelded, (int)r.ncollapsed);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,7 +110,7 @@ static PetscErrorCode test_all_at_once(void)
   SB_CHECK_NEAR(facts.body.volume, 2, 1e-12, "volume");
   test_groups_of(im, 3, 0, sizeof(text), text);
   SB_CHECK(strstr(text, "99 again") && strstr(text, " left"), "the first tet is in '%s'", text);
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,8 +166,8 @@ static PetscErrorCode test_curved_edges(void)
   SB_CHECK(im->nmiddle.n == 1 && im->middle[0].end[1] == 7, "%d curved edges", (int)im->nmiddle.n);
   PetscCall(test_round(im, "repaired.h5", SB_MESH_H5, &again));
   test_same(im, again, "repaired");
-  PetscCall(SbMeshFileDestroy(&again));
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&again));
+  PetscCall(test_free(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -184,9 +184,9 @@ int main(int argc, char **argv)
   /* what cannot be repaired */
   PetscCall(test_read("tests/data/bad_flat.msh", 0, &im));
   SB_CHECK_ERROR(SbMeshFileRepair(im, -1, &r), PETSC_ERR_USER_INPUT, "body 'b'|tests/data/bad_flat.msh");
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   PetscCall(test_read("tests/data/bad_three.msh", 0, &im));
   SB_CHECK_ERROR(SbMeshFileRepair(im, -1, &r), PETSC_ERR_USER_INPUT, "body 'b'|tests/data/bad_three.msh|2");
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(test_free(&im));
   SB_TEST_END();
 }

@@ -83,8 +83,8 @@ static PetscErrorCode make_mesh(const char *path, PetscBool random)
   PetscCall(add_group(im, 0, "corner", 1, (const PetscInt[]){nvert}));
   PetscCall(test_curve(im));
   PetscCall(SbMeshFileWrite(im, path, SB_MESH_H5));
-  PetscCall(SbMeshFileDestroy(&im));
-  PetscCall(SbMeshFileDestroy(&other));
+  PetscCall(test_free(&im));
+  PetscCall(test_free(&other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,7 +198,7 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
     if (vert) PetscCall(SbImportAddItem(im, 3, vert[0] < 0 ? im->item[3].vert : vert, 0, ncell + 1));
     im->x[3 * im->nvert - 1] += x;
     PetscCall(SbMeshFileWrite(im, path, SB_MESH_H5));
-    PetscCall(SbMeshFileDestroy(&im));
+    PetscCall(test_free(&im));
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   for (int k = 0; k < 2; k++) {

@@ -13,7 +13,7 @@
 */
 #include "curved.h"
 #include "sbestimate.h"
-#include "sbmeshfile.h"
+#include "sbmeshio.h"
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
@@ -274,7 +274,7 @@ static void half(PetscReal x[3])
 static PetscErrorCode convert(const char *msh, char h5[512])
 {
   SbBody body = {.scale = 1.};
-  SbImport *im;
+  SbImport im = {0};
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -282,9 +282,9 @@ static PetscErrorCode convert(const char *msh, char h5[512])
   PetscCall(test_file_close(f));
   if (!test_rank) {
     PetscCall(PetscStrncpy(body.mesh, msh, sizeof(body.mesh)));
-    PetscCall(SbMeshFileRead(&body, NULL, NULL, &im));
-    PetscCall(SbMeshFileWrite(im, h5, SB_MESH_AUTO));
-    PetscCall(SbMeshFileDestroy(&im));
+    PetscCall(SbImportRead(&body, &im));
+    PetscCall(SbMeshFileWrite(&im, h5, SB_MESH_AUTO));
+    PetscCall(SbImportDestroy(&im));
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
