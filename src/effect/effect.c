@@ -144,8 +144,8 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formulas));
   for (PetscInt i = 0; i < n; i++) {
-    if (SbFormulaUsesTime(formulas[i])) *steady = PETSC_FALSE;
-    if (SbFormulaUsesPosition(formulas[i]) && !position) {
+    if (SbFormulaUses(formulas[i], 't')) *steady = PETSC_FALSE;
+    if (SbFormulaUses(formulas[i], 'x') && !position) {
       char option[3 * SB_NAME_MAX];
 
       SbOptionName(scope, key, sizeof(option), option);
