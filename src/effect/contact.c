@@ -91,13 +91,11 @@ typedef struct {
 static PetscErrorCode examine(const char *name, Needs *needs)
 {
   SbScope scope;
-  PetscInt choice;
   char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   SbScopeSet(&scope, "effect", "contact", name);
-  PetscCall(SbOptionChoice(&scope, "response", &choice));
-  needs->response = (SbResponse)choice;
+  PetscCall(SbOptionChoice(&scope, "response", &needs->response));
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
   needs->bodies = (PetscBool)(needs->bodies || !text[0]);
   needs->vertices = (PetscBool)(needs->vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
@@ -114,7 +112,8 @@ static PetscErrorCode examine(const char *name, Needs *needs)
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
   PetscBool possible = PETSC_TRUE;
-  PetscInt n = 0, method;
+  PetscInt n = 0;
+  int method;
   char(*names)[SB_NAME_MAX] = NULL;
   SbResponse other = AUTO;
   SbScope scope;
@@ -131,13 +130,13 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   if (*response != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the integrator, where the program has one */
-  if (SbOptionExists(&SbRunScope, "time")) {
+  if (SbOptionFind(&SbRunScope, "time")) {
     PetscCall(SbOptionChoice(&SbRunScope, "time", &method));
     possible = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
   }
 
   /* the other effects */
-  if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+  if (SbOptionFind(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
     char type[SB_NAME_MAX];
 
@@ -169,7 +168,6 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
   PetscBool given, steady;
   PetscReal steps;
-  PetscInt choice;
 
   PetscFunctionBeginUser;
   e->ops = SbContactNodeOps;
@@ -216,8 +214,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "start and stop in turn",
              e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
   c->friction.exact = exact(c);
-  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
-  c->cut = (PetscBool)(choice == 1);
+  PetscCall(SbOptionChoice(scope, "time_of_impact", &c->cut));
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "damping", &c->damping));
   PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

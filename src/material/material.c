@@ -119,8 +119,8 @@ PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind)
 
 PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope)
 {
-  const PetscInt first = m->tangent == SB_TANGENT_WARPED ? SB_TANGENT_WARPED : SB_TANGENT_EXACT;
-  PetscInt choice;
+  const int first = m->tangent == SB_TANGENT_WARPED ? SB_TANGENT_WARPED : SB_TANGENT_EXACT;
+  int choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "tangent", &choice));

@@ -97,7 +97,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   for (PetscInt e = 0; e < model->neffect; e++) {
     // sets of an effect; none if its type has no such option
     SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
-    if (!SbOptionExists(&scope, "on")) continue;
+    if (!SbOptionFind(&scope, "on")) continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
