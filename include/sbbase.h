@@ -52,7 +52,7 @@ typedef struct {
 } SbScope;
 extern const SbScope SbRunScope; /* of the program-wide options */
 
-/* Adds rows to the table. `rows` must live as long as the program. Not collective. */
+/* Adds rows to the table. Names and rows must live as long as the program. Not collective. */
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);
 void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
@@ -67,17 +67,18 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
 PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value);
 PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[]);
 PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[]);
-/* names: PetscFree(); index: position in `range`. */
+/* names: PetscFree(); choice: position in `range`, into an int or an enum; second: whether it is 1. */
 PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX]);
-PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index);
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, void *choice);
+PetscErrorCode SbOptionSecond(const SbScope *scope, const char *key, PetscBool *second);
 /* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>. */
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from);
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
 /* Reads and checks a value that is asked for only later, when much has been computed already. */
 PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key);
-/* Whether the scope has a row with this key. */
-PetscBool SbOptionExists(const SbScope *scope, const char *key);
+/* The row of a key in the scope; NULL if there is none. */
+const SbOption *SbOptionFind(const SbScope *scope, const char *key);
 /* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
 
 /* Full name, e.g. "-body_liver_young", for messages. */
@@ -114,7 +115,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
 PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
 /* ASCII viewer on a file, "" or "-": standard output; an error on every rank if not writable. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
-PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
+PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; before PetscFinalize() */
 
 /* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when
    none is near. NULL among the names is passed over: PetscFunctionListGet() counts its closing one. */
@@ -235,18 +236,16 @@ typedef struct _p_SbFormula *SbFormula;
 /* where: option name, for messages; x may be NULL when the formula does not use it. */
 PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula);
 PetscReal SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);
-PetscBool SbFormulaUsesTime(SbFormula formula);
-PetscBool SbFormulaUsesPosition(SbFormula formula);
+PetscBool SbFormulaUses(SbFormula formula, char variable); /* 't': time; 'x': position */
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
 
-  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0:
-  no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
+  SetUp: file, and the options -live_...; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
   its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an
   accepted step that ended at t, reads new targets from the file. Collective.
 */
-void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
+PetscErrorCode SbLiveSetUp(const char *file);
 PetscInt SbLiveCount(void);
 const char *SbLiveColumn(PetscInt i, const char **unit);
 PetscReal SbLiveGet(PetscInt i, PetscReal t);

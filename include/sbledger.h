@@ -40,8 +40,6 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
 PetscErrorCode SbLedgerAttach(SbLedger ledger);
 /* `to`, attached, continues the sums of errors and work of `from`, on a re-meshed model. Not collective. */
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
-/* The error of a source, J^(1/2), and the energy that it is relative to, J. Not collective. */
-PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);
 /* Writes the table as `file`, and prints it unless quiet. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerReport(SbLedger ledger, const char *file, PetscBool quiet);
 PetscErrorCode SbLedgerDestroy(SbLedger *ledger);

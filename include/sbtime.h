@@ -104,9 +104,9 @@ struct _p_SbRun {
   PetscBool free_body;   /* static, without contact: some body can move rigidly; load steps are not halved */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
-  PetscBool saddle;        /* some effect asks for multipliers as unknowns */
-  PetscInt saddle_choice;  /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
-  PetscInt contact_choice; /* -contact_solver: likewise */
+  PetscBool saddle;   /* some effect asks for multipliers as unknowns */
+  int saddle_choice;  /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
+  int contact_choice; /* -contact_solver: likewise */
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* -solver: "auto" or a name */
   const struct _SbSolverPreset *solver_used;

@@ -126,6 +126,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     PetscCall(SbModelDestroy(&scene.model));
     if (!command.view) PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
   }
+  PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

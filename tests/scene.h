@@ -133,6 +133,19 @@ static inline PetscErrorCode test_scene_close(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The error of a source, J^(1/2), and the energy that it is relative to, J: as in history.csv, checkpoints. */
+static inline PetscErrorCode test_ledger(SbRun run, SbErrorSource source, PetscReal *error, PetscReal *stored)
+{
+  PetscInt k = 0;
+
+  PetscFunctionBeginUser;
+  while (k < run->ncarried && strcmp(run->carried[k].name, "ledger_stored_0")) k++;
+  PetscCheck(k < run->ncarried, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is no ledger");
+  *stored = *run->carried[k].value;
+  *error = *run->column[source].value * PetscSqrtReal(*stored);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Displacement (or any vector of the run) at the vertex nearest to a rest position, on every rank. */
 static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
 {

@@ -115,6 +115,7 @@ static inline int sb_test_end(void)
 
   (void)MPI_Allreduce(mine, sums, 2, MPI_INT, MPI_SUM, PETSC_COMM_WORLD);
   test_print("%d passed, %d failed\n", sums[0], sums[1]);
+  (void)SbOptionsReset();
   (void)PetscFinalize();
   return sums[1] ? 1 : 0;
 }

@@ -45,6 +45,9 @@ static const struct {
 };
 static const char *const variables[] = {"t", "x", "y", "z"};
 
+#define SUM "+-" /* operators of a rank; PRODUCT binds closer */
+#define PRODUCT "*/"
+
 /* The compiler: a text, and the position in it. */
 typedef struct {
   const char *text;  /* the complete formula */
@@ -54,7 +57,7 @@ typedef struct {
   int nesting, depth; /* depth of the recursion; depth of the stack at this point of the code */
 } Parser;
 
-static PetscErrorCode expression(Parser *p);
+static PetscErrorCode expression(Parser *p, const char *operators);
 
 static void skip_blanks(Parser *p)
 {
@@ -69,7 +72,7 @@ static PetscErrorCode complain(const Parser *p, const char *at, const char *what
           p->text, what);
 }
 
-static PetscErrorCode emit(Parser *p, SbFormulaOp op, int index, PetscReal number, int change)
+static PetscErrorCode emit(Parser *p, char op, int index, PetscReal number, int change)
 {
   PetscFunctionBeginUser;
   p->formula->step[p->formula->nstep++] = (SbFormulaStep){op, index, number, change};
@@ -105,15 +108,12 @@ static PetscErrorCode word(Parser *p)
   name[n] = 0;
   for (int i = 0; i < 4; i++) {
     if (strcmp(name, variables[i])) continue;
-    if (i)
-      p->formula->uses_position = PETSC_TRUE;
-    else
-      p->formula->uses_time = PETSC_TRUE;
-    PetscCall(emit(p, SB_OP_VARIABLE, i, 0, 1));
+    p->formula->uses[i > 0] = PETSC_TRUE;
+    PetscCall(emit(p, 'v', i, 0, 1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!strcmp(name, "pi")) {
-    PetscCall(emit(p, SB_OP_NUMBER, 0, PETSC_PI, 1));
+    PetscCall(emit(p, 'n', 0, PETSC_PI, 1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
@@ -122,10 +122,10 @@ static PetscErrorCode word(Parser *p)
     PetscCall(expect(p, '('));
     for (int k = 0; k < functions[i].narg; k++) {
       if (k) PetscCall(expect(p, ','));
-      PetscCall(expression(p));
+      PetscCall(expression(p, SUM));
     }
     PetscCall(expect(p, ')'));
-    PetscCall(emit(p, SB_OP_CALL, (int)i, 0, 1 - functions[i].narg));
+    PetscCall(emit(p, 'f', (int)i, 0, 1 - functions[i].narg));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   // an unknown name: suggest similar ones
@@ -150,7 +150,7 @@ static PetscErrorCode unary(Parser *p)
     const PetscBool minus = (PetscBool)(*p->next++ == '-');
 
     PetscCall(unary(p));
-    if (minus) PetscCall(emit(p, SB_OP_NEG, 0, 0, 0));
+    if (minus) PetscCall(emit(p, 'm', 0, 0, 0));
   } else {
     const unsigned char c = (unsigned char)*p->next;
 
@@ -160,12 +160,12 @@ static PetscErrorCode unary(Parser *p)
       const PetscReal number = strtod(p->next, &end);
 
       p->next = end;
-      PetscCall(emit(p, SB_OP_NUMBER, 0, number, 1));
+      PetscCall(emit(p, 'n', 0, number, 1));
     } else if (isalpha(c)) {
       PetscCall(word(p));
     } else if (c == '(') {
       p->next++;
-      PetscCall(expression(p));
+      PetscCall(expression(p, SUM));
       PetscCall(expect(p, ')'));
     } else {
       PetscCall(complain(p, p->next, c ? "expected a number, a name or '('" : "the formula ends too early"));
@@ -174,35 +174,24 @@ static PetscErrorCode unary(Parser *p)
     if (*p->next == '^') {
       p->next++;
       PetscCall(unary(p));
-      PetscCall(emit(p, SB_OP_POW, 0, 0, -1));
+      PetscCall(emit(p, '^', 0, 0, -1));
     }
   }
   p->nesting--;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode term(Parser *p)
+/* Operands joined by the operators of one rank, SUM or PRODUCT. */
+static PetscErrorCode expression(Parser *p, const char *operators)
 {
+  const PetscBool sum = (PetscBool)(operators[0] == '+');
+
   PetscFunctionBeginUser;
-  PetscCall(unary(p));
-  for (skip_blanks(p); *p->next == '*' || *p->next == '/'; skip_blanks(p)) {
-    const SbFormulaOp op = *p->next++ == '*' ? SB_OP_MUL : SB_OP_DIV;
-
-    PetscCall(unary(p));
-    PetscCall(emit(p, op, 0, 0, -1));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode expression(Parser *p)
-{
-  PetscFunctionBeginUser;
-  PetscCall(term(p));
-  for (skip_blanks(p); *p->next == '+' || *p->next == '-'; skip_blanks(p)) {
-    const SbFormulaOp op = *p->next++ == '+' ? SB_OP_ADD : SB_OP_SUB;
-
-    PetscCall(term(p));
-    PetscCall(emit(p, op, 0, 0, -1));
+  for (char op = 0;; op = *p->next++) {
+    PetscCall(sum ? expression(p, PRODUCT) : unary(p));
+    if (op) PetscCall(emit(p, op, 0, 0, -1));
+    skip_blanks(p);
+    if (!*p->next || !strchr(operators, *p->next)) break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -218,31 +207,31 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
     /* Operands are on top of the stack, the first one deepest; the result replaces the first. */
     a += s->change;
     switch (s->op) {
-    case SB_OP_NUMBER:
+    case 'n':
       a[0] = s->number;
       break;
-    case SB_OP_VARIABLE:
+    case 'v':
       a[0] = s->index ? x[s->index - 1] : t;
       break;
-    case SB_OP_ADD:
+    case '+':
       a[0] += a[1];
       break;
-    case SB_OP_SUB:
+    case '-':
       a[0] -= a[1];
       break;
-    case SB_OP_MUL:
+    case '*':
       a[0] *= a[1];
       break;
-    case SB_OP_DIV:
+    case '/':
       a[0] /= a[1];
       break;
-    case SB_OP_POW:
+    case '^':
       a[0] = pow(a[0], a[1]);
       break;
-    case SB_OP_NEG:
+    case 'm':
       a[0] = -a[0];
       break;
-    case SB_OP_CALL:
+    case 'f':
       if (functions[s->index].f1)
         a[0] = functions[s->index].f1(a[0]);
       else if (functions[s->index].f2)
@@ -255,14 +244,9 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
   return a[0];
 }
 
-PetscBool SbFormulaUsesTime(SbFormula f)
+PetscBool SbFormulaUses(SbFormula f, char variable)
 {
-  return f->uses_time;
-}
-
-PetscBool SbFormulaUsesPosition(SbFormula f)
-{
-  return f->uses_position;
+  return f->uses[variable == 'x'];
 }
 
 PetscErrorCode SbFormulaDestroy(SbFormula *formula)
@@ -286,14 +270,14 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
   *formula = f;
   skip_blanks(&p);
   if (!strncmp(p.next, "table:", 6)) {
-    f->uses_time = PETSC_TRUE;
+    f->uses[0] = PETSC_TRUE;
     PetscCall(SbFormulaReadTable(comm, p.next + 6, where, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* each instruction comes from at least one character of the text */
   PetscCall(PetscMalloc1(strlen(text) + 1, &f->step));
   p.formula = f;
-  PetscCall(expression(&p));
+  PetscCall(expression(&p, SUM));
   if (*p.next) PetscCall(complain(&p, p.next, "expected an operator"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

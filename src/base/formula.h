@@ -6,21 +6,9 @@
 
 #define SB_FORMULA_STACK 64 /* largest stack depth of a formula */
 
-typedef enum {
-  SB_OP_NUMBER,
-  SB_OP_VARIABLE,
-  SB_OP_ADD,
-  SB_OP_SUB,
-  SB_OP_MUL,
-  SB_OP_DIV,
-  SB_OP_POW,
-  SB_OP_NEG,
-  SB_OP_CALL
-} SbFormulaOp;
-
 typedef struct {
-  SbFormulaOp op;
-  int index; /* SB_OP_VARIABLE: 0 to 3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
+  char op;   /* n number, v variable, f function, m unary minus; + - * / ^ */
+  int index; /* v: 0 to 3 for t, x, y, z; f: row of the table of functions */
   PetscReal number;
   int change; /* of the number of values on the stack */
 } SbFormulaStep;
@@ -28,7 +16,7 @@ typedef struct {
 struct _p_SbFormula {
   PetscInt nstep;
   SbFormulaStep *step; /* [nstep] postfix code; NULL for a table */
-  PetscBool uses_time, uses_position;
+  PetscBool uses[2];   /* time, position */
   PetscInt nrow;
   PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
 };

@@ -66,7 +66,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     for (PetscInt i = 0; i < live.n; i++)
       if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->row[0][1];
     PetscCall(PetscNew(&formula[k]));
-    formula[k]->uses_time = PETSC_TRUE;
+    formula[k]->uses[0] = PETSC_TRUE;
     formula[k]->nrow = 2;
     PetscCall(PetscMalloc1(2, &formula[k]->row));
     set_rows(formula[k], 0., old, 1., old);
@@ -86,13 +86,15 @@ void SbLiveForget(SbFormula formula)
   }
 }
 
-void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace)
+PetscErrorCode SbLiveSetUp(const char *file)
 {
+  PetscFunctionBeginUser;
   SbFormat(sizeof(live.file), live.file, "%s", file);
-  live.speed = speed;
-  live.angular_speed = angular_speed;
-  live.pace = pace;
+  PetscCall(SbOptionReal(&SbRunScope, "live_speed", &live.speed));
+  PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &live.angular_speed));
+  PetscCall(SbOptionReal(&SbRunScope, "live_pace", &live.pace));
   live.clock = 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscInt SbLiveCount(void)

@@ -18,41 +18,31 @@ static PetscErrorCode grow(PetscInt n, size_t size, void *array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode at_end(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsReset());
-  SbTheOptions.at_end = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Registers the destructor of the table once: PETSc allows 256 of them, and a test may read more often. */
-static PetscErrorCode free_at_end(void)
-{
-  PetscFunctionBeginUser;
-  if (!SbTheOptions.at_end) PetscCall(PetscRegisterFinalize(at_end));
-  SbTheOptions.at_end = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[])
 {
-  PetscFunctionBeginUser;
-  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++)
-    if (r->rows == rows && !strcmp(r->klass, klass) && !strcmp(r->type, type))
-      PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(free_at_end());
-  for (PetscInt i = 0; i < n; i++) {
-    SbOptionRow *r;
+  SbOptionRow *r = SbTheOptions.row;
+  PetscInt at = -1;
 
+  PetscFunctionBeginUser;
+  /* in the order of the manual: at the end of its class, rows of all types before those of one */
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
+    if (strcmp(r[i].klass, klass)) continue;
+    if (r[i].row == rows && !strcmp(r[i].type, type)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (type[0] || !r[i].type[0])
+      at = i + 1;
+    else if (at < 0)
+      at = i;
+  }
+  if (at < 0) at = SbTheOptions.nrow;
+  PetscCall(PetscRealloc((size_t)(SbTheOptions.nrow + n) * sizeof(*r), &SbTheOptions.row));
+  r = SbTheOptions.row + at;
+  PetscCall(PetscArraymove(r + n, r, SbTheOptions.nrow - at));
+  for (PetscInt i = 0; i < n; i++) {
     PetscCheck(rows[i].count <= SB_OPTION_COUNT_MAX, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Option %s has more than %d values", rows[i].key, SB_OPTION_COUNT_MAX);
-    PetscCall(grow(SbTheOptions.nrow, sizeof(*r), &SbTheOptions.row));
-    r = &SbTheOptions.row[SbTheOptions.nrow++];
-    *r = (SbOptionRow){.row = &rows[i], .rows = rows};
-    PetscCall(PetscStrncpy(r->klass, klass, sizeof(r->klass)));
-    PetscCall(PetscStrncpy(r->type, type, sizeof(r->type)));
+    r[i] = (SbOptionRow){klass, type, &rows[i]};
   }
+  SbTheOptions.nrow += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,11 +101,6 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbOptionExists(const SbScope *scope, const char *key)
-{
-  return (PetscBool)(SbOptionFind(scope, key) != NULL);
-}
-
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from)
 {
   PetscFunctionBeginUser;
@@ -125,7 +110,6 @@ PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const c
     if (!strcmp(known->klass, klass) && !strcmp(known->instance, instance))
       PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(free_at_end());
   PetscCall(grow(SbTheOptions.ninherit, sizeof(*SbTheOptions.inherit), &SbTheOptions.inherit));
   SbScopeSet(&SbTheOptions.inherit[SbTheOptions.ninherit++], klass, from, instance);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -184,41 +168,29 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc separates names and values only for options that have not been read. Those read are returned as one
-   string: names are recognised because they have been read, and a value extends to the next name. */
+/* PETSc lists only options that have not been read. Those read are found in a string of all, by their names. */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
-  PetscInt nleft, at = -1;
-  char **names, **values, *all, *rest, value[PETSC_MAX_PATH_LEN] = "";
+  PetscInt nleft;
+  char **names, **values, *all, *rest;
 
   PetscFunctionBeginUser;
   *n = 0;
   *users = NULL;
-  // unread options
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
-  // read options: a name, then words up to the next name of either kind
+  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));
   PetscCall(PetscOptionsGetAll(NULL, &all));
   for (char *token = strtok_r(all, " ", &rest); token; token = strtok_r(NULL, " ", &rest)) {
-    const PetscBool dash = (PetscBool)(token[0] == '-' && token[1]);
-    PetscBool read = PETSC_FALSE, left = PETSC_FALSE;
+    PetscBool read = PETSC_FALSE;
+    const char *value;
 
-    if (dash) PetscCall(PetscOptionsUsed(NULL, token + 1, &read));
-    for (PetscInt i = 0; i < nleft && !left; i++) left = (PetscBool)(dash && !strcmp(token + 1, names[i]));
-    if (read) {
-      at = *n;
-      value[0] = 0;
-      PetscCall(add_user(n, users, token + 1, NULL));
-    } else if (left)
-      at = -1;
-    else if (at >= 0) {
-      SbAppend(sizeof(value), value, "%s%s", value[0] ? " " : "", token);
-      PetscCall(PetscFree((*users)[at].value));
-      PetscCall(PetscStrallocpy(value, &(*users)[at].value));
-    }
+    if (token[0] == '-' && token[1]) PetscCall(PetscOptionsUsed(NULL, token + 1, &read));
+    if (!read) continue;
+    PetscCall(PetscOptionsFindPair(NULL, NULL, token, &value, &read));
+    PetscCall(add_user(n, users, token + 1, value));
   }
   PetscCall(PetscFree(all));
-  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,7 +209,6 @@ PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users)
 PetscErrorCode SbOptionsRemember(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(free_at_end());
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   PetscCall(SbOptionUsersGet(&SbTheOptions.nuser, &SbTheOptions.user));
   SbTheOptions.remembered = PETSC_TRUE;
@@ -291,17 +262,14 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file)
 
 PetscErrorCode SbOptionsReset(void)
 {
-  const PetscBool registered = SbTheOptions.at_end;
-
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
+  for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
   PetscCall(PetscFree(SbTheOptions.record));
   PetscCall(PetscFree(SbTheOptions.row));
-  for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
   PetscCall(PetscFree(SbTheOptions.listed));
   PetscCall(PetscFree(SbTheOptions.inherit));
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
-  PetscCall(PetscMemzero(&SbTheOptions, sizeof(SbTheOptions)));
-  SbTheOptions.at_end = registered;
+  SbTheOptions = (SbOptionTable){0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

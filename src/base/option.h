@@ -8,8 +8,8 @@
 
 /* A registered row. */
 typedef struct {
-  char klass[SB_NAME_MAX], type[SB_NAME_MAX];
-  const SbOption *row, *rows; /* borrowed, static; the first row of its SbOptionsRegister() */
+  const char *klass, *type;
+  const SbOption *row;
 } SbOptionRow;
 
 /* A value that has been read. */
@@ -29,9 +29,8 @@ typedef struct {
 } SbOptionUser;
 
 typedef struct {
-  PetscBool at_end; /* the destructor is registered with PetscFinalize() */
   PetscInt nrow, nrecord, nuser;
-  SbOptionRow *row;       /* [nrow] in the order of registration */
+  SbOptionRow *row;       /* [nrow] in the order of the manual */
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */
   PetscBool remembered;   /* SbOptionsRemember() has filled `user` */
   SbOptionUser *user;     /* [nuser] */
@@ -42,8 +41,7 @@ typedef struct {
 } SbOptionTable;
 extern SbOptionTable SbTheOptions; /* the registry of options */
 
-/* Row of a key in a scope; NULL if there is none. SbOptionNeed(): an internal error if there is none. */
-const SbOption *SbOptionFind(const SbScope *scope, const char *key);
+/* SbOptionFind(), an internal error if there is none. */
 PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOption **row);
 /* Whether the option of this full name, without its dash, has been read. */
 PetscBool SbOptionIsRead(const char *name);

@@ -36,23 +36,15 @@ static PetscBool looks_like_petsc(const char *name)
 }
 
 /* Most common options of PETSc's solvers, and some that differ from them by two letters. */
-static const char *const common[] = {
-  "-ksp_type",         "-ksp_rtol",          "-ksp_atol",
-  "-ksp_divtol",       "-ksp_max_it",        "-ksp_min_it",
-  "-ksp_norm_type",    "-ksp_pc_side",       "-ksp_monitor",
-  "-ksp_view",         "-ksp_gmres_restart", "-ksp_converged_reason",
-  "-pc_type",          "-pc_side",           "-pc_view",
-  "-pc_asm_overlap",   "-pc_asm_type",       "-pc_gasm_overlap",
-  "-pc_gasm_type",     "-pc_bjacobi_blocks", "-pc_factor_mat_solver_type",
-  "-pc_factor_levels", "-pc_gamg_type",      "-pc_factor_mat_ordering_type",
-  "-pc_hypre_type",    "-pc_jacobi_type",    "-pc_gamg_threshold",
-  "-pc_mg_levels",     "-pc_mg_type",        "-pc_gamg_agg_nsmooths",
-  "-pc_sor_its",       "-pc_sor_lits",       "-pc_factor_shift_type",
-  "-snes_type",        "-snes_rtol",         "-snes_atol",
-  "-snes_stol",        "-snes_max_it",       "-snes_max_funcs",
-  "-snes_monitor",     "-snes_view",         "-snes_converged_reason",
-  "-snes_ksp_ew",      "-snes_lag_jacobian", "-snes_linesearch_type",
-};
+static const char common[] =
+  "-ksp_type -ksp_rtol -ksp_atol -ksp_divtol -ksp_max_it -ksp_min_it -ksp_norm_type -ksp_pc_side "
+  "-ksp_monitor -ksp_view -ksp_gmres_restart -ksp_converged_reason -pc_type -pc_side -pc_view "
+  "-pc_asm_overlap -pc_asm_type -pc_gasm_overlap -pc_gasm_type -pc_bjacobi_blocks "
+  "-pc_factor_mat_solver_type -pc_factor_levels -pc_gamg_type -pc_factor_mat_ordering_type "
+  "-pc_hypre_type -pc_jacobi_type -pc_gamg_threshold -pc_mg_levels -pc_mg_type -pc_gamg_agg_nsmooths "
+  "-pc_sor_its -pc_sor_lits -pc_factor_shift_type -snes_type -snes_rtol -snes_atol -snes_stol "
+  "-snes_max_it -snes_max_funcs -snes_monitor -snes_view -snes_converged_reason -snes_ksp_ew "
+  "-snes_lag_jacobian -snes_linesearch_type";
 
 /* Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a program-wide
    key, as -history_every; its first word as -solver_type or -time_budget (-contact_ksp_type is PETSc's). ""
@@ -173,7 +165,8 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   const SbOption *row = program_row(name);
   PetscInt n = 0, room = SbTheOptions.nrecord;
   const char **list;
-  char(*names)[SB_OPTION_NAME_MAX];
+  char(*names)[SB_OPTION_NAME_MAX], **words;
+  int ncommon;
   SbScope scope;
 
   PetscFunctionBeginUser;
@@ -186,8 +179,11 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is an option of supple */
-    if (SbHasPrefix(name, "ksp_ pc_ snes_"))
-      SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near);
+    if (SbHasPrefix(name, "ksp_ pc_ snes_")) {
+      PetscCall(PetscStrToArray(common, ' ', &ncommon, &words));
+      SbSuggestNames(dashed, ncommon, (const char *const *)words, sizeof(near), near);
+      PetscCall(PetscStrToArrayDestroy(ncommon, words));
+    }
     if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
     *verdict = WRONG;
     PetscCall(PetscSNPrintf(text, size, "%s is not an option of PETSc; did you mean %s?", dashed, near));

@@ -2,9 +2,8 @@
   option_manual.c - reference manual generated from the table of options: for the terminal (-help TOPIC) and,
   for scripts/manual, as a table (-options_table).
 
-  Sections are ordered by class, the run and the bodies first: options of all instances of the class, then
-  those of each type. A topic is a class (body), a type (pressure), the first word of options (solver), or any
-  word in their names and help texts.
+  A topic is a class (body), a type (pressure), the first word of options (solver), or any word in their names
+  and help texts.
 */
 #include "option.h"
 
@@ -27,13 +26,18 @@ static const char *const kinds[][2] = {
   [SB_OPTION_STRING] = {"text", "text"},        [SB_OPTION_NAMES] = {"comma-separated names", "names"},
   [SB_OPTION_CHOICE] = {"one of", "choice"},    [SB_OPTION_FORMULA] = {"formula", "formula"}};
 
+static void full_name(const SbOptionRow *r, char name[SB_OPTION_NAME_MAX])
+{
+  SbFormat(SB_OPTION_NAME_MAX, name, r->klass[0] ? "-%s_<name>_%s" : "-%s%s", r->klass, r->row->key);
+}
+
 static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
 {
   const SbOption *row = r->row;
   char name[SB_OPTION_NAME_MAX], number[16] = "";
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(name), name, r->klass[0] ? "-%s_<name>_%s" : "-%s%s", r->klass, row->key);
+  full_name(r, name);
   // description of the value: "3 numbers", "euler_implicit|newmark"
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s%s%s%s", name, number,
@@ -52,22 +56,21 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints the options of a class and type from relevance `least` on, with a headline; adds their number. */
-static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, const char *topic, int least,
-                                 PetscBool table, PetscInt *n)
+/* Prints the options from relevance `least` on, with a headline for each class and type; n: their number. */
+static PetscErrorCode print_options(PetscViewer viewer, const char *topic, int least, PetscInt *n)
 {
   const size_t length = strlen(topic);
-  char name[SB_OPTION_NAME_MAX];
-  PetscInt printed = 0;
+  const SbOptionRow *last = NULL;
 
   PetscFunctionBeginUser;
-  for (const SbOptionRow *r = first; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+  *n = 0;
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
     const SbOption *row = r->row;
+    char name[SB_OPTION_NAME_MAX];
     int relevance = 0;
 
-    if (strcmp(r->klass, first->klass) || strcmp(r->type, first->type)) continue;
     // relevance of the option to the topic: 3: class or type, 2: first word, 1: a word in name or text
-    SbFormat(sizeof(name), name, r->klass[0] ? "-%s_<name>_%s" : "-%s%s", r->klass, row->key);
+    full_name(r, name);
     if (!strcasecmp(r->klass[0] ? r->klass : "run", topic) || !strcasecmp(r->type, topic))
       relevance = 3;
     else if (!r->klass[0] && !strncasecmp(row->key, topic, length) &&
@@ -77,55 +80,15 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, c
       relevance = 1;
     if (relevance < least) continue;
     // headline of a section: "The run", "Every body", "body: corotated"
-    if (!printed++ && !table) {
-      if (!r->klass[0])
-        PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
-      else if (!r->type[0])
-        PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", r->klass));
-      else
-        PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", r->klass, r->type));
-    }
-    // a line for the terminal, or one of the table for scripts, whose columns are those of SbOptionsTable()
-    if (table)
-      PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
-                                       r->klass, r->type, name, kinds[row->kind][1], row->count, row->unit,
-                                       row->preset ? "no" : "yes", row->preset ? row->preset : "", row->range,
-                                       row->help));
-    else
-      PetscCall(help_row(viewer, r));
-  }
-  *n += printed;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether no row before it is of the same class, or class and type. */
-static PetscBool is_first(const SbOptionRow *a, PetscBool by_type)
-{
-  for (const SbOptionRow *b = SbTheOptions.row; b < a; b++)
-    if (!strcmp(a->klass, b->klass) && (!by_type || !strcmp(a->type, b->type))) return PETSC_FALSE;
-  return PETSC_TRUE;
-}
-
-/* Prints all options with at least the relevance `least`; n: their number. */
-static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool table,
-                                   PetscInt *n)
-{
-  static const char *const order[] = {"", "body", "effect"}; /* then as registered */
-  const PetscInt nordered = PETSC_STATIC_ARRAY_LENGTH(order);
-  const SbOptionRow *rows = SbTheOptions.row, *end = rows + SbTheOptions.nrow;
-
-  PetscFunctionBeginUser;
-  *n = 0;
-  for (PetscInt i = -nordered; i < SbTheOptions.nrow; i++) {
-    const char *klass = i < 0 ? order[i + nordered] : rows[i].klass;
-    PetscBool seen = (PetscBool)(i >= 0 && !is_first(&rows[i], PETSC_FALSE));
-
-    for (PetscInt k = 0; i >= 0 && k < nordered; k++) seen = (PetscBool)(seen || !strcmp(order[k], klass));
-    /* options of all instances first, then those of each type */
-    for (int typed = 0; typed < 2 && !seen; typed++)
-      for (const SbOptionRow *r = rows; r < end; r++)
-        if (!strcmp(r->klass, klass) && (r->type[0] != 0) == typed && is_first(r, PETSC_TRUE))
-          PetscCall(print_type(viewer, r, topic, least, table, n));
+    if (!last || strcmp(r->klass, last->klass) || strcmp(r->type, last->type))
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s%s%s%s\n",
+                                       !r->klass[0] ? "The run"
+                                       : r->type[0] ? ""
+                                                    : "Every ",
+                                       r->klass, r->type[0] ? ": " : "", r->type));
+    PetscCall(help_row(viewer, r));
+    last = r;
+    (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -165,22 +128,20 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
     }
     PetscCall(PetscViewerASCIIPrintf(viewer, "  of the run:%s", words));
     for (const SbOptionRow *r = rows; r < end; r++) {
-      PetscInt types = 0;
+      const PetscBool same = (PetscBool)(r > rows && !strcmp(r->klass, r[-1].klass));
 
-      if (!r->klass[0] || !is_first(r, PETSC_FALSE)) continue;
-      PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", r->klass));
-      for (const SbOptionRow *t = r; t < end; t++)
-        if (!strcmp(t->klass, r->klass) && t->type[0] && is_first(t, PETSC_TRUE))
-          PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", types++ ? "" : ":", t->type));
+      if (!same && r->klass[0]) PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", r->klass));
+      if (r->type[0] && (!same || strcmp(r->type, r[-1].type)))
+        PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", same && r[-1].type[0] ? "" : ":", r->type));
     }
     PetscCall(PetscViewerASCIIPrintf(viewer,
                                      "\n  any other word: the options whose name or text contains it\n"
                                      "  all: everything; petsc: a run that lists PETSc's own options\n"));
   }
-  if (all) PetscCall(print_manual(viewer, "", 0, PETSC_FALSE, &n));
+  if (all) PetscCall(print_options(viewer, "", 0, &n));
   /* only the options of highest relevance */
   for (int least = 3; topic[0] && !n && least > 0; least--)
-    PetscCall(print_manual(viewer, topic, least, PETSC_FALSE, &n));
+    PetscCall(print_options(viewer, topic, least, &n));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscCheck(n || !topic[0], comm, PETSC_ERR_USER,
              "-help %s: no option has this word in its name or text; supple -help lists the topics", topic);
@@ -190,13 +151,21 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file)
 {
   PetscViewer viewer;
-  PetscInt n;
+  char name[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, file, &viewer));
   PetscCall(PetscViewerASCIIPrintf(
     viewer, "class\ttype\toption\tkind\tcount\tunit\trequired\tdefault\trange\tmeaning\n"));
-  PetscCall(print_manual(viewer, "", 0, PETSC_TRUE, &n));
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+    const SbOption *o = r->row;
+
+    full_name(r, name);
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
+                                     r->klass, r->type, name, kinds[o->kind][1], o->count, o->unit,
+                                     o->preset ? "no" : "yes", o->preset ? o->preset : "", o->range,
+                                     o->help));
+  }
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -229,30 +229,34 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index)
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, void *choice)
 {
   const SbOptionRecord *r;
-  const char *range, **list;
-  char(*words)[SB_NAME_MAX], near[2 * SB_NAME_MAX];
-  PetscInt n, found = -1;
+  char **words, near[2 * SB_NAME_MAX];
+  int n, found = -1;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_CHOICE, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
-  range = r->row->range;
-  n = count_pieces(range, '|');
-  PetscCall(PetscCalloc2(n, &words, n, &list));
-  for (PetscInt i = 0; i < n; i++) {
-    (void)next_piece(&range, '|', SB_NAME_MAX, words[i]);
-    list[i] = words[i];
+  PetscCall(PetscStrToArray(r->row->range, '|', &n, &words));
+  for (int i = 0; i < n; i++)
     if (!strcmp(words[i], r->text)) found = i;
-  }
-  SbSuggestNames(r->text, n, list, sizeof(near), near);
-  PetscCall(PetscFree2(words, list));
+  SbSuggestNames(r->text, n, (const char *const *)words, sizeof(near), near);
+  PetscCall(PetscStrToArrayDestroy(n, words));
   PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name,
              r->text, r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "",
              r->row->help);
-  *index = found;
+  *(int *)choice = found;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionSecond(const SbScope *scope, const char *key, PetscBool *second)
+{
+  int choice = *second;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionChoice(scope, key, &choice));
+  *second = (PetscBool)(choice == 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -303,6 +307,7 @@ PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
   PetscReal x[SB_OPTION_COUNT_MAX];
   PetscInt n;
   PetscBool b;
+  int choice;
   char text[PETSC_MAX_PATH_LEN], (*names)[SB_NAME_MAX] = NULL;
   SbFormula f[SB_OPTION_COUNT_MAX] = {NULL};
 
@@ -314,7 +319,7 @@ PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
   if (row->kind == SB_OPTION_REALS) PetscCall(SbOptionReals(scope, key, x));
   if (row->kind == SB_OPTION_STRING) PetscCall(SbOptionString(scope, key, sizeof(text), text));
   if (row->kind == SB_OPTION_NAMES) PetscCall(SbOptionNames(scope, key, &n, &names));
-  if (row->kind == SB_OPTION_CHOICE) PetscCall(SbOptionChoice(scope, key, &n));
+  if (row->kind == SB_OPTION_CHOICE) PetscCall(SbOptionChoice(scope, key, &choice));
   if (row->kind == SB_OPTION_FORMULA) PetscCall(SbOptionFormulas(scope, key, f));
   PetscCall(PetscFree(names));
   for (int i = 0; i < SB_OPTION_COUNT_MAX; i++) PetscCall(SbFormulaDestroy(&f[i]));

@@ -86,7 +86,8 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscBool vertices = PETSC_TRUE; /* all obstacles are half-spaces and bowls */
   PetscBool lacks = PETSC_FALSE;   /* some obstacle has an option that `barrier` lacks */
   PetscBool possible = PETSC_TRUE;
-  PetscInt n = 0, choice;
+  PetscInt n = 0;
+  int choice;
   char(*names)[SB_NAME_MAX] = NULL, text[PETSC_MAX_PATH_LEN];
   SbResponse other = AUTO; /* option of this effect, or of the last one that has it */
   SbScope scope;
@@ -117,12 +118,12 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
                "give -effect_%s_obstacle",
                e->name, names_of_responses[other], e->name);
     if (other != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-    if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+    if (SbOptionFind(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   }
   PetscCall(PetscFree(names));
 
   /* the integrator, where the program has one */
-  if (SbOptionExists(&SbRunScope, "time")) {
+  if (SbOptionFind(&SbRunScope, "time")) {
     PetscCall(SbOptionChoice(&SbRunScope, "time", &choice));
     possible = (PetscBool)(choice == 0 || choice == 6); /* euler_implicit, static */
   }
@@ -147,7 +148,6 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
   PetscBool given;
   PetscReal steps;
-  PetscInt choice;
 
   PetscFunctionBeginUser;
   e->ops = SbContactNodeOps;
@@ -193,8 +193,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
              "start and stop in turn",
              e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
-  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
-  c->cut = (PetscBool)(choice == 1);
+  PetscCall(SbOptionSecond(scope, "time_of_impact", &c->cut));
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "damping", &c->damping));
   PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

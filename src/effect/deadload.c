@@ -178,7 +178,7 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
   /* a steady load is integrated once */
   PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
-  for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUsesTime(load->density[i]));
+  for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUses(load->density[i], 't'));
   if (steady) PetscCall(PetscFree(load->corner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -138,8 +138,8 @@ PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *ke
   PetscCall(SbOptionFormulas(scope, key, e->formula + e->nformula - n));
   for (PetscInt i = 0; i < n; i++) {
     formulas[i] = e->formula[e->nformula - n + i];
-    if (SbFormulaUsesTime(formulas[i])) e->steady = PETSC_FALSE;
-    if (SbFormulaUsesPosition(formulas[i]) && !position) {
+    if (SbFormulaUses(formulas[i], 't')) e->steady = PETSC_FALSE;
+    if (SbFormulaUses(formulas[i], 'x') && !position) {
       char option[3 * SB_NAME_MAX];
 
       SbOptionName(scope, key, sizeof(option), option);

@@ -53,7 +53,7 @@ static PetscErrorCode options_fixed(SbEffect e, const SbScope *scope)
 {
   static const int bits[] = {1, 2, 4, 3, 6, 5, 7};
   Support *d = (Support *)e->data;
-  PetscInt choice;
+  int choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "components", &choice));

@@ -124,7 +124,7 @@ PetscErrorCode SbElementRegisterAll(void)
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *element)
 {
   PetscErrorCode (*create)(SbElement) = NULL;
-  PetscInt choice;
+  int choice;
   SbScope scope;
   SbElement e;
 

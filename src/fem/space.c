@@ -152,7 +152,6 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
                              SbSpace *space)
 {
   SbSpace s;
-  PetscInt mass;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
@@ -162,8 +161,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCallMPI(MPI_Comm_size(s->comm, &s->size));
   s->mesh = mesh;
   s->block_scale = 1.;
-  PetscCall(SbOptionChoice(&SbRunScope, "mass", &mass));
-  s->consistent_mass = (PetscBool)(mass == 1);
+  PetscCall(SbOptionSecond(&SbRunScope, "mass", &s->consistent_mass));
   s->element = element;
   s->material = material;
   PetscCall(SbLayoutNodes(s));

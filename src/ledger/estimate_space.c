@@ -146,44 +146,36 @@ static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
   }
 }
 
-/* First row of the inverse of [n b^T; b B], moments n, b, upper B: (1, -y) / (n - b.y), y = B^-1 b. */
-static void solve_fit(const PetscReal moments[10], PetscReal row[4])
-{
-  const PetscReal *b = moments + 1, *M = moments + 4, ridge = RIDGE * (M[0] + M[3] + M[5]);
-  const PetscReal B[9] = {M[0] + ridge, M[1], M[2], M[1], M[3] + ridge, M[4], M[2], M[4], M[5] + ridge};
-  PetscReal cofactor[9], y[3];
-  const PetscReal det = SbMatDet(B);
-
-  SbMatCofactor(B, cofactor);
-  for (int k = 0; k < 3; k++) y[k] = SbDot3(cofactor + 3 * k, b) / det;
-  row[0] = 1. / (moments[0] - SbDot3(b, y));
-  for (int k = 0; k < 3; k++) row[k + 1] = -y[k] * row[0];
-}
-
 static PetscErrorCode create_weights(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
   const PetscInt n = r->nlayer * mesh->nvert_owned;
-  PetscReal *moments, *row, p[4];
+  PetscBLASInt four = 4, one = 1, info;
+  PetscReal(*sums)[16], (*row)[4], p[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(10 * (size_t)n, &moments, 4 * (size_t)n, &row));
+  /* normal equations of the fits; the first row of their inverses */
+  PetscCall(PetscCalloc2(n, &sums, n, &row));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    PetscReal *sum = moments + 10 * r->slot[i];
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    for (int k = 0; k < 16; k++) sums[r->slot[i]][k] += p[k / 4] * p[k % 4];
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal ridge = RIDGE * (sums[k][5] + sums[k][10] + sums[k][15]);
 
-    if (mesh->cell[i] >= mesh->nvert_owned) continue;
-    monomials(mesh, i / 4, (int)(i % 4), p);
-    for (int a = 0; a < 4; a++)
-      for (int b = a; b < 4; b++) *sum++ += p[a] * p[b];
+    if (sums[k][0] == 0.) continue;
+    for (int j = 5; j < 16; j += 5) sums[k][j] += ridge;
+    row[k][0] = 1.;
+    LAPACKpotrf_("L", &four, sums[k], &four, &info);
+    LAPACKpotrs_("L", &four, &one, sums[k], &four, row[k], &four, &info);
   }
-  for (PetscInt k = 0; k < n; k++)
-    if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, row + 4 * k);
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     if (mesh->cell[i] >= mesh->nvert_owned) continue;
     monomials(mesh, i / 4, (int)(i % 4), p);
-    for (int a = 0; a < 4; a++) r->weight[i] += row[4 * r->slot[i] + a] * p[a];
+    for (int a = 0; a < 4; a++) r->weight[i] += row[r->slot[i]][a] * p[a];
   }
-  PetscCall(PetscFree2(moments, row));
+  PetscCall(PetscFree2(sums, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -301,14 +301,6 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbLedgerGet(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *stored)
-{
-  PetscFunctionBeginUser;
-  *error = SbLedgerError(l, source);
-  *stored = l->stored;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLedgerDestroy(SbLedger *ledger)
 {
   SbLedger l = *ledger;

@@ -15,16 +15,14 @@
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l)
 {
   SbQuantity *q = &l->quantity;
-  PetscInt kind;
   PetscReal length;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionChoice(&SbRunScope, "ledger_quantity", &kind));
-  q->kind = (SbQuantityKind)kind;
+  PetscCall(SbOptionChoice(&SbRunScope, "ledger_quantity", &q->kind));
   q->node = -1;
   q->least = PETSC_MAX_REAL;
   q->most = PETSC_MIN_REAL;
-  if (!kind) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!q->kind) PetscFunctionReturn(PETSC_SUCCESS);
   if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(SbOptionReals(&SbRunScope, "ledger_at", q->at));
   if (q->kind == SB_QUANTITY_REACTION)
     PetscCall(SbOptionString(&SbRunScope, "ledger_on", sizeof(q->on), q->on));

@@ -80,7 +80,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 {
   SbScope scope;
   PetscReal E, nu, density;
-  PetscInt choice;
+  int choice;
   SbMaterial m;
 
   PetscFunctionBeginUser;
@@ -90,7 +90,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscCall(SbOptionReal(&scope, "density", &density));
   PetscCall(SbMaterialCreateElastic(law, E, nu, density, material));
   m = *material;
-  if (SbOptionExists(&scope, "tangent")) {
+  if (SbOptionFind(&scope, "tangent")) {
     /* auto, then the tangents of the law: all or, without a warped one, the two exact ones */
     PetscCall(SbOptionChoice(&scope, "tangent", &choice));
     m->adaptive = (PetscBool)(choice == 0);

@@ -29,7 +29,8 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbMesh m;
   SbMergedMesh merged;
   SbLocalMesh local;
-  PetscInt partitioner, reading;
+  SbReading reading;
+  int partitioner;
   PetscBool full, all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -39,7 +40,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(SbOptionChoice(&SbRunScope, "mesh_reading", &reading));
   PetscCall(SbOptionBool(&SbRunScope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  PetscCall(SbMergedMeshCreate(comm, (SbReading)reading, nbody, body, nset, set, &merged));
+  PetscCall(SbMergedMeshCreate(comm, reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   // repairs and warnings are always reported, once for copies of the same mesh; the statistics on request
   for (PetscInt b = 0; b < nbody; b++) {

@@ -67,7 +67,7 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
-  PetscInt precision, nname;
+  PetscInt nname;
   char **args, (*names)[SB_NAME_MAX];
   int n;
 
@@ -113,8 +113,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   /* contents and intervals */
   PetscCall(SbOptionReal(&SbRunScope, "output_every", &out->every));
   PetscCall(SbOptionInt(&SbRunScope, "output_every_steps", &out->every_steps));
-  PetscCall(SbOptionChoice(&SbRunScope, "output_precision", &precision));
-  out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(SbOptionSecond(&SbRunScope, "output_precision", &out->precise));
   PetscCall(SbOptionBool(&SbRunScope, "output_discontinuous", &out->discontinuous));
   PetscCall(SbOptionBool(&SbRunScope, "output_quadratic", &out->quadratic));
   PetscCheck(!out->quadratic || !out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
@@ -139,13 +138,9 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   /* live.txt, which has the values of live formulas */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
-    PetscReal speed, angular_speed, pace;
 
-    PetscCall(SbOptionReal(&SbRunScope, "live_speed", &speed));
-    PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &angular_speed));
-    PetscCall(SbOptionReal(&SbRunScope, "live_pace", &pace));
     PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
-    SbLiveSetUp(path, speed, angular_speed, pace);
+    PetscCall(SbLiveSetUp(path));
   }
 
   /* console output */

@@ -72,7 +72,7 @@ PetscErrorCode SbRemeshRegister(void)
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
   PetscBool named = PETSC_FALSE, any = PETSC_FALSE, given;
-  PetscInt from, n;
+  PetscInt n;
   SbScope own;
   SbRemesh r;
   char(*words)[SB_NAME_MAX], wrong[SB_NAME_MAX] = "";
@@ -147,9 +147,8 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them", wrong);
   PetscCall(SbOptionBool(&SbRunScope, "remesh_failed", &r->failed));
-  PetscCall(SbOptionChoice(&SbRunScope, "remesh_from", &from));
+  PetscCall(SbOptionSecond(&SbRunScope, "remesh_from", &r->how.rest));
   PetscCall(SbOptionReal(&SbRunScope, "remesh_size", &r->how.size));
-  r->how.rest = (PetscBool)(from == 1);
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;
   r->meshes = (PetscBool)(any || r->ntime || r->failed);

@@ -23,8 +23,9 @@ PetscErrorCode SbRegisterAll(void)
   /* otherwise PETSc does not free partitioners that are registered before the first use */
   PetscCall(PetscPartitionerInitializePackage());
 
-  /* options of the run, in the order of the manual */
+  /* in the order of the manual */
   PetscCall(SbSceneRegister());
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
   PetscCall(SbMeshRegister());
   PetscCall(SbSpaceRegister());
   PetscCall(SbTimeRegister());
@@ -35,7 +36,5 @@ PetscErrorCode SbRegisterAll(void)
 
   PetscCall(SbElementRegisterAll());
   PetscCall(SbMaterialRegisterAll());
-
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

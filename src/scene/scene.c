@@ -74,9 +74,9 @@ static const SbOption set_rows[] = {
 PetscErrorCode SbSceneRegister(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
   PetscCall(SbOptionsRegister("set", "", PETSC_STATIC_ARRAY_LENGTH(set_rows), set_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -159,7 +159,7 @@ static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormul
   PetscCall(SbOptionFormulas(scope, key, formula));
   SbOptionName(scope, key, sizeof(option), option);
   for (int k = 0; k < 3; k++)
-    PetscCheck(!SbFormulaUsesTime(formula[k]), PETSC_COMM_SELF, PETSC_ERR_USER,
+    PetscCheck(!SbFormulaUses(formula[k], 't'), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s: what a body begins with may use the place x, y, z only, not t", option);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,7 +195,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
   for (int k = 0; k < 3; k++) {
     /* constant velocities are stored in the body */
-    if (SbFormulaUsesPosition(model->start[i].velocity[k])) continue;
+    if (SbFormulaUses(model->start[i].velocity[k], 'x')) continue;
     body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }
@@ -354,7 +354,7 @@ static PetscErrorCode read_sets(SbModel model)
   for (PetscInt e = 0; e < model->neffect; e++) {
     // sets of an effect; none if its type has no such option
     SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
-    if (!SbOptionExists(&scope, "on")) continue;
+    if (!SbOptionFind(&scope, "on")) continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));

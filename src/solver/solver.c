@@ -116,7 +116,7 @@ PetscErrorCode SbSolverRegister(void)
 
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
 {
-  PetscInt index;
+  int index;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(&SbRunScope, "solver", &index));

@@ -43,20 +43,16 @@ PetscBool SbMeshFileIsSurface(const char *path)
 
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *o)
 {
-  PetscInt backend = 0, surface = 0;
-
   PetscFunctionBeginUser;
   SbTetDefaults(o);
   if (!SbMeshFileIsSurface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "tet_size", &o->size));
-  PetscCall(SbOptionChoice(scope, "tet_surface", &surface));
+  PetscCall(SbOptionChoice(scope, "tet_surface", &o->surface));
   PetscCall(SbOptionReal(scope, "tet_feature_angle", &o->angle));
-  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &backend));
+  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &o->backend));
   PetscCall(SbOptionReal(scope, "tet_seconds", &o->seconds));
   PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));
   PetscCall(SbOptionReal(scope, "untangle", &o->untangle));
-  o->backend = (SbTetBackend)backend;
-  o->surface = (SbTetSurface)surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -101,15 +101,14 @@ PetscErrorCode SbTimeRegister(void)
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
-  PetscInt preset, predictor, inverted, control;
+  int inverted;
   PetscBool barrier = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
   r->barrier_weight = 1.;
   r->model = model;
-  PetscCall(SbOptionChoice(&SbRunScope, "time", &preset));
-  r->preset = (SbIntegrator)preset;
+  PetscCall(SbOptionChoice(&SbRunScope, "time", &r->preset));
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
     char text[64];
@@ -122,13 +121,11 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionReal(&SbRunScope, "ts_dt", &r->dt));
     PetscCall(SbOptionGiven(&SbRunScope, "ts_dt", &r->dt_given));
     PetscCall(SbOptionReal(&SbRunScope, "ts_max_time", &r->t_end));
-    PetscCall(SbOptionChoice(&SbRunScope, "time_predictor", &predictor));
-    r->velocity_predictor = (PetscBool)(predictor == 1);
+    PetscCall(SbOptionSecond(&SbRunScope, "time_predictor", &r->velocity_predictor));
   } else {
     PetscCall(SbOptionInt(&SbRunScope, "static_steps", &r->static_steps));
     PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->min_increment));
-    PetscCall(SbOptionChoice(&SbRunScope, "static_control", &control));
-    r->arc.on = (PetscBool)(control == 1);
+    PetscCall(SbOptionSecond(&SbRunScope, "static_control", &r->arc.on));
     r->t_end = 1.;
     r->dt = 1. / (PetscReal)r->static_steps;
   }

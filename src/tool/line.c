@@ -120,7 +120,6 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   char all[256] = "";
   PetscInt n = 0;
   PetscMPIInt size;
-  PetscInt format, backend, surface;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
@@ -166,17 +165,14 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   /* options of tetrahedralization */
   SbTetDefaults(&tool->body.tet);
   PetscCall(SbOptionReal(&SbRunScope, "size", &tool->body.tet.size));
-  PetscCall(SbOptionChoice(&SbRunScope, "surface", &surface));
+  PetscCall(SbOptionChoice(&SbRunScope, "surface", &tool->body.tet.surface));
   PetscCall(SbOptionReal(&SbRunScope, "angle", &tool->body.tet.angle));
-  PetscCall(SbOptionChoice(&SbRunScope, "tetrahedralizer", &backend));
+  PetscCall(SbOptionChoice(&SbRunScope, "tetrahedralizer", &tool->body.tet.backend));
   PetscCall(SbOptionReal(&SbRunScope, "seconds", &tool->body.tet.seconds));
   PetscCall(SbOptionReal(&SbRunScope, "untangle", &tool->body.tet.untangle));
   PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->body.tet.merge_tolerance));
-  tool->body.tet.backend = (SbTetBackend)backend; /* in the order of the rows */
-  tool->body.tet.surface = (SbTetSurface)surface;
   PetscCall(SbOptionInt(&SbRunScope, "levels", &tool->levels));
-  PetscCall(SbOptionChoice(&SbRunScope, "format", &format));
-  tool->format = (SbMeshFormat)format; /* in the order of the row */
+  PetscCall(SbOptionChoice(&SbRunScope, "format", &tool->format));
   PetscCall(SbOptionInt(&SbRunScope, "step", &tool->body.mesh_step));
   PetscCall(SbOptionReal(&SbRunScope, "scale", &tool->body.scale));
   PetscCall(SbOptionReals(&SbRunScope, "rotate", tool->body.rotate));

@@ -71,8 +71,8 @@ static PetscErrorCode test_uses(void)
   PetscFunctionBeginUser;
   for (int i = 0; i < 4; i++) {
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, cases[i].text, "-test", &f));
-    SB_CHECK(SbFormulaUsesTime(f) == cases[i].time && SbFormulaUsesPosition(f) == cases[i].place,
-             "%s: time %d, place %d", cases[i].text, SbFormulaUsesTime(f), SbFormulaUsesPosition(f));
+    SB_CHECK(SbFormulaUses(f, 't') == cases[i].time && SbFormulaUses(f, 'x') == cases[i].place,
+             "%s: time %d, place %d", cases[i].text, SbFormulaUses(f, 't'), SbFormulaUses(f, 'x'));
     PetscCall(SbFormulaDestroy(&f));
   }
   /* without a dependence on position, x may be NULL */
@@ -151,7 +151,7 @@ static PetscErrorCode test_tables(void)
   PetscCall(test_file_close(empty));
 
   PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
-  SB_CHECK(SbFormulaUsesTime(f) && !SbFormulaUsesPosition(f), "a table is a function of time");
+  SB_CHECK(SbFormulaUses(f, 't') && !SbFormulaUses(f, 'x'), "a table is a function of time");
   SB_CHECK(SbFormulaEval(f, -1, NULL) == 1 && SbFormulaEval(f, 9, NULL) == -5, "constant outside");
   SB_CHECK(SbFormulaEval(f, 1, NULL) == 3 && SbFormulaEval(f, 2, NULL) == 5, "at the rows");
   SB_CHECK(SbFormulaEval(f, 0.25, NULL) == 1.5 && SbFormulaEval(f, 3, NULL) == 0, "in between");

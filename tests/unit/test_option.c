@@ -103,6 +103,7 @@ static PetscErrorCode test_refused_words(void)
 {
   PetscBool b;
   PetscInt n;
+  int choice;
   char(*names)[SB_NAME_MAX], text[8];
   SbFormula f[3];
 
@@ -111,7 +112,8 @@ static PetscErrorCode test_refused_words(void)
                   "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh"));
   SB_CHECK_ERROR(SbOptionBool(&run_scope, "verbose", &b), PETSC_ERR_USER, "-verbose perhaps");
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 2.5");
-  SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &n), PETSC_ERR_USER, "-integrator newmrk|newmark");
+  SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &choice), PETSC_ERR_USER,
+                 "-integrator newmrk|newmark");
   SB_CHECK_ERROR(SbOptionNames(&body_scope, "tags", &n, &names), PETSC_ERR_USER,
                  "-body_liver_tags a,,b|name 2|63 characters");
   SB_CHECK_ERROR(SbOptionFormulas(&body_scope, "pull", f), PETSC_ERR_USER,
@@ -132,7 +134,8 @@ static PetscErrorCode read_all(PetscBool given)
 {
   PetscReal x[3], limit = 77;
   PetscBool b;
-  PetscInt n, choice, repeat;
+  PetscInt n, repeat;
+  int choice;
   char(*names)[SB_NAME_MAX], text[64];
   SbFormula f[3];
 
@@ -379,10 +382,10 @@ static PetscErrorCode test_ahead(void)
   for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
   for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
-  SB_CHECK(SbOptionExists(&body_scope, "young"), "young exists");
-  SB_CHECK(!SbOptionExists(&run_scope, "young"), "a run has no young");
+  SB_CHECK(SbOptionFind(&body_scope, "young"), "young exists");
+  SB_CHECK(!SbOptionFind(&run_scope, "young"), "a run has no young");
   SbScopeSet(&linear, "body", "linear", "liver");
-  SB_CHECK(!SbOptionExists(&linear, "young"), "young belongs to another type");
+  SB_CHECK(!SbOptionFind(&linear, "young"), "young belongs to another type");
   PetscCall(end());
   PetscCall(begin("-body_liver_scale -1"));
   SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");

@@ -58,9 +58,9 @@ static PetscErrorCode compare(const char *what, const char *name, SbErrorSource 
   PetscCall(test_open(&t, "%s %s -ledger yes", scene, coarse));
   PetscCall(verify_solve(&t, what));
   PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
-  PetscCall(SbLedgerGet(t.ledger, source, &estimate, &stored));
+  PetscCall(test_ledger(t.run, source, &estimate, &stored));
   /* the remainder of Newton's method is partly that of its linear solves */
-  if (source == SB_ERROR_NONLINEAR) PetscCall(SbLedgerGet(t.ledger, SB_ERROR_LINEAR, &linear, &stored));
+  if (source == SB_ERROR_NONLINEAR) PetscCall(test_ledger(t.run, SB_ERROR_LINEAR, &linear, &stored));
   estimate = PetscSqrtReal(PetscSqr(estimate) + PetscSqr(linear));
   ratio = estimate / error;
   stored = PetscSqrtReal(stored);
@@ -216,7 +216,7 @@ static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
     &t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g", accuracy));
   PetscCall(verify_solve(&t, "dial"));
   PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
-  PetscCall(SbLedgerGet(t.ledger, SB_ERROR_TIME, &form, &stored));
+  PetscCall(test_ledger(t.run, SB_ERROR_TIME, &form, &stored));
   *steps = t.run->steps_total;
   test_print("  -accuracy %g: %d steps, %d iterations, error %.2e\n", accuracy, (int)*steps,
              (int)t.run->linear_total, error / PetscSqrtReal(stored));
@@ -277,7 +277,7 @@ static PetscErrorCode gaps(void)
     PetscCall(test_open(&t, "%s -accuracy %g", ball, asked[i]));
     PetscCall(verify_solve(&t, "ball"));
     PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
-    PetscCall(SbLedgerGet(t.ledger, SB_ERROR_SPACE, &mesh, &stored));
+    PetscCall(test_ledger(t.run, SB_ERROR_SPACE, &mesh, &stored));
     test_print("  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n", asked[i],
                error / PetscSqrtReal(stored), mesh / PetscSqrtReal(stored));
     SB_CHECK(error < PetscMax(asked[i] * PetscSqrtReal(stored), 0.1 * mesh), "ball, -accuracy %g: %g",
