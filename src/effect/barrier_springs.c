@@ -54,7 +54,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   PetscFunctionBeginUser;
   b->nspring = 0;
   if (first && !b->contact.obstacle) PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(m, b->contact.self, b->x, inside, o));
+  PetscCall(SbContactOverlapFind(m, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
     "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
@@ -205,7 +205,6 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   PetscCall(SbBarrierUpdate(b, u0));
   PetscCall(SbBarrierPlace(b, u1, 1., b->other));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
-  b->known = PETSC_FALSE;
 
   /* impacts on it */
   for (PetscInt i = 0; i < b->pairs->n; i++) {

@@ -37,30 +37,20 @@
 */
 #include "contact.h"
 
-#define STIFFEST 11.   /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
-#define TOGGLES 3      /* activations of a node within a step after which it stays active */
-#define PULLING 1e-6   /* tension at which a node is released, over the largest contact force */
-#define EARLY 1e-6     /* of the path of a rebounding node: near misses count as impacts */
-#define INSTANT 1e-3   /* fraction of a step for the difference quotient of the obstacle's velocity */
-#define SETTLED 1e-4   /* tolerance of spring forces, over the largest contact force */
+#define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
+#define TOGGLES 3    /* activations of a node within a step after which it stays active */
+#define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define EARLY 1e-6   /* of the path of a rebounding node: near misses count as impacts */
+#define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
+#define SETTLED 1e-4 /* tolerance of spring forces and of friction, over the largest of them */
+#define LATE 1e-2    /* that of friction after UPDATES solves of a step, with a warning; else it is halved */
+#define UPDATES 30
 #define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
 #define VALLEY 2       /* flips of an active node between facets in a step that allow two constraints */
 #define AVERAGED 4     /* flips after which normals are averaged */
 #define GIVEN_UP 16    /* flips after which it is not constrained on two any more */
 #define JUMP 1e-6      /* 1 - cosine: a flip */
 #define KEPT 24        /* flips after which a node keeps its plane until the end of the step */
-
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space)
-{
-  const Contact *c = (const Contact *)e->data;
-  char option[3 * SB_NAME_MAX], note[192] = "";
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(option), option, "-effect_%s_obstacle", e->name);
-  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
-  if (note[0]) SbAppend(sizeof(e->note), e->note, "%s%s", e->note[0] ? "; " : "", note);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbContactDestroy(SbEffect e)
 {
@@ -117,7 +107,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscInt n, *slot;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSetUpObstacle(e, space));
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, c->scale, c->at, sizeof(e->note), e->note));
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
@@ -494,7 +484,11 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   c->first = PETSC_FALSE;
-  if (c->friction.mu > 0) SbFrictionJudge(&c->friction, worst, largest, &mine);
+  if (c->friction.mu > 0) {
+    c->friction.updates++;
+    c->friction.error = largest > 0 ? worst / (c->friction.mu * largest) : 0;
+    if (c->friction.error > (c->friction.updates > UPDATES ? LATE : SETTLED)) mine = PETSC_TRUE;
+  }
   /* release springs in tension once all else has converged, a few times */
   wait = mine;
   if (c->held && !exact(c))
@@ -625,11 +619,21 @@ static void rotate_stretch(const SbPose *pose, Touch *touch)
 static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Contact *c = (Contact *)e->data;
+  PetscReal most = c->friction.error;
   SbPose pose;
 
   PetscFunctionBeginUser;
   SbContactPose(c, stage->t, &pose);
-  if (c->friction.mu > 0) PetscCall(SbFrictionWarn(&c->friction, e->name, space, stage->t));
+  if (c->friction.updates > UPDATES && !c->friction.said) { /* alike on all ranks */
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
+    c->friction.said = (PetscBool)(most > SETTLED);
+    if (c->friction.said)
+      PetscCall(
+        SbWarning(space->comm,
+                  "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
+                  "%g; said once: smaller steps make it more exact",
+                  (double)stage->t, e->name, (double)most, SETTLED));
+  }
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal x[3], n[3];
