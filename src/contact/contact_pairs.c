@@ -115,7 +115,7 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscBool driven = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  /* of different bodies, with an obstacle one of them, or self-contact; not both of the obstacle or prescribed */
+  /* of different bodies, one of them the obstacle if there is one, or self-contact; not both prescribed */
   if (one != two ? m->nvertex > m->nbody_vertex && one != obstacle && two != obstacle
                  : !m->self || one == obstacle)
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -36,12 +36,11 @@ static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal 
 /* Some unit vector at right angles to the unit vector a. */
 static void across(const PetscReal a[3], PetscReal n[3])
 {
-  const int i = PetscAbsReal(a[0]) < 0.6 ? 0 : 1;
-  PetscReal e[3] = {0, 0, 0}, c[3];
+  const PetscBool first = (PetscBool)(PetscAbsReal(a[0]) < 0.6);
+  const PetscReal e[3] = {first, !first, 0};
 
-  e[i] = 1;
-  SbCross(a, e, c);
-  (void)unit(c, c, n);
+  SbCross(a, e, n);
+  (void)SbNormalise(n);
 }
 
 /* What is wrong with the numbers of a shape, or NULL. Makes the normal of a plane a unit vector. */
@@ -213,16 +212,6 @@ static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s,
   return unit(v, other, away);
 }
 
-static PetscReal from_capsule(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
-{
-  PetscReal s, length, a[3], away[3], v[3];
-
-  (void)axial(p, x, &s, &length, a, away);
-  s = PetscMax(0, PetscMin(s, length));
-  for (int i = 0; i < 3; i++) v[i] = x[i] - p[i] - s * a[i];
-  return unit(v, away, n) - p[6];
-}
-
 static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
 {
   PetscReal s, length, a[3], away[3];
@@ -241,24 +230,26 @@ static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], Petsc
 
 PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
 {
-  static const PetscReal up[3] = {0, 0, 1};
-  const PetscReal *p = o->p, v[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
-  PetscReal distance;
+  const PetscReal *p = o->p;
+  PetscReal v[3], a[3], other[3] = {0, 0, 1}, s, length;
 
+  SbSubtract(x, p, v);
   switch (o->shape) {
   case PLANE:
     for (int i = 0; i < 3; i++) n[i] = p[i];
     return SbDot3(p, x) - p[3];
   case SPHERE:
-    return unit(v, up, n) - p[3];
+    return unit(v, other, n) - p[3];
   case BOWL:
-    distance = p[3] - unit(v, up, n);
+    length = unit(v, other, n);
     for (int i = 0; i < 3; i++) n[i] = -n[i];
-    return distance;
+    return p[3] - length;
   case BOX:
     return from_box(p, x, n);
   case CAPSULE:
-    return from_capsule(p, x, n);
+    (void)axial(p, x, &s, &length, a, other);
+    for (int i = 0; i < 3; i++) v[i] -= PetscMax(0, PetscMin(s, length)) * a[i];
+    return unit(v, other, n) - p[6];
   case MESH:
     return SbSignedDistanceEvaluate(o->distance, x, n);
   default:

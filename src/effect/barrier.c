@@ -120,15 +120,17 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc7(2 * nbody + 2, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
+  PetscCall(PetscMalloc7(3 * nbody + 3, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
                          3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
   b->k = b->w + nbody + 1;
-  b->w[nbody] = b->k[nbody] = e->width = PETSC_MAX_REAL;
+  b->mass = b->k + nbody + 1;
+  b->w[nbody] = b->k[nbody] = b->mass[nbody] = e->width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->w[i] = b->width > 0.
                 ? b->width
                 : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube), 0.5 * b->mesh->shortest);
     e->width = PetscMin(e->width, b->w[i]);
+    b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
@@ -278,8 +280,8 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of the barrier at the current positions, J, and the work of its forces on the obstacle along the path
-   of this step, with the forces there, J; this rank's. They rotate with the obstacle: moment times angle. */
+/* Energy of the barrier at the current positions, J, and the work of its forces there on the obstacle along
+   the path of this step, J; this rank's. They rotate with the obstacle: moment times angle. */
 static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 {
   PetscReal sum = 0.;

@@ -41,7 +41,7 @@ typedef struct {
   SbContactMesh mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w, *k;          /* [nbody+1] width, m, and stiffness, Pa, of each body; obstacle: infinite */
+  PetscReal *w, *k, *mass;   /* [nbody+1] width, m, stiffness, Pa, and mass, kg; obstacle: infinite */
   PetscReal scale;           /* w over its default, 0..1 (-accuracy) */
   PetscReal wider, growth;   /* largest factor on it at the next step, 0: none; growth of energy by it, J */
   PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */

@@ -210,8 +210,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscReal w = of_pair(b, b->w, pair);
-    const PetscInt part[2] = {m->part[pair->v[0]], m->part[pair->v[SbContactPairSplit(pair)]]};
-    PetscReal at, mass = PETSC_MAX_REAL;
+    PetscReal at;
     Spring spring;
 
     if (SbContactPairSweptApart(m, pair, b->x, b->other, w)) continue;
@@ -223,10 +222,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
       x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
     }
     if (!find_spring(b, pair, x, &spring)) continue;
-    for (int k = 0; k < 2; k++)
-      if (part[k] < s->mesh->nbody)
-        mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
-    spring.stiffness = RIGID * mass / PetscSqr(dt);
+    spring.stiffness = RIGID * of_pair(b, b->mass, pair) / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact.bounce, 0., spring.approach);
     PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
     b->spring[b->nspring++] = spring;

@@ -1,6 +1,6 @@
 /*
-  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c, friction.c) and of
-  surfaces (barrier.c).
+  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c, friction.c) and
+  of surfaces (barrier.c).
 */
 #pragma once
 #include "effect_impl.h"

@@ -81,24 +81,6 @@ static PetscReal gap_at(const Contact *c, const SbPose *pose, const PetscReal x[
   return gap;
 }
 
-/* Adds a facet's share of area and stiffness to one of its nodes; slot[]: its index, -1: none yet. */
-static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
-                      Contact *c)
-{
-  const PetscInt node = SbSpaceCellNode(space, facet->cell, a);
-  const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
-  Touch *touch;
-
-  if (node >= space->nnode_owned) return;
-  if (slot[node] < 0) {
-    slot[node] = c->n++;
-    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a, .along = -1};
-  }
-  touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / facet->height;
-  touch->stiff = touch->k;
-}
-
 static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 {
   Contact *c = (Contact *)e->data;
@@ -116,18 +98,29 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscCall(PetscMalloc1(6 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
+  /* nodes of the facets with their shares of area and stiffness; slot[]: their indices, -1: none yet */
   for (PetscInt i = 0; i < n; i++) {
-    const SbElement element = SbSpaceCellElement(space, facet[i].cell);
+    const SbFacet *f = &facet[i];
+    const PetscInt *per = SbSpaceCellElement(space, f->cell)->nodes_per;
+    const SbMaterial m = space->material[space->mesh->cell_material[f->cell]];
 
-    for (int k = 0; element->nodes_per[1] && k < 6; k++)
-      if (SbTetEdge[k][0] != facet[i].face && SbTetEdge[k][1] != facet[i].face)
-        add_share(space, &facet[i], 4 + k, facet[i].area / 4, slot, c);
-    if (element->nodes_per[0]) {
-      const PetscReal share = element->nodes_per[1] ? facet[i].area / 12 : facet[i].area / 3;
+    for (PetscInt a = 0; a < (per[1] ? SB_CELL_NODES : 4); a++) {
+      const PetscInt node = SbSpaceCellNode(space, f->cell, a);
+      const PetscReal share = f->area / (!per[0] ? 1 : a >= 4 ? 4 : per[1] ? 12 : 3);
+      const int *edge = a < 4 ? NULL : SbTetEdge[a - 4];
+      /* at the vertex behind the facet; the node of CR and DG with its number is on the facet */
+      const PetscBool behind = (PetscBool)(edge ? edge[0] == f->face || edge[1] == f->face : a == f->face);
+      Touch *touch;
 
-      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], share, slot, c);
-    } else
-      add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
+      if (node >= space->nnode_owned || behind != (PetscBool)!per[0]) continue;
+      if (slot[node] < 0) {
+        slot[node] = c->n++;
+        c->touch[slot[node]] = (Touch){.node = node, .cell = f->cell, .a = a, .along = -1};
+      }
+      touch = &c->touch[slot[node]];
+      touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / f->height;
+      touch->stiff = touch->k;
+    }
   }
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));
@@ -165,9 +158,9 @@ static PetscReal contact_force(const Contact *c, const Touch *touch)
   return exact(c) ? touch->lambda : spring(touch, touch->gap);
 }
 
-/* Updates the planes of an active node after a solve, which constrained it to one facet; it is at the distance
-   `gap` (m) from the plane of `facet`, whose normal may be averaged with earlier ones. Returns whether the node
-   is on another facet now, too. */
+/* Updates the planes of an active node after a solve, which constrained it to one facet; it is at the
+   distance `gap` (m) from the plane of `facet`, whose normal may be averaged with earlier ones. Returns
+   whether the node is on another facet now, too. */
 static PetscBool flip(const Contact *c, PetscReal gap, Plane *facet, Touch *touch)
 {
   const PetscBool flips = (PetscBool)(SbDot3(facet->n, touch->surface.n) < 1 - JUMP);
@@ -610,10 +603,9 @@ static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *
 /* Rotates the deflection of a node's springs with the obstacle. */
 static void rotate_stretch(const SbPose *pose, Touch *touch)
 {
-  for (int k = 0; k < 3; k++) {
-    touch->stretch[k] = 0;
-    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->friction.stretch[i];
-  }
+  const PetscReal *R = pose->R, *s = touch->friction.stretch;
+
+  for (int k = 0; k < 3; k++) touch->stretch[k] = R[k] * s[0] + R[3 + k] * s[1] + R[6 + k] * s[2];
 }
 
 static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
