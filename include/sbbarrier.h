@@ -14,6 +14,7 @@
 typedef struct _p_SbContactMesh *SbContactMesh;
 struct _p_SbContactMesh {
   SbSpace space;                  /* borrowed */
+  PetscBool self;                 /* self-contact, too; set by the caller, false at first */
   PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
   PetscInt ntriangle, nbody_triangle, nedge;
   PetscInt *start, *gnode; /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those below,
@@ -35,7 +36,7 @@ struct _p_SbContactMesh {
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
   /* of SbContactMeshGetPositions() */
-  PetscInt nlocal, *local;    /* own vertices of bodies */
+  PetscInt nlocal, *local;    /* own vertices of bodies, in order[] */
   PetscMPIInt *count, *first; /* [ranks] */
   PetscInt *order;            /* [nbody_vertex] vertex of each received one */
   PetscReal *buffer;          /* [2][nbody_vertex][3] */
@@ -75,10 +76,9 @@ static inline PetscReal SbContactPairRadius(SbContactMesh mesh, const SbContactP
 /* Search and its results; x0 and x1 below are arrays of SbContactMeshGetPositions(). */
 typedef struct _p_SbContactPairs *SbContactPairs;
 struct _p_SbContactPairs {
-  SbContactMesh mesh;     /* borrowed */
-  PetscBool self, others; /* self-contact; contact between bodies */
-  PetscReal reach;        /* pairs nearer than this are found, m */
-  PetscReal margin;       /* by which boxes are grown, m */
+  SbContactMesh mesh; /* borrowed */
+  PetscReal reach;    /* pairs nearer than this are found, m */
+  PetscReal margin;   /* by which boxes are grown, m */
   PetscReal *box;     /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
@@ -89,8 +89,7 @@ struct _p_SbContactPairs {
   PetscInt nsearch, most; /* searches; number of pairs at which they end, and whether the last one did */
   PetscBool full;
 };
-PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
-                                    SbContactPairs *pairs);
+PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscReal reach, SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
 /* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
@@ -141,7 +140,7 @@ typedef struct {
   uint8_t *near;        /* [nvertex] SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
 /* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
-PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
+PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of
    body[0] is within the surface of body[1] at x. Slow: for the start of a run. Collective. */
@@ -161,17 +160,16 @@ void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
                    PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
 
-/* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix; start with {0}. */
+/* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix. Start with {0}; release
+   with PetscFree(block) and PetscFree(slot). */
 typedef struct {
   PetscInt n, size;
   SbBlock *block;        /* [n] the lower number first */
   PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
-void SbContactBlocksClear(SbContactBlocks *blocks);
-PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
 /* Adds the 3x3 block of bodies' vertices v and w, rows `ld` numbers apart, and its transpose for w and v. */
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
                                   PetscInt ld);
-/* Adds the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed
+/* Moves the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed
    components, each pair of nodes once. Not collective. */
-PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);
+PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, SbContactBlocks *blocks, SbBlocks *nodes);

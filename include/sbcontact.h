@@ -25,12 +25,12 @@ PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
 
   Collective. Every rank holds the whole obstacle.
 
-  Input: option - for messages; scale, at - x <- scale x + at (m) for the coordinates of the file.
-  Output: note[size] - one line on the obstacle for the run's report; untouched with other shapes.
+  Input: scale, at - x <- scale x + at (m) for the coordinates of the file.
+  Output: note[size] - one line on the obstacle for the run's report is appended, with other shapes nothing.
   Errors: those of SbTrianglesRead(), alike on all ranks.
 */
-PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *option, PetscReal scale,
-                               const PetscReal at[3], size_t size, char note[]);
+PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, PetscReal scale, const PetscReal at[3],
+                               size_t size, char note[]);
 /* Signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal at
    the nearest point of its surface, or one of several (centre of a sphere). Not collective. */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);

@@ -9,15 +9,6 @@
 */
 #include "sbbarrier.h"
 
-PetscErrorCode SbContactBlocksFree(SbContactBlocks *b)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(b->block));
-  PetscCall(PetscFree(b->slot));
-  *b = (SbContactBlocks){0};
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Slot of the vertex pair in the hash table: where it is, or the free one where it belongs. */
 static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt w)
 {
@@ -27,12 +18,6 @@ static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt 
   while (b->slot[at] >= 0 && (b->block[b->slot[at]].v[0] != v || b->block[b->slot[at]].v[1] != w))
     at = (at + 1) & (b->nslot - 1);
   return at;
-}
-
-void SbContactBlocksClear(SbContactBlocks *b)
-{
-  b->n = 0;
-  for (PetscInt k = 0; k < b->nslot; k++) b->slot[k] = -1;
 }
 
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, const PetscReal H[],
@@ -62,7 +47,7 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b, SbBlocks *to)
+PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlocks *to)
 {
   const SbSpace s = m->space;
   const PetscInt nv = m->nbody_vertex;
@@ -151,5 +136,7 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(first));
   PetscCall(PetscFree(entry));
+  b->n = 0;
+  for (PetscInt k = 0; k < b->nslot; k++) b->slot[k] = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

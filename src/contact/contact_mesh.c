@@ -136,7 +136,7 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     arrival[k] = k;
   }
   PetscCall(PetscSortIntWithArray(nv, id, arrival));
-  PetscCall(PetscCalloc4(nv, &m->order, m->nlocal, &m->local, 6 * nv, &m->buffer, nv + 1, &m->start));
+  PetscCall(PetscCalloc3(nv, &m->order, 6 * nv, &m->buffer, nv + 1, &m->start));
   for (PetscInt v = 0; v < nv; v++) m->order[arrival[v]] = v;
   PetscCall(PetscFree2(id, arrival));
 
@@ -173,10 +173,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     }
   }
   PetscCall(PetscFree(all));
-  for (PetscInt k = 0; k < m->nlocal; k++) {
-    m->local[k] = m->order[m->first[s->rank] / 3 + k];
-    m->own[m->local[k]] = m->mine[m->local[k]] = 1;
-  }
+  m->local = m->order + m->first[s->rank] / 3;
+  for (PetscInt k = 0; k < m->nlocal; k++) m->own[m->local[k]] = m->mine[m->local[k]] = 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,7 +366,7 @@ PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh)
   PetscCall(PetscFree(m->triangle));
   PetscCall(PetscFree2(m->edge, m->edge_area));
   PetscCall(PetscFree2(m->count, m->first));
-  PetscCall(PetscFree4(m->order, m->local, m->buffer, m->start));
+  PetscCall(PetscFree3(m->order, m->buffer, m->start));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

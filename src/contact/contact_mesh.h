@@ -16,21 +16,11 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
 
-/*
-  SbContactMeshCrossings - edges that intersect triangles of another body, or of the same one (self), at
-                           x[nvertex][3], current positions, m.
-
-  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it.
-  Independent of the pair search.
-*/
-PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
-                                      PetscInt **hit);
-
 typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 struct _p_SbObstacle {
   Shape shape;
-  PetscReal p[7]; /* its numbers */
-  char *file;     /* mesh: its path */
+  PetscReal p[7];                      /* its numbers */
+  char option[3 * SB_NAME_MAX], *file; /* full name of it; mesh: its path */
   /* at rest, of a mesh after SbObstacleSetUp(); without triangles one vertex (sphere) or an edge of two
      (capsule), with a radius */
   SbTriangles surface;

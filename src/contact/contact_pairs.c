@@ -115,8 +115,9 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscBool driven = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  /* only of different bodies or self-contact, not both of the obstacle, or prescribed */
-  if (one != two ? !p->others && one != obstacle && two != obstacle : !p->self || one == obstacle)
+  /* of different bodies, one of them the obstacle if there is one, or self-contact; not both prescribed */
+  if (one != two ? m->nvertex > m->nbody_vertex && one != obstacle && two != obstacle
+                 : !m->self || one == obstacle)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 4; k++) {
     driven = (PetscBool)(driven && m->driven[pair.v[k]]);
@@ -134,8 +135,7 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool others, PetscReal reach,
-                                    SbContactPairs *pairs)
+PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscReal reach, SbContactPairs *pairs)
 {
   const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle, m->nedge};
   SbContactPairs p;
@@ -144,8 +144,6 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   PetscCall(PetscNew(&p));
   *pairs = p;
   p->mesh = m;
-  p->self = self;
-  p->others = others;
   p->reach = reach;
   p->most = PETSC_MAX_INT;
   p->margin = PetscMax(2. * reach, MARGIN * m->mean_edge);
@@ -200,32 +198,6 @@ static PetscBool still_within(SbContactPairs p, const PetscReal x0[], const Pets
   return PETSC_TRUE;
 }
 
-/* Boxes of the features around those of their vertices, grown by half the reach, and the tree over them. */
-static PetscErrorCode update_features(SbContactPairs p, int k)
-{
-  const SbContactMesh m = p->mesh;
-  struct SbContactFeatures *f = &p->features[k];
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < f->n; i++) {
-    PetscInt own;
-    const PetscInt *v = vertices_of(m, k / 2, f->item[i], &own);
-    const PetscReal grown = 0.5 * p->reach + (v[0] < m->nbody_vertex ? 0. : m->radius);
-
-    for (int c = 0; c < 6; c++) f->box[i][c] = p->box[6 * v[0] + c];
-    for (int a = 1; a < corners[k / 2]; a++) SbBoxMerge(f->box[i], p->box + 6 * v[a]);
-    for (int c = 0; c < 3; c++) {
-      f->box[i][c] -= grown;
-      f->box[i][3 + c] += grown;
-    }
-  }
-  if (p->nsearch == 1)
-    PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
-  else
-    PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
   /* this rank's features among themselves, and with those of others */
@@ -252,7 +224,25 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
       box[3 + k] = PetscMax(x0[3 * v + k], x1[3 * v + k]) + p->margin;
     }
   }
-  for (int k = 0; k < 6; k++) PetscCall(update_features(p, k));
+
+  /* boxes of the features around those of their vertices, grown by half the reach, and the trees over them */
+  for (int k = 0; k < 6; k++) {
+    struct SbContactFeatures *f = &p->features[k];
+
+    for (PetscInt i = 0; i < f->n; i++) {
+      PetscInt own;
+      const PetscInt *v = vertices_of(m, k / 2, f->item[i], &own);
+      const PetscReal grown = 0.5 * p->reach + (v[0] < m->nbody_vertex ? 0. : m->radius);
+
+      for (int c = 0; c < 6; c++) f->box[i][c] = p->box[6 * v[0] + c];
+      for (int a = 1; a < corners[k / 2]; a++) SbBoxMerge(f->box[i], p->box + 6 * v[a]);
+      for (int c = 0; c < 6; c++) f->box[i][c] += c < 3 ? -grown : grown;
+    }
+    if (p->nsearch == 1)
+      PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
+    else
+      PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
+  }
 
   for (int q = 0; q < 5 && !p->full; q++) {
     const struct SbContactFeatures *a = &p->features[meeting[q][0]], *b = &p->features[meeting[q][1]];

@@ -12,16 +12,16 @@
 #define LARGE 20. /* m; files of larger obstacles are in mm */
 
 static const struct {
-  const char *name, *form;
+  const char *form;
   int numbers, nvert, ntri; /* in the option; vertices and triangles of the surface */
 } shapes[] = {
-  {"plane", "plane:nx,ny,nz,d", 4, 2, 0},
-  {"sphere", "sphere:x,y,z,r", 4, 1, 0},
-  {"box", "box:x0,y0,z0,x1,y1,z1", 6, 8, 12},
-  {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7, 2, 0},
-  {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7, 2 * SIDES + 2, 4 * SIDES},
-  {"bowl", "bowl:x,y,z,r", 4, 1, 0},
-  {"mesh", "mesh:FILE", 0, 0, 0},
+  {"plane:nx,ny,nz,d", 4, 2, 0},
+  {"sphere:x,y,z,r", 4, 1, 0},
+  {"box:x0,y0,z0,x1,y1,z1", 6, 8, 12},
+  {"capsule:x0,y0,z0,x1,y1,z1,r", 7, 2, 0},
+  {"cylinder:x0,y0,z0,x1,y1,z1,r", 7, 2 * SIDES + 2, 4 * SIDES},
+  {"bowl:x,y,z,r", 4, 1, 0},
+  {"mesh:FILE", 0, 0, 0},
 };
 
 /* Unit vector from v; `other` where v vanishes. Returns its length. */
@@ -36,16 +36,14 @@ static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal 
 /* Some unit vector at right angles to the unit vector a. */
 static void across(const PetscReal a[3], PetscReal n[3])
 {
-  const int i = PetscAbsReal(a[0]) < 0.6 ? 0 : 1;
-  PetscReal e[3] = {0, 0, 0}, c[3];
+  const PetscBool first = (PetscBool)(PetscAbsReal(a[0]) < 0.6);
+  const PetscReal e[3] = {first, !first, 0};
 
-  e[i] = 1;
-  SbCross(a, e, c);
-  (void)unit(c, c, n);
+  SbCross(a, e, n);
+  (void)SbNormalise(n);
 }
 
-/* What is wrong with the numbers of a shape; NULL when nothing is. Makes the normal of a plane a unit vector.
-   */
+/* What is wrong with the numbers of a shape, or NULL. Makes the normal of a plane a unit vector. */
 static const char *normalise(SbObstacle o)
 {
   const PetscReal length = PetscSqrtReal(SbDot3(o->p, o->p));
@@ -124,8 +122,7 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
 
   PetscFunctionBeginUser;
   while (k < PETSC_STATIC_ARRAY_LENGTH(shapes) &&
-         (!colon || strlen(shapes[k].name) != (size_t)(colon - text) ||
-          strncmp(shapes[k].name, text, (size_t)(colon - text))))
+         (!colon || strncmp(shapes[k].form, text, (size_t)(colon - text) + 1)))
     k++;
   PetscCheck(k < PETSC_STATIC_ARRAY_LENGTH(shapes), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:..., "
@@ -134,6 +131,7 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   PetscCall(PetscNew(&o));
   *obstacle = o;
   o->shape = (Shape)k;
+  PetscCall(PetscStrncpy(o->option, option, sizeof(o->option)));
   if (o->shape == MESH) {
     PetscCheck(colon[1], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: write %s", option, text,
                shapes[k].form);
@@ -148,22 +146,22 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, PetscReal scale,
-                               const PetscReal at[3], size_t size, char note[])
+PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, PetscReal scale, const PetscReal at[3],
+                               size_t size, char note[])
 {
   SbTriangles *t = &o->surface;
   PetscReal length = 0.;
 
   PetscFunctionBeginUser;
   if (o->shape != MESH) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbTrianglesRead(comm, option, o->file, scale, at, t));
+  PetscCall(SbTrianglesRead(comm, o->option, o->file, scale, at, t));
   PetscCall(SbSignedDistanceCreate(t->nvert, t->x, t->ntri, t->tri, t->across, &o->distance));
-  (void)snprintf(note, size, "%s: %" PetscInt_FMT " triangles around %.4g m^3%s", o->file, t->ntri,
-                 (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
+  SbAppend(size, note, "%s%s: %" PetscInt_FMT " triangles around %.4g m^3%s", note[0] ? "; " : "", o->file,
+           t->ntri, (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
   for (PetscInt i = 0; i < 3 * t->nvert; i++) length = PetscMax(length, t->x[i] - t->x[i % 3]);
   if (length > LARGE && scale == 1.)
     PetscCall(SbWarning(comm, "%s: %s is more than %.3g m long: if the file is in mm, give %s_scale 0.001",
-                        option, o->file, (double)length, option));
+                        o->option, o->file, (double)length, o->option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -214,16 +212,6 @@ static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s,
   return unit(v, other, away);
 }
 
-static PetscReal from_capsule(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
-{
-  PetscReal s, length, a[3], away[3], v[3];
-
-  (void)axial(p, x, &s, &length, a, away);
-  s = PetscMax(0, PetscMin(s, length));
-  for (int i = 0; i < 3; i++) v[i] = x[i] - p[i] - s * a[i];
-  return unit(v, away, n) - p[6];
-}
-
 static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
 {
   PetscReal s, length, a[3], away[3];
@@ -242,24 +230,26 @@ static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], Petsc
 
 PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
 {
-  static const PetscReal up[3] = {0, 0, 1};
-  const PetscReal *p = o->p, v[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
-  PetscReal distance;
+  const PetscReal *p = o->p;
+  PetscReal v[3], a[3], other[3] = {0, 0, 1}, s, length;
 
+  SbSubtract(x, p, v);
   switch (o->shape) {
   case PLANE:
     for (int i = 0; i < 3; i++) n[i] = p[i];
     return SbDot3(p, x) - p[3];
   case SPHERE:
-    return unit(v, up, n) - p[3];
+    return unit(v, other, n) - p[3];
   case BOWL:
-    distance = p[3] - unit(v, up, n);
+    length = unit(v, other, n);
     for (int i = 0; i < 3; i++) n[i] = -n[i];
-    return distance;
+    return p[3] - length;
   case BOX:
     return from_box(p, x, n);
   case CAPSULE:
-    return from_capsule(p, x, n);
+    (void)axial(p, x, &s, &length, a, other);
+    for (int i = 0; i < 3; i++) v[i] -= PetscMax(0, PetscMin(s, length)) * a[i];
+    return unit(v, other, n) - p[6];
   case MESH:
     return SbSignedDistanceEvaluate(o->distance, x, n);
   default:
@@ -275,13 +265,9 @@ void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], c
   PetscReal K2[9];
 
   SbMatMul(K, K, K2);
+  *pose = (SbPose){
+    .c = {c[0], c[1], c[2]}, .d = {d[0], d[1], d[2]}, .axis = {axis[0], axis[1], axis[2]}, .angle = angle};
   for (int k = 0; k < 9; k++) pose->R[k] = (k % 4 == 0) + s * K[k] + v * K2[k];
-  for (int i = 0; i < 3; i++) {
-    pose->c[i] = c[i];
-    pose->d[i] = d[i];
-    pose->axis[i] = axis[i];
-  }
-  pose->angle = angle;
 }
 
 void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3], PetscReal way[3])

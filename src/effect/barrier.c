@@ -107,7 +107,9 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscInt n, nmove, nobstacle;
 
   PetscFunctionBeginUser;
-  if (b->contact.obstacle) PetscCall(SbContactSetUpObstacle(e, s));
+  if (b->contact.obstacle)
+    PetscCall(SbObstacleSetUp(b->contact.obstacle, s->comm, b->contact.scale, b->contact.at, sizeof(e->note),
+                              e->note));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
   PetscCall(SbContactMeshCreate(s, n, facet, b->contact.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
@@ -118,23 +120,25 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc7(2 * nbody + 2, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
+  PetscCall(PetscMalloc7(3 * nbody + 3, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
                          3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
   b->k = b->w + nbody + 1;
-  b->w[nbody] = b->k[nbody] = e->width = PETSC_MAX_REAL;
+  b->mass = b->k + nbody + 1;
+  b->w[nbody] = b->k[nbody] = b->mass[nbody] = e->width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->w[i] = b->width > 0.
                 ? b->width
                 : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube), 0.5 * b->mesh->shortest);
     e->width = PetscMin(e->width, b->w[i]);
+    b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
              "most half of that",
              e->name, (double)b->width, (double)b->mesh->shortest);
-  PetscCall(
-    SbContactPairsCreate(b->mesh, b->contact.self, (PetscBool)!b->contact.obstacle, b->w[0], &b->pairs));
+  b->mesh->self = b->contact.self;
+  PetscCall(SbContactPairsCreate(b->mesh, b->w[0], &b->pairs));
   b->least = PETSC_MAX_REAL;
   b->shortest = b->stiffer = b->scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -276,8 +280,8 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of the barrier at the current positions, J, and the work of its forces on the obstacle along the path
-   of this step, with the forces there, J; this rank's. They rotate with the obstacle: moment times angle. */
+/* Energy of the barrier at the current positions, J, and the work of its forces there on the obstacle along
+   the path of this step, J; this rank's. They rotate with the obstacle: moment times angle. */
 static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 {
   PetscReal sum = 0.;
@@ -426,17 +430,13 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
                                    PetscReal *part, PetscInt *nactive)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscInt nsearch;
 
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u0));
-  nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
   PetscCall(SbBarrierPlace(b, u1, 1., b->other));
   PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part));
-  /* the pairs were searched for anew */
-  if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -458,12 +458,13 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     PetscReal u[3];
     const PetscReal slip = SbBarrierSlip(b, pair, u), force = pair->force * SbBarrierSlope(b, slip);
 
-    if (!counts(b, &pair->pair)) continue;
+    if (!counts(b, &pair->on.pair)) continue;
     b->friction_loss += force * PetscSqr(slip);
     for (int k = 0; k < 12; k++) {
-      const PetscInt v = pair->pair.v[k / 3], c = 3 * v + k % 3;
+      const PetscInt v = pair->on.pair.v[k / 3], c = 3 * v + k % 3;
 
-      if (v < m->nbody_vertex) e->work -= force * u[k % 3] * pair->weight[k / 3] * (b->x[c] - b->start[c]);
+      if (v < m->nbody_vertex)
+        e->work -= force * u[k % 3] * pair->on.at.weight[k / 3] * (b->x[c] - b->start[c]);
     }
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
@@ -486,7 +487,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
   if (!b->verify || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactOverlapFind(b->mesh, b->contact.self, b->x, PETSC_FALSE, &b->overlap));
+  PetscCall(SbContactOverlapFind(b->mesh, b->x, PETSC_FALSE, &b->overlap));
   PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT " edges go through triangles, one at (%g, %g, %g) m",
              e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
@@ -613,18 +614,15 @@ static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage
       p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
       if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
     } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
-      p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].pair, b->x, &d);
+      p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].on.pair, b->x, &d);
     else
       p.gap = b->active[i].gap;
 
     /* friction there */
     for (PetscInt k = b->nactive; i < b->nactive && k < b->nactive + b->friction.n; k++) {
-      const SbContactPair *pair = &b->pairs->pair[b->active[i].pair],
-                          *with = &b->friction.pair[k - b->nactive].pair;
-      PetscBool same;
+      const SbContactPair *pair = &b->active[i].pair, *with = &b->friction.pair[k - b->nactive].on.pair;
 
-      PetscCall(PetscArraycmp(pair->v, with->v, 4, &same));
-      if (!same || pair->kind != with->kind || pair->side != with->side) continue;
+      if (memcmp(pair, with, offsetof(SbContactPair, area))) continue; /* not the same features */
       SbBarrierTerm(b, k, &t);
       other = point_of(b, &t);
       for (int j = 0; j < 3; j++) p.force[j] += other.force[j];
@@ -648,7 +646,7 @@ static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, P
   PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
-    const PetscInt *vertex = b->pairs->pair[a->pair].v;
+    const PetscInt *vertex = a->pair.v;
 
     for (int k = 0; k < 4; k++) {
       const PetscInt v = vertex[k];
@@ -670,23 +668,19 @@ static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, P
 static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char text[])
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal value[2] = {b->least, b->shortest};
-  PetscInt most = b->most;
-  char note[96] = "";
+  PetscReal value[3] = {b->least, b->shortest, -(PetscReal)b->most};
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 3, MPIU_REAL, MPI_MIN, s->comm));
+  SbFormat(size, text, "nothing came nearer than %.3g m", (double)b->w[0]);
+  if (value[2] == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  SbFormat(size, text,
+           "%.0f pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, shortest safe part of an "
+           "iteration %.2g",
+           -(double)value[2], (double)value[0], (double)b->w[0], (double)value[1]);
   if (b->contact.friction.mu > 0.)
-    (void)snprintf(note, sizeof(note), ", friction lagged behind normal forces by at most %.2g of itself",
-                   (double)b->most_lag);
-  if (most)
-    (void)snprintf(text, size,
-                   "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
-                   "shortest safe part of an iteration %.2g%s",
-                   most, (double)value[0], (double)b->w[0], (double)value[1], note);
-  else
-    (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
+    SbAppend(size, text, ", friction lagged behind normal forces by at most %.2g of itself",
+             (double)b->most_lag);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -709,7 +703,7 @@ static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, siz
   if (first.gap >= *gap) PetscFunctionReturn(PETSC_SUCCESS);
   *gap = first.gap;
   if (s->rank == first.rank) {
-    const SbContactPair *pair = &b->pairs->pair[least->pair];
+    const SbContactPair *pair = &least->pair;
     const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
     const char *name[2];
 
@@ -766,7 +760,8 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->active));
   PetscCall(PetscFree(b->friction.pair));
   PetscCall(PetscFree(b->next.pair));
-  PetscCall(SbContactBlocksFree(&b->blocks));
+  PetscCall(PetscFree(b->blocks.block));
+  PetscCall(PetscFree(b->blocks.slot));
   PetscCall(PetscFree(b->spring));
   PetscCall(PetscFree(b->overlap.point));
   PetscCall(PetscFree(b->overlap.near));

@@ -22,11 +22,11 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_active(const void *x, const void *y, void *ctx)
+static int compare_active(const void *x, const void *y, void *unused)
 {
-  const SbContactPair *pair = ((const Barrier *)ctx)->pairs->pair, *p = &pair[((const Active *)x)->pair],
-                      *q = &pair[((const Active *)y)->pair];
+  const SbContactPair *p = &((const Active *)x)->pair, *q = &((const Active *)y)->pair;
 
+  (void)unused;
   if (p->side != q->side) return p->side ? 1 : -1;
   if (p->kind != q->kind) return p->kind < q->kind ? -1 : 1;
   for (int k = 0; k < 4; k++)
@@ -52,15 +52,18 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   b->nactive = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
-    Active a = {.pair = i};
+    const SbContactPair *pair = &b->pairs->pair[i];
+    Active a;
 
-    if (SbContactPairSweptApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
-    a.gap = SbContactPairGap(b->mesh, &b->pairs->pair[i], b->x, &a.at);
-    if (a.gap >= of_pair(b, b->w, &b->pairs->pair[i])) continue;
+    if (SbContactPairSweptApart(b->mesh, pair, b->x, b->x, b->w[0])) continue;
+    a.gap = SbContactPairGap(b->mesh, pair, b->x, &a.at);
+    if (a.gap >= of_pair(b, b->w, pair)) continue;
+    a.pair = *pair;
     PetscCall(SbReserve(b->nactive + 1, sizeof(*b->active), &b->size, &b->active));
     b->active[b->nactive++] = a;
   }
-  if (b->nactive > 1) PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, b));
+  if (b->nactive > 1)
+    PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,18 +74,18 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
   for (int i = 0; i < 3; i++) {
     u[i] = -b->effect->progress * friction->rotation[i];
     for (int k = 0; k < 4; k++)
-      u[i] +=
-        friction->weight[k] * (b->x[3 * friction->pair.v[k] + i] - b->start[3 * friction->pair.v[k] + i]);
-    normal += u[i] * friction->n[i];
+      u[i] += friction->on.at.weight[k] *
+              (b->x[3 * friction->on.pair.v[k] + i] - b->start[3 * friction->on.pair.v[k] + i]);
+    normal += u[i] * friction->on.at.n[i];
   }
-  for (int i = 0; i < 3; i++) u[i] -= normal * friction->n[i];
+  for (int i = 0; i < 3; i++) u[i] -= normal * friction->on.at.n[i];
   return PetscSqrtReal(SbDot3(u, u));
 }
 
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
 static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
 {
-  const SbContactPair *pair = &b->pairs->pair[a->pair];
+  const SbContactPair *pair = &a->pair;
   PetscReal force = 0., w2 = 0.;
 
   SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair), energy,
@@ -123,7 +126,7 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscCall(SbBarrierUpdate(b, u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    const SbContactPair *pair = &a->pair;
     PetscReal d[3], energy, gradient[12];
     const PetscReal force = normal_force(b, a, &energy, gradient);
 
@@ -140,19 +143,19 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
 void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
 {
   const PetscInt k = i - b->nactive;
-  const SbContactPair *pair;
 
   if (k < b->friction.n) {
-    pair = k < 0 ? &b->pairs->pair[b->active[i].pair] : &b->friction.pair[k].pair;
+    const Active *a = k < 0 ? &b->active[i] : &b->friction.pair[k].on;
+
     t->n = 4;
-    t->nfirst = SbContactPairSplit(pair);
-    t->v = pair->v;
-    t->counts = counts(b, pair);
-    t->weight = k < 0 ? b->active[i].at.weight : b->friction.pair[k].weight;
-    t->normal = k < 0 ? b->active[i].at.n : b->friction.pair[k].n;
+    t->nfirst = SbContactPairSplit(&a->pair);
+    t->v = a->pair.v;
+    t->counts = counts(b, &a->pair);
+    t->weight = a->at.weight;
+    t->normal = a->at.n;
     t->force = 0.;
     if (k < 0)
-      t->force = normal_force(b, &b->active[i], &t->energy, t->gradient);
+      t->force = normal_force(b, a, &t->energy, t->gradient);
     else {
       PetscReal u[3];
       const PetscReal y = SbBarrierSlip(b, &b->friction.pair[k], u), w = b->slip,
@@ -251,10 +254,9 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
-  SbContactBlocksClear(&b->blocks);
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    const SbContactPair *pair = &a->pair;
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
                   &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
@@ -278,17 +280,17 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
       PetscReal force[12];
 
       for (int k = 0; k < 12; k++)
-        force[k] = friction->force * (1. / w - slope) * friction->weight[k / 3] * friction->slip[k % 3];
-      spread(b, friction->pair.side ? 1 : 4, friction->pair.v, 1., force, r);
+        force[k] = friction->force * (1. / w - slope) * friction->on.at.weight[k / 3] * friction->slip[k % 3];
+      spread(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, 1., force, r);
       slope = curve = 1. / w;
     } else if (kind == SB_HESSIAN_MAJORIZED)
       curve = slope;
     for (int k = 0; k < 9; k++) {
-      T[k] = slope * ((k % 4 ? 0. : 1.) - friction->n[k / 3] * friction->n[k % 3]);
+      T[k] = slope * ((k % 4 ? 0. : 1.) - friction->on.at.n[k / 3] * friction->on.at.n[k % 3]);
       if (y > 0.) T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
       T[k] *= friction->force;
     }
-    PetscCall(add_blocks(b, friction->pair.side ? 1 : 4, friction->pair.v, friction->weight, T));
+    PetscCall(add_blocks(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, friction->on.at.weight, T));
   }
 
   /* active springs */
@@ -306,18 +308,19 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
 }
 
 /* Displacement in the step of the obstacle's contact point by rotation, beyond that of its vertices. */
-static void find_rotation(const Barrier *b, PetscBool end, const Active *a, FrictionPair *friction)
+static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
 {
   const SbContactMesh m = b->mesh;
-  const PetscInt *v = b->pairs->pair[a->pair].v;
+  const PetscInt *v = friction->on.pair.v;
+  const PetscReal *weight = friction->on.at.weight, *n = friction->on.at.n;
   PetscReal X[3], at[3] = {0}, other[3], sign = 0.;
 
   for (int k = 0; k < 4; k++) {
-    if (v[k] >= m->nbody_vertex || friction->weight[k] == 0.) continue;
-    sign = friction->weight[k] > 0. ? 1. : -1.;
-    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(friction->weight[k]) * b->x[3 * v[k] + i];
+    if (v[k] >= m->nbody_vertex || weight[k] == 0.) continue;
+    sign = weight[k] > 0. ? 1. : -1.;
+    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(weight[k]) * b->x[3 * v[k] + i];
   }
-  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * friction->n[i];
+  for (int i = 0; i < 3; i++) at[i] -= sign * friction->on.gap * n[i];
   SbPoseInvert(&b->pose[end], at, X);
   SbPoseApply(&b->pose[!end], X, other);
   for (int i = 0; i < 3; i++) friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
@@ -325,7 +328,7 @@ static void find_rotation(const Barrier *b, PetscBool end, const Active *a, Fric
     const PetscInt o = 3 * (v[k] - m->nbody_vertex);
 
     for (int i = 0; i < 3 && o >= 0; i++)
-      friction->rotation[i] += friction->weight[k] * (b->to[o + i] - b->from[o + i]);
+      friction->rotation[i] += weight[k] * (b->to[o + i] - b->from[o + i]);
   }
 }
 
@@ -334,15 +337,11 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
   PetscFunctionBeginUser;
   b->next.n = 0;
   for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
     PetscReal energy, gradient[12];
-    FrictionPair friction = {.pair = *pair};
+    FrictionPair friction = {.on = b->active[i]};
 
-    friction.force = b->contact.friction.mu * normal_force(b, a, &energy, gradient);
-    PetscCall(PetscArraycpy(friction.weight, a->at.weight, 4));
-    PetscCall(PetscArraycpy(friction.n, a->at.n, 3));
-    if (b->contact.obstacle) find_rotation(b, end, a, &friction);
+    friction.force = b->contact.friction.mu * normal_force(b, &friction.on, &energy, gradient);
+    if (b->contact.obstacle) find_rotation(b, end, &friction);
     PetscCall(SbReserve(b->next.n + 1, sizeof(*b->next.pair), &b->next.size, &b->next.pair));
     b->next.pair[b->next.n++] = friction;
   }
@@ -373,7 +372,7 @@ PetscErrorCode SbBarrierLag(Barrier *b)
   SbBarrierSwapFriction(b);
   for (PetscInt i = 0; i < s->nnode_owned; i++) sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   for (PetscInt i = 0; i < b->next.n; i++)
-    sum[1] += counts(b, &b->next.pair[i].pair) ? b->next.pair[i].force : 0.;
+    sum[1] += counts(b, &b->next.pair[i].on.pair) ? b->next.pair[i].force : 0.;
   PetscCall(PetscFree(f));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
   b->lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;

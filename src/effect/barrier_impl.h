@@ -7,15 +7,15 @@
 
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {
-  PetscInt pair;
+  SbContactPair pair;
   PetscReal gap; /* m */
   SbDistance at;
 } Active;
 
 /* A pair with friction in this step. */
 typedef struct {
-  SbContactPair pair;
-  PetscReal weight[4], n[3], force; /* mu N, N */
+  Active on;               /* when its normal force was taken */
+  PetscReal force;         /* mu N, N */
   PetscReal rotation[3];   /* displacement of the obstacle's contact point by rotation, beyond that of its
                               vertices, m; with the sign of its weights */
   PetscReal slip[3];       /* at the last Hessian, m */
@@ -41,7 +41,7 @@ typedef struct {
   SbContactMesh mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w, *k;          /* [nbody+1] width, m, and stiffness, Pa, of each body; obstacle: infinite */
+  PetscReal *w, *k, *mass;   /* [nbody+1] width, m, stiffness, Pa, and mass, kg; obstacle: infinite */
   PetscReal scale;           /* w over its default, 0..1 (-accuracy) */
   PetscReal wider, growth;   /* largest factor on it at the next step, 0: none; growth of energy by it, J */
   PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
@@ -54,7 +54,7 @@ typedef struct {
   PetscInt nactive, size;
   Active *active;
   FrictionPairs friction, next; /* next: with closest points and normal forces at the end of the step */
-  SbContactBlocks blocks;       /* of the last Hessian */
+  SbContactBlocks blocks;       /* of a Hessian while it is summed up */
   SbPose pose[2];               /* of the obstacle at the start and the end of the step */
   PetscInt lags, nlag;          /* lagged-friction iterations of a step: the most; of this step */
   PetscReal lag_tolerance, lag; /* tolerance of the lag; the lag, relative to mu N of all pairs */

@@ -54,7 +54,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   PetscFunctionBeginUser;
   b->nspring = 0;
   if (first && !b->contact.obstacle) PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(m, b->contact.self, b->x, inside, o));
+  PetscCall(SbContactOverlapFind(m, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
     "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
@@ -205,14 +205,12 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   PetscCall(SbBarrierUpdate(b, u0));
   PetscCall(SbBarrierPlace(b, u1, 1., b->other));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
-  b->known = PETSC_FALSE;
 
   /* impacts on it */
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscReal w = of_pair(b, b->w, pair);
-    const PetscInt part[2] = {m->part[pair->v[0]], m->part[pair->v[SbContactPairSplit(pair)]]};
-    PetscReal at, mass = PETSC_MAX_REAL;
+    PetscReal at;
     Spring spring;
 
     if (SbContactPairSweptApart(m, pair, b->x, b->other, w)) continue;
@@ -224,10 +222,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
       x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
     }
     if (!find_spring(b, pair, x, &spring)) continue;
-    for (int k = 0; k < 2; k++)
-      if (part[k] < s->mesh->nbody)
-        mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
-    spring.stiffness = RIGID * mass / PetscSqr(dt);
+    spring.stiffness = RIGID * of_pair(b, b->mass, pair) / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact.bounce, 0., spring.approach);
     PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
     b->spring[b->nspring++] = spring;

@@ -1,6 +1,6 @@
 /*
-  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c, friction.c) and of
-  surfaces (barrier.c).
+  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c, friction.c) and
+  of surfaces (barrier.c).
 */
 #pragma once
 #include "effect_impl.h"
@@ -8,7 +8,7 @@
 
 typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
 
-/* Coefficients of friction of an effect, and convergence in a step (friction.c). */
+/* Coefficients of friction of an effect, and convergence in a step. */
 typedef struct {
   PetscReal mu, mu_kinetic;
   int updates;     /* number of updates within the step */
@@ -124,15 +124,13 @@ static inline PetscBool exact(const Contact *c)
 
 /* The obstacle's pose at time t. */
 void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
-/* Reads the obstacle's file, if it is a mesh, and adds to the effect's note. Collective. */
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space);
 /* Destroys what the Contact owns. */
 PetscErrorCode SbContactDestroy(SbEffect e);
 
 /* Operations of nodes against an obstacle. */
 extern const SbEffectOps SbContactNodeOps;
 
-/* Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last
+/* Friction (friction.c). Not collective. Begin: a step; touches: active at the end of the last
    one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`
    (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read: their forces after
    a solve, N being the normal force. */
@@ -143,10 +141,6 @@ PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch
 void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N);
 /* Updates stick or slip of a node with the normal force N; returns the error of its friction, N. */
 PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N);
-/* After all nodes: worst of these errors, largest normal force of all ranks, N; changed: too large. */
-void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed);
 /* Accepts a step for a node; presses: its normal force is positive. */
 void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses);
-/* At the end of a step: warns once of friction that did not converge. Collective. */
-PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
 #define SB_CONTACT_STATE 23 /* numbers in a record of a node */

@@ -37,30 +37,20 @@
 */
 #include "contact.h"
 
-#define STIFFEST 11.   /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
-#define TOGGLES 3      /* activations of a node within a step after which it stays active */
-#define PULLING 1e-6   /* tension at which a node is released, over the largest contact force */
-#define EARLY 1e-6     /* of the path of a rebounding node: near misses count as impacts */
-#define INSTANT 1e-3   /* fraction of a step for the difference quotient of the obstacle's velocity */
-#define SETTLED 1e-4   /* tolerance of spring forces, over the largest contact force */
+#define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
+#define TOGGLES 3    /* activations of a node within a step after which it stays active */
+#define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define EARLY 1e-6   /* of the path of a rebounding node: near misses count as impacts */
+#define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
+#define SETTLED 1e-4 /* tolerance of spring forces and of friction, over the largest of them */
+#define LATE 1e-2    /* that of friction after UPDATES solves of a step, with a warning; else it is halved */
+#define UPDATES 30
 #define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
 #define VALLEY 2       /* flips of an active node between facets in a step that allow two constraints */
 #define AVERAGED 4     /* flips after which normals are averaged */
 #define GIVEN_UP 16    /* flips after which it is not constrained on two any more */
 #define JUMP 1e-6      /* 1 - cosine: a flip */
 #define KEPT 24        /* flips after which a node keeps its plane until the end of the step */
-
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space)
-{
-  const Contact *c = (const Contact *)e->data;
-  char option[3 * SB_NAME_MAX], note[192] = "";
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(option), option, "-effect_%s_obstacle", e->name);
-  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
-  if (note[0]) SbAppend(sizeof(e->note), e->note, "%s%s", e->note[0] ? "; " : "", note);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbContactDestroy(SbEffect e)
 {
@@ -91,24 +81,6 @@ static PetscReal gap_at(const Contact *c, const SbPose *pose, const PetscReal x[
   return gap;
 }
 
-/* Adds a facet's share of area and stiffness to one of its nodes; slot[]: its index, -1: none yet. */
-static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
-                      Contact *c)
-{
-  const PetscInt node = SbSpaceCellNode(space, facet->cell, a);
-  const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
-  Touch *touch;
-
-  if (node >= space->nnode_owned) return;
-  if (slot[node] < 0) {
-    slot[node] = c->n++;
-    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a, .along = -1};
-  }
-  touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / facet->height;
-  touch->stiff = touch->k;
-}
-
 static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 {
   Contact *c = (Contact *)e->data;
@@ -117,7 +89,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscInt n, *slot;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSetUpObstacle(e, space));
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, c->scale, c->at, sizeof(e->note), e->note));
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
@@ -126,18 +98,29 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscCall(PetscMalloc1(6 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
+  /* nodes of the facets with their shares of area and stiffness; slot[]: their indices, -1: none yet */
   for (PetscInt i = 0; i < n; i++) {
-    const SbElement element = SbSpaceCellElement(space, facet[i].cell);
+    const SbFacet *f = &facet[i];
+    const PetscInt *per = SbSpaceCellElement(space, f->cell)->nodes_per;
+    const SbMaterial m = space->material[space->mesh->cell_material[f->cell]];
 
-    for (int k = 0; element->nodes_per[1] && k < 6; k++)
-      if (SbTetEdge[k][0] != facet[i].face && SbTetEdge[k][1] != facet[i].face)
-        add_share(space, &facet[i], 4 + k, facet[i].area / 4, slot, c);
-    if (element->nodes_per[0]) {
-      const PetscReal share = element->nodes_per[1] ? facet[i].area / 12 : facet[i].area / 3;
+    for (PetscInt a = 0; a < (per[1] ? SB_CELL_NODES : 4); a++) {
+      const PetscInt node = SbSpaceCellNode(space, f->cell, a);
+      const PetscReal share = f->area / (!per[0] ? 1 : a >= 4 ? 4 : per[1] ? 12 : 3);
+      const int *edge = a < 4 ? NULL : SbTetEdge[a - 4];
+      /* at the vertex behind the facet; the node of CR and DG with its number is on the facet */
+      const PetscBool behind = (PetscBool)(edge ? edge[0] == f->face || edge[1] == f->face : a == f->face);
+      Touch *touch;
 
-      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], share, slot, c);
-    } else
-      add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
+      if (node >= space->nnode_owned || behind != (PetscBool)!per[0]) continue;
+      if (slot[node] < 0) {
+        slot[node] = c->n++;
+        c->touch[slot[node]] = (Touch){.node = node, .cell = f->cell, .a = a, .along = -1};
+      }
+      touch = &c->touch[slot[node]];
+      touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / f->height;
+      touch->stiff = touch->k;
+    }
   }
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));
@@ -175,9 +158,9 @@ static PetscReal contact_force(const Contact *c, const Touch *touch)
   return exact(c) ? touch->lambda : spring(touch, touch->gap);
 }
 
-/* Updates the planes of an active node after a solve, which constrained it to one facet; it is at the distance
-   `gap` (m) from the plane of `facet`, whose normal may be averaged with earlier ones. Returns whether the node
-   is on another facet now, too. */
+/* Updates the planes of an active node after a solve, which constrained it to one facet; it is at the
+   distance `gap` (m) from the plane of `facet`, whose normal may be averaged with earlier ones. Returns
+   whether the node is on another facet now, too. */
 static PetscBool flip(const Contact *c, PetscReal gap, Plane *facet, Touch *touch)
 {
   const PetscBool flips = (PetscBool)(SbDot3(facet->n, touch->surface.n) < 1 - JUMP);
@@ -494,7 +477,11 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   c->first = PETSC_FALSE;
-  if (c->friction.mu > 0) SbFrictionJudge(&c->friction, worst, largest, &mine);
+  if (c->friction.mu > 0) {
+    c->friction.updates++;
+    c->friction.error = largest > 0 ? worst / (c->friction.mu * largest) : 0;
+    if (c->friction.error > (c->friction.updates > UPDATES ? LATE : SETTLED)) mine = PETSC_TRUE;
+  }
   /* release springs in tension once all else has converged, a few times */
   wait = mine;
   if (c->held && !exact(c))
@@ -616,20 +603,29 @@ static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *
 /* Rotates the deflection of a node's springs with the obstacle. */
 static void rotate_stretch(const SbPose *pose, Touch *touch)
 {
-  for (int k = 0; k < 3; k++) {
-    touch->stretch[k] = 0;
-    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->friction.stretch[i];
-  }
+  const PetscReal *R = pose->R, *s = touch->friction.stretch;
+
+  for (int k = 0; k < 3; k++) touch->stretch[k] = R[k] * s[0] + R[3 + k] * s[1] + R[6 + k] * s[2];
 }
 
 static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Contact *c = (Contact *)e->data;
+  PetscReal most = c->friction.error;
   SbPose pose;
 
   PetscFunctionBeginUser;
   SbContactPose(c, stage->t, &pose);
-  if (c->friction.mu > 0) PetscCall(SbFrictionWarn(&c->friction, e->name, space, stage->t));
+  if (c->friction.updates > UPDATES && !c->friction.said) { /* alike on all ranks */
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
+    c->friction.said = (PetscBool)(most > SETTLED);
+    if (c->friction.said)
+      PetscCall(
+        SbWarning(space->comm,
+                  "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
+                  "%g; said once: smaller steps make it more exact",
+                  (double)stage->t, e->name, (double)most, SETTLED));
+  }
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal x[3], n[3];

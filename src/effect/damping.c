@@ -32,11 +32,9 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
 {
   const Damping *d = (const Damping *)e->data;
   const SbMesh mesh = space->mesh;
-  PetscBool *damped;
 
   PetscFunctionBeginUser;
-  /* the bodies of these names; an error with the nearest ones where there is none */
-  PetscCall(PetscCalloc1(mesh->nbody, &damped));
+  /* an error with the nearest names where there is no such body */
   for (PetscInt i = 0; i < e->on.n; i++) {
     PetscInt b = 0;
 
@@ -49,19 +47,19 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
       for (b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
       SbSuggestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near);
       PetscCall(PetscFree(names));
-      PetscCall(PetscFree(damped));
       SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
               "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", e->on.option, e->on.name[i],
               near[0] ? "; did you mean " : "", near);
     }
-    damped[b] = PETSC_TRUE;
   }
   for (PetscInt b = 0; b < mesh->nbody; b++) {
-    if (e->on.n && !damped[b]) continue;
+    PetscInt i = 0;
+
+    while (i < e->on.n && strcmp(mesh->body[b].name, e->on.name[i])) i++;
+    if (e->on.n && i == e->on.n) continue;
     space->alpha[b] += d->alpha;
     space->beta[b] += d->beta;
   }
-  PetscCall(PetscFree(damped));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,11 +13,8 @@
 */
 #include "contact.h"
 
-#define SETTLED 1e-4 /* tolerance of friction, relative to the largest */
-#define LATE 1e-2    /* the same after UPDATES solves, with a warning; else the step is halved */
-#define UPDATES 30   /* solves of a step with friction */
-#define FLIPS 10     /* changes of a pair between stick and slip within a step, after which it has springs */
-#define STIFF 1e-3   /* smallest relative difference of trial force and limit, for the stiffness across */
+#define FLIPS 10   /* changes of a pair between stick and slip within a step, after which it has springs */
+#define STIFF 1e-3 /* smallest relative difference of trial force and limit, for the stiffness across */
 
 void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {
@@ -209,13 +206,6 @@ PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N)
   return error;
 }
 
-void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed)
-{
-  f->updates++;
-  f->error = largest > 0 ? worst / (f->mu * largest) : 0;
-  if (f->error > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
-}
-
 void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
 {
   SbFrictionState *g = &touch->friction;
@@ -227,20 +217,4 @@ void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
   }
   g->slid = g->slides;
   for (int k = 0; k < 3; k++) g->stretch[k] = springs(c, g) ? -g->force[k] / touch->k : 0;
-}
-
-PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t)
-{
-  PetscReal most = f->error;
-
-  PetscFunctionBeginUser;
-  if (f->updates <= UPDATES || f->said) PetscFunctionReturn(PETSC_SUCCESS); /* alike on all ranks */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
-  if (most <= SETTLED) PetscFunctionReturn(PETSC_SUCCESS);
-  f->said = PETSC_TRUE;
-  PetscCall(SbWarning(space->comm,
-                      "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
-                      "%g; said once: smaller steps make it more exact",
-                      (double)t, effect, (double)most, SETTLED));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

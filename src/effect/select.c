@@ -70,6 +70,7 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
 {
   const SbMesh mesh = space->mesh;
   PetscInt *count; /* vertices and nodes of each body */
+  PetscInt b = 0, nvert;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(2 * mesh->nbody, &count));
@@ -79,18 +80,15 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
     count[2 * space->node_body[i] + 1] += !!(space->node_set[i] & mask);
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, space->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    const PetscInt nvert = count[2 * b], nnode = count[2 * b + 1];
-
-    if (!nvert || nnode) continue;
-    PetscCall(PetscFree(count));
-    SETERRQ(space->comm, PETSC_ERR_USER_INPUT,
-            "%s selects %" PetscInt_FMT
-            " vertices of body %s but none of its triangles, where element %s has its nodes: take a set that "
-            "contains whole triangles, such as a thicker plane or box",
-            on->option, nvert, mesh->body[b].name, space->element[b]->name);
-  }
+  while (b < mesh->nbody && (!count[2 * b] || count[2 * b + 1])) b++;
+  nvert = b < mesh->nbody ? count[2 * b] : 0;
   PetscCall(PetscFree(count));
+  PetscCheck(
+    !nvert, space->comm, PETSC_ERR_USER_INPUT,
+    "%s selects %" PetscInt_FMT
+    " vertices of body %s but none of its triangles, where element %s has its nodes: take a set that "
+    "contains whole triangles, such as a thicker plane or box",
+    on->option, nvert, mesh->body[b].name, space->element[b]->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -79,7 +79,7 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
 {
   const SbMesh mesh = s->mesh;
   const PetscInt nslot = SLOTS * mesh->ncell, nslot_owned = SLOTS * mesh->ncell_owned;
-  PetscInt *item, *number, *first, *last, *at, *ghost, nitem, nghost = 0;
+  PetscInt *item, *number, *first, *last, *at, *ghost, nitem = 0, nghost = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(nslot, &item, nslot, &number));

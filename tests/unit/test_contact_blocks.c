@@ -40,7 +40,6 @@ int main(int argc, char **argv)
 
   /* two rounds, so that data kept from one round to the next are tested */
   for (int round = 0; round < 2; round++) {
-    SbContactBlocksClear(&blocks);
     PetscCall(PetscArrayzero(&H[0][0], 9 * NV * NV));
     for (int k = 0; k < NPAIR; k++) {
       const PetscInt v = (5 * k + round) % NV, w = (k * k + 3) % NV;
@@ -84,6 +83,7 @@ int main(int argc, char **argv)
                got[i][j], wanted[i][j]);
   }
   PetscCall(PetscFree(spread.block));
-  PetscCall(SbContactBlocksFree(&blocks));
+  PetscCall(PetscFree(blocks.block));
+  PetscCall(PetscFree(blocks.slot));
   SB_TEST_END();
 }

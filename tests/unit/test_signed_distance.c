@@ -19,7 +19,8 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
   PetscCall(test_file_write(".off", PETSC_FALSE, s, NULL, path));
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(SbObstacleCreate("-o", text, o));
-  PetscCall(SbObstacleSetUp(*o, PETSC_COMM_WORLD, "-o", 1, zero, size, note));
+  note[0] = 0;
+  PetscCall(SbObstacleSetUp(*o, PETSC_COMM_WORLD, 1, zero, size, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -285,7 +286,7 @@ int main(int argc, char **argv)
   SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
-  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
                  "-o|no,such.stl");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(measure());

@@ -110,6 +110,7 @@ static PetscErrorCode check_ring(const char *element)
   PetscCall(SbSpaceFindSet(s, "boundary", "the test", &set));
   PetscCall(SbSpaceGetSetFacets(s, set, &nfacet, &facet));
   PetscCall(SbContactMeshCreate(s, nfacet, facet, NULL, &m));
+  m->self = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &x));
   for (PetscInt i = 0; i < m->nvertex; i++) {
     const PetscReal *X = m->X + 3 * i, turn = (2 * PETSC_PI + 0.7) / 2, r = 1 / turn + X[2] + 0.03 * X[0];
@@ -118,7 +119,7 @@ static PetscErrorCode check_ring(const char *element)
     x[3 * i + 1] = X[1];
     x[3 * i + 2] = r * PetscCosReal(turn * X[0]);
   }
-  PetscCall(SbContactOverlapFind(m, PETSC_TRUE, x, PETSC_FALSE, &o));
+  PetscCall(SbContactOverlapFind(m, x, PETSC_FALSE, &o));
   for (PetscInt i = 0; i < o.n; i++) {
     const PetscReal *p = x + 3 * o.point[i].v[0], *n = o.point[i].normal;
 
