@@ -70,7 +70,7 @@ static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edg
 static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], PetscInt *n, PetscInt **hits)
 {
   PetscInt nmine = 0, size = 0, *mine = NULL, hit;
-  SbBoxQuery query;
+  SbBoxNearest query;
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
@@ -80,7 +80,7 @@ static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], Petsc
 
     SbBoxClear(around);
     for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
-    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) {
+    for (SbBoxNearestBegin(&tree, around, 0, &query); SbBoxNearestNext(&query, &hit);) {
       if (!goes_through(m, x, e, hit)) continue;
       PetscCall(SbReserve(nmine + 2, sizeof(*mine), &size, &mine));
       mine[nmine++] = e;
