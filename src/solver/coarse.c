@@ -37,7 +37,8 @@ static PetscErrorCode free_pattern(SbCoarse c)
   PetscCall(PetscFree5(c->way, c->moved, c->unit, c->d, c->other));
   PetscCall(PetscFree3(c->centre, c->null, c->row_of));
   PetscCall(PetscFree2(c->weight, c->ia));
-  PetscCall(PetscFree2(c->ja, c->value));
+  PetscCall(PetscFree(c->ja));
+  PetscCall(PetscFree(c->value));
   PetscCall(VecDestroy(&c->c));
   PetscCall(VecDestroy(&c->y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -251,43 +252,40 @@ PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
 /* The rows of a unit have the units of its nodes' neighbours; ia, column: rows of A, own nodes and ghosts. */
 static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscInt column[])
 {
-  PetscInt *start, *member, *mark, nz = 0;
+  PetscInt *start, *member, *mark, nz = 0, size = 0;
 
   PetscFunctionBeginUser;
   /* nodes by unit; each is listed for each of its units */
   PetscCall(SbBucketByKey(2 * c->space->nnode_owned, c->unit, c->n, &start, &member));
   PetscCall(PetscCalloc1(c->n + c->nother, &mark));
-  for (PetscInt pass = 0; pass < 2; pass++) {
-    nz = 0;
-    for (PetscInt u = 0; u < c->n; u++) {
-      const PetscInt stamp = 1 + u + pass * c->n;
+  for (PetscInt u = 0; u < c->n; u++) {
+    const PetscInt stamp = 1 + u;
 
-      c->ia[u] = nz;
-      for (PetscInt m = start[u]; m < start[u + 1]; m++) {
-        for (PetscInt k = ia[member[m] / 2]; k < ia[member[m] / 2 + 1]; k++) {
-          for (PetscInt v = 2 * column[k]; v < 2 * column[k] + 2; v++) {
-            const PetscInt b = c->unit[v];
+    c->ia[u] = nz;
+    for (PetscInt m = start[u]; m < start[u + 1]; m++) {
+      for (PetscInt k = 2 * ia[member[m] / 2]; k < 2 * ia[member[m] / 2 + 1]; k++) {
+        const PetscInt v = 2 * column[k / 2] + k % 2, b = c->unit[v];
 
-            if (b < 0 || mark[b] == stamp) continue;
-            mark[b] = stamp;
-            for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++, nz++)
-              if (pass) c->ja[nz] = (b < c->n ? c->first + b : c->other[b - c->n]) + q;
-          }
-        }
-      }
-      if (pass) PetscCall(PetscSortInt(nz - c->ia[u], c->ja + c->ia[u]));
-      /* the rotation of an aggregate has the members of its translation */
-      if (start[u + 1] > start[u] && c->way[member[start[u]] / 2] == SB_MEMBER) {
-        const PetscInt length = nz - c->ia[u];
-
-        if (pass) PetscCall(PetscArraycpy(c->ja + nz, c->ja + nz - length, length));
-        c->ia[++u] = nz;
-        nz += length;
+        if (b < 0 || mark[b] == stamp) continue;
+        mark[b] = stamp;
+        PetscCall(SbReserve(nz + 2, sizeof(*c->ja), &size, &c->ja));
+        for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++)
+          c->ja[nz++] = (b < c->n ? c->first + b : c->other[b - c->n]) + q;
       }
     }
-    c->ia[c->n] = nz;
-    if (!pass) PetscCall(PetscMalloc2(nz, &c->ja, 9 * (size_t)nz, &c->value));
+    PetscCall(PetscSortInt(nz - c->ia[u], c->ja + c->ia[u]));
+    /* the rotation of an aggregate has the members of its translation */
+    if (start[u + 1] > start[u] && c->way[member[start[u]] / 2] == SB_MEMBER) {
+      const PetscInt length = nz - c->ia[u];
+
+      PetscCall(SbReserve(nz + length, sizeof(*c->ja), &size, &c->ja));
+      PetscCall(PetscArraycpy(c->ja + nz, c->ja + nz - length, length));
+      c->ia[++u] = nz;
+      nz += length;
+    }
   }
+  c->ia[c->n] = nz;
+  PetscCall(PetscMalloc1(9 * (size_t)nz, &c->value));
   PetscCall(PetscFree(mark));
   PetscCall(PetscFree(member));
   PetscCall(PetscFree(start));

@@ -59,7 +59,6 @@ static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
 
 PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
 {
-  const PetscInt width = c->aggregated ? 6 : 3;
   PetscInt *own, *foreign;
   const char *package;
 
@@ -72,7 +71,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
   // the matrix E, of 6x6 blocks for aggregates
   PetscCall(MatCreate(c->space->comm, &c->E));
   PetscCall(MatSetSizes(c->E, 3 * c->n, 3 * c->n, PETSC_DETERMINE, PETSC_DETERMINE));
-  PetscCall(MatSetBlockSize(c->E, width));
+  PetscCall(MatSetBlockSize(c->E, c->aggregated ? 6 : 3));
   PetscCall(MatSetType(c->E, MATAIJ));
   PetscCall(MatSeqAIJSetPreallocation(c->E, 0, own));
   PetscCall(MatMPIAIJSetPreallocation(c->E, 0, own, 0, foreign));

@@ -42,7 +42,7 @@ struct _p_SbContactSystem {
   PetscInt *ka, *kj; /* pattern of the tangent: [n+1]; [ka[n]] global nodes */
   PetscInt *place;   /* [ka[n]] position of the tangent's blocks in rows.value */
   PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
-  PetscInt *last;    /* [n] last solve in which contact used the row, -1: never */
+  PetscInt *until;   /* [n] last solve for which the node is in contact, KEEP after it was, 0: never */
   PetscInt nsolve;
   PetscInt limit, most;         /* limits of CG's iterations: by options; by the cost of a factorisation */
   PetscInt budget;              /* credit of iterations */
@@ -78,8 +78,7 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->space = s;
   c->choice = choice;
   c->rows.n = n;
-  PetscCall(PetscCalloc2(n, &c->last, n, &c->rows.contact));
-  for (PetscInt i = 0; i < n; i++) c->last[i] = -1;
+  PetscCall(PetscCalloc2(n, &c->until, n, &c->rows.contact));
   PetscCall(SbSpaceGetGraph(s, &c->ka, &c->kj));
   PetscCall(PetscMalloc2(c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
   PetscCall(PetscCalloc3(n + 1, &c->rows.ia, 0, &c->rows.ja, 0, &c->used));
@@ -113,7 +112,7 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
 static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
   const PetscInt n = c->rows.n;
-  PetscInt *key, *first, *order, *ia, *ja, *used, most = 0, nz = 0, *column, *stamp;
+  PetscInt *key, *first, *order, *ia, *ja, *used, nz = 0;
   const SbContactRows old = c->rows;
 
   PetscFunctionBeginUser;
@@ -122,15 +121,12 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   for (PetscInt k = 0; k < b->n; k++) key[k] = b->block[k].v[0];
   PetscCall(SbBucketByKey(b->n, key, n, &first, &order));
   PetscCall(PetscFree(key));
-  for (PetscInt r = 0; r < n; r++)
-    most = PetscMax(most, c->ka[r + 1] - c->ka[r] + first[r + 1] - first[r] + old.ia[r + 1] - old.ia[r]);
 
   /* each row: columns of the tangent, those of the old pattern still in use, those of contact */
-  PetscCall(PetscMalloc2(most, &column, most, &stamp));
   PetscCall(PetscMalloc3(n + 1, &ia, c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
   ia[0] = 0;
   for (PetscInt r = 0; r < n; r++) {
-    PetscInt m = 0;
+    PetscInt *column = ja + nz, *stamp = used + nz, m = 0;
 
     for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++, m++) {
       column[m] = c->kj[k];
@@ -147,16 +143,14 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
     }
     PetscCall(PetscSortIntWithArray(m, column, stamp));
     for (PetscInt k = 0; k < m; k++)
-      if (!k || column[k] != column[k - 1]) {
+      if (!k || column[k] != ja[nz - 1]) {
         ja[nz] = column[k];
         used[nz++] = stamp[k];
       } else
         used[nz - 1] = used[nz - 1] < 0 || stamp[k] < 0 ? -1 : PetscMax(used[nz - 1], stamp[k]);
     ia[r + 1] = nz;
-    c->rows.contact[r] =
-      (uint8_t)(c->space->fixed[r] != 7 && c->last[r] >= 0 && c->last[r] + KEEP >= c->nsolve);
+    c->rows.contact[r] = (uint8_t)(c->space->fixed[r] != 7 && c->until[r] >= c->nsolve);
   }
-  PetscCall(PetscFree2(column, stamp));
   PetscCall(PetscFree(order));
   PetscCall(PetscFree(first));
   PetscCall(PetscFree3(c->rows.ia, c->rows.ja, c->used));
@@ -181,7 +175,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt r = b->block[k].v[0];
 
-    c->last[r] = c->nsolve;
+    c->until[r] = c->nsolve + KEEP;
     missing = (PetscBool)(missing || SbRowFind(rows->ia, rows->ja, r, b->block[k].v[1]) < 0 ||
                           (c->space->fixed[r] != 7 && !rows->contact[r]));
   }
@@ -335,27 +329,11 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason)
-{
-  const SbContactRows *rows = &c->rows;
-  PetscBool ok = PETSC_TRUE;
-
-  PetscFunctionBeginUser;
-  if (!c->factor) PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
-  if (c->fresh[1])
-    PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value, c->foreign[1], &ok));
-  if (c->fresh[1]) c->foreign[1] = PETSC_FALSE;
-  c->fresh[1] = (PetscBool)!ok;
-  *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
-  if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBlockSolverSolve(c->factor, F, Y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks, PetscBool fresh, Vec F,
                                     Vec Y, KSPConvergedReason *reason, PetscInt *iterations)
 {
-  PetscBool factored, slow;
+  const SbContactRows *rows = &c->rows;
+  PetscBool factored, slow, ok = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
@@ -374,7 +352,14 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
     c->budget = 0;
   }
   if (factored || slow) {
-    PetscCall(factor(c, F, Y, reason));
+    if (!c->factor) PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
+    if (c->fresh[1]) {
+      PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value, c->foreign[1], &ok));
+      c->foreign[1] = PETSC_FALSE;
+    }
+    c->fresh[1] = (PetscBool)!ok;
+    if (ok) PetscCall(SbBlockSolverSolve(c->factor, F, Y));
+    *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
     ++*iterations;
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
@@ -390,7 +375,7 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));
-  PetscCall(PetscFree2(c->last, c->rows.contact));
+  PetscCall(PetscFree2(c->until, c->rows.contact));
   PetscCall(PetscFree2(c->ka, c->kj));
   PetscCall(PetscFree2(c->place, c->tangent));
   PetscCall(PetscFree3(c->rows.ia, c->rows.ja, c->used));

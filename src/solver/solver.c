@@ -600,12 +600,10 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
     PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
     PetscCall(KSPGMRESSetRestart(ksp, restart));
   }
-  PetscCall(SbKSPCheckNorm(ksp));
   /* check true residuals where no Newton step does, or where the method's norm is unreliable */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   if (s->constraints && s->constraints->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
-  PetscCall(SbKSPCheckTrueResidual(ksp, direct, single));
-  if (s->constraints) PetscCall(SbKSPSetForceTolerance(ksp));
+  PetscCall(SbKSPFinish(ksp, direct, single, (PetscBool)(s->constraints != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

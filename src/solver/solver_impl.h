@@ -4,32 +4,22 @@
 #pragma once
 #include "sbsolver.h"
 
-/* PETSC_ERR_USER if ksp does not support its norm and side. After KSPSetFromOptions(). Not collective. */
-PetscErrorCode SbKSPCheckNorm(KSP ksp);
-
 /*
-  SbKSPCheckTrueResidual - makes solves with a true residual far above the tolerance fail
-  (KSP_DIVERGED_BREAKDOWN).
+  SbKSPFinish - the norm and the convergence test of ksp, after KSPSetFromOptions().
 
-  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no
-  Newton step tests the residual afterwards. No check is added to an iteration that tests the true residual or
-  no norm, nor to one that tests another norm inside Newton's method.
+  Not collective. A solve with a true residual far above the tolerance fails (KSP_DIVERGED_BREAKDOWN); no check
+  is added to an iteration that tests the true residual or no norm, nor to one that tests another norm inside
+  Newton's method. Input: direct, the preconditioner is a factorisation; alone, no Newton step tests the
+  residual afterwards; forces, the absolute tolerance is one of the true residual, N, for any norm in the
+  convergence test: another norm has to decrease by the factor by which the true residual has to. The last is
+  without effect with -ksp_convergence_test of the user. Errors: PETSC_ERR_USER if the method does not have the
+  norm and side.
 */
-PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
+PetscErrorCode SbKSPFinish(KSP ksp, PetscBool direct, PetscBool alone, PetscBool forces);
 
 /* Makes ksp test the true residual, unless the user chose a norm or side, or the method does not compute it.
    After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
-
-/*
-  SbKSPSetForceTolerance - makes the absolute tolerance of ksp apply to the true residual, N, for any norm in
-  the convergence test.
-
-  Not collective; after KSPSetFromOptions(). Another norm has to decrease by the factor by which the true
-  residual has to. Without effect on a method that tests the true residual, or with -ksp_convergence_test of
-  the user.
-*/
-PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 
 /*
   SbPCConstrainedCreate - for a space with constraints outside the matrix: makes pc a preconditioner in the

@@ -51,22 +51,6 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *early)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone)
-{
-  PetscBool always;
-  KSPNormType norm;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &always));
-  PetscCall(KSPGetNormType(ksp, &norm));
-  /* inside Newton's method no check: its next residual is a better test than norms of different scale */
-  if ((direct && norm == KSP_NORM_UNPRECONDITIONED) ||
-      (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
-    always = PETSC_TRUE;
-  if (always || alone) PetscCall(KSPSetPostSolve(ksp, check_residual, always ? NULL : ksp));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* KSPConvergedDefault() with abstol as a tolerance of the true residual. */
 static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConvergedReason *reason, void *ctx)
 {
@@ -86,19 +70,6 @@ static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConverge
     *reason = KSP_CONVERGED_RTOL;
   else if (norm >= ksp->divtol * ksp->rnorm0 && n)
     *reason = KSP_DIVERGED_DTOL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbKSPSetForceTolerance(KSP ksp)
-{
-  KSPNormType norm;
-  PetscBool asked;
-
-  PetscFunctionBeginUser;
-  PetscCall(KSPGetNormType(ksp, &norm));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_convergence_test", &asked));
-  if (!asked && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL))
-    PetscCall(KSPSetConvergenceTest(ksp, converged, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,15 +96,18 @@ PetscErrorCode SbKSPPreferTrueResidual(KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbKSPCheckNorm(KSP ksp)
+PetscErrorCode SbKSPFinish(KSP ksp, PetscBool direct, PetscBool alone, PetscBool forces)
 {
   const KSPNormType asked = ksp->normtype_set;
   PetscInt any = 0;
+  PetscBool always, other, users;
   char norms[128] = "";
+  KSPNormType norm;
   KSPType type;
 
   PetscFunctionBeginUser;
-  for (KSPNormType norm = KSP_NORM_NONE; norm < KSP_NORM_MAX; norm++) {
+  /* whether the method has the norm and the side */
+  for (norm = KSP_NORM_NONE; norm < KSP_NORM_MAX; norm++) {
     if (!norm_support(ksp, norm)) continue;
     any += asked == KSP_NORM_DEFAULT || asked == norm;
     PetscCall(PetscStrlcat(norms, norms[0] ? ", " : "", sizeof(norms)));
@@ -147,5 +121,14 @@ PetscErrorCode SbKSPCheckNorm(KSP ksp)
              ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : " -ksp_pc_side ",
              ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : PCSides[ksp->pc_side_set],
              norms[0] ? norms : "none with that side");
+  /* inside Newton's method no check: its next residual is a better test than norms of different scale */
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &always));
+  PetscCall(KSPGetNormType(ksp, &norm));
+  other = (PetscBool)(norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL);
+  if ((direct && norm == KSP_NORM_UNPRECONDITIONED) || (alone && other)) always = PETSC_TRUE;
+  if (always || alone) PetscCall(KSPSetPostSolve(ksp, check_residual, always ? NULL : ksp));
+  /* the absolute tolerance */
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_convergence_test", &users));
+  if (forces && other && !users) PetscCall(KSPSetConvergenceTest(ksp, converged, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
