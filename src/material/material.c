@@ -143,7 +143,7 @@ SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPa
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
 
-    SbPackGet(9, (const SbPack *)R, l, r);
+    SbPackGet(9, R, l, r);
     SbPackGet(9, H, l, h);
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);
