@@ -148,10 +148,6 @@ PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
   Collective. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
 */
 PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
-/* Factorisations so far; bytes that an application reads on this rank: its interior's factor, twice, and its
-   rows of the interface's; nodes of the interface. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
-                                   PetscInt *nface);
 
 /* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the constraints.
    singular: K may be, if only constraints support some body: it is regularised for preconditioners, not for

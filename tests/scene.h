@@ -103,6 +103,26 @@ static inline PetscErrorCode test_scene_solve(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What PCView() prints, on all ranks. Collective. */
+static inline PetscErrorCode test_pc_view(PC pc, size_t size, char text[])
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)pc);
+  PetscViewer viewer;
+  char *all = NULL;
+  size_t length;
+  FILE *file = open_memstream(&all, &length);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscViewerASCIIOpenWithFILE(comm, file, &viewer));
+  PetscCall(PCView(pc, viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  (void)fclose(file);
+  PetscCall(PetscStrncpy(text, all, size));
+  free(all);
+  PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static inline PetscErrorCode test_scene_close(TestScene *scene)
 {
   PetscFunctionBeginUser;
@@ -155,5 +175,18 @@ static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3]
   PetscCall(VecGetArray(U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) f(s->node_x + 3 * i, u + 3 * i);
   PetscCall(VecRestoreArray(U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number behind these words in what PCView() prints, -1: they are not there. Collective. */
+static inline PetscErrorCode test_pc_number(PC pc, const char *words, double *number)
+{
+  char text[4096];
+  const char *at;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_pc_view(pc, sizeof(text), text));
+  at = strstr(text, words);
+  *number = at ? atof(at + strlen(words)) : -1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -55,7 +55,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   *factor = f;
   e = &f->e;
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
-  PetscCall(PetscMalloc1(e->nsuper + e->nfree / PANEL, &f->panel));
+  PetscCall(PetscMalloc3(e->nsuper + e->nfree / PANEL, &f->panel, 6 * e->nfree, &f->scale, 3 * n, &f->w));
   // a supernode is divided evenly into panels of at most PANEL nodes: their rows below and position of words
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
@@ -70,10 +70,8 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
     }
     f->tallest = PetscMax(f->tallest, 3 * nall);
   }
-  // storage of the panels, with room for reads beyond the end, and work arrays of a solve
+  // storage of the panels, with room for reads beyond the end, and of the rows below one of them
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
-  PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
-  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
   PetscCall(allocate_pages(sizeof(float) * (size_t)(f->tallest + ROWS), &f->below));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -106,12 +104,10 @@ PetscErrorCode SbFactorDestroy(SbFactor *f)
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbEliminationDestroy(&(*f)->e));
-  PetscCall(PetscFree((*f)->panel));
+  PetscCall(PetscFree3((*f)->panel, (*f)->scale, (*f)->w));
   PetscCall(PetscFree((*f)->column));
   PetscCall(PetscFree2((*f)->L, (*f)->y));
   free((*f)->word);
-  free((*f)->scale);
-  free((*f)->w);
   free((*f)->below);
   PetscCall(PetscFree(*f));
   PetscFunctionReturn(PETSC_SUCCESS);
