@@ -41,8 +41,10 @@ PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscI
 */
 PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
                                     uint32_t *tried, const SbSolverPreset **preset);
-/* Removes the row's options from the database unless their values differ. Not collective. */
-PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
+/* Adds options, such as "-key value", with a prefix to PETSc's database unless the user set them, or (clear)
+   removes those whose values are still the same. -ksp_type and -pc_type are skipped: they are set by calls,
+   so that types in the database are always the user's. Not collective. */
+PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear);
 /* Gives the solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and restores

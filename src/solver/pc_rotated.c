@@ -160,7 +160,7 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
-    PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
+    PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &p->factor));
     PetscCall(
       PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n, &p->diagonal));
     PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n, &p->x,
