@@ -90,6 +90,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscCall(SbOptionReal(&scope, "density", &density));
   PetscCall(SbMaterialCreateElastic(law, E, nu, density, material));
   m = *material;
+  PetscCall(PetscStrncpy(m->name, body->instance, sizeof(m->name)));
   if (SbOptionExists(&scope, "tangent")) {
     /* auto, then the tangents of the law: all or, without a warped one, the two exact ones */
     PetscCall(SbOptionChoice(&scope, "tangent", &choice));
