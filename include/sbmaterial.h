@@ -50,7 +50,7 @@ typedef struct {
 } SbMaterialOps;
 
 struct _p_SbMaterial {
-  char law[SB_NAME_MAX];
+  char law[SB_NAME_MAX], name[SB_NAME_MAX]; /* name: of the body or inclusion */
   PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
   PetscReal E, nu;      /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
@@ -71,7 +71,7 @@ extern PetscFunctionList SbMaterialList;
 PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial), const SbOption *tangent);
 /* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope of the body
+/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope of a body
    or inclusion (its `type` is not examined). The material is owned by the caller. Errors: PETSC_ERR_USER for
    an unknown law and for what the option readers refuse. Not collective, same on all ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);

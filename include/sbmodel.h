@@ -41,11 +41,10 @@ struct _p_SbModel {
   PetscInt nset;
   SbSet *set;
   PetscInt nmaterial;
-  SbMaterial *material;           /* [nmaterial] one per body, then those of inclusions */
-  char (*inclusion)[SB_NAME_MAX]; /* [nmaterial - nbody] names of the inclusions */
-  SbElement *element;             /* [nbody] */
-  SbStart *start;                 /* [nbody] */
-  PetscReal t_begin;              /* s, at set-up: 0, or the time of re-meshing */
+  SbMaterial *material; /* [nmaterial] one per body, then those of inclusions */
+  SbElement *element;   /* [nbody] */
+  SbStart *start;       /* [nbody] */
+  PetscReal t_begin;    /* s, at set-up: 0, or the time of re-meshing */
   SbMesh mesh;
   SbSpace space;
   PetscInt neffect;

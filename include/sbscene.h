@@ -5,16 +5,16 @@
 #include "sbledger.h"
 #include "sboutput.h"
 
-/* What the command line asks of the program beside the options of the scenario. */
+/* What the command line asks of the program beside the options of the scenario: words of argv, borrowed; NULL
+   when not asked for. */
 typedef struct {
-  PetscBool help, version;
-  char topic[SB_NAME_MAX];            /* of -help; "" without one */
-  PetscBool view;                     /* -scenario_view */
-  char view_file[PETSC_MAX_PATH_LEN]; /* "" for standard output */
-  char table[PETSC_MAX_PATH_LEN];     /* -options_table FILE; "" when not asked for */
-  char scenario[PETSC_MAX_PATH_LEN];  /* first word of the command line when it is no option */
+  const char *help;     /* topic, "" without one */
+  const char *view;     /* file of -scenario_view, "" for standard output */
+  const char *table;    /* file of -options_table, "-" for standard output */
+  const char *scenario; /* first word of the command line when it is no option */
+  PetscBool version;
   PetscInt nfile;
-  const char *file[16]; /* [nfile] scenario and other option files that can be read; of argv, borrowed */
+  const char *file[16];                   /* [nfile] scenario and other option files that can be read */
   char problem[PETSC_MAX_PATH_LEN + 256]; /* what is wrong with the command line; "" when nothing is */
 } SbCommand;
 

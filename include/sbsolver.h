@@ -41,8 +41,10 @@ PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscI
 */
 PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
                                     uint32_t *tried, const SbSolverPreset **preset);
-/* Removes the row's options from the database unless their values differ. Not collective. */
-PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
+/* Adds options, such as "-key value", with a prefix to PETSc's database unless the user set them, or (clear)
+   removes those whose values are still the same. -ksp_type and -pc_type are skipped: they are set by calls,
+   so that types in the database are always the user's. Not collective. */
+PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear);
 /* Gives the solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and restores
@@ -144,10 +146,6 @@ PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
   Collective. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
 */
 PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
-/* Factorisations so far; bytes that an application reads on this rank: its interior's factor, twice, and its
-   rows of the interface's; nodes of the interface. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
-                                   PetscInt *nface);
 
 /* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the constraints.
    singular: K may be, if only constraints support some body: it is regularised for preconditioners, not for

@@ -71,7 +71,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   /* initialise libraries and error handling */
   PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(SbCommandLine(&argc, argv, &command));
-  ierr = PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL);
+  ierr = PetscInitialize(&argc, &argv, command.scenario, NULL);
   if (ierr) SbErrorFindYamlLine();
   PetscCall(ierr);
   SbMemoryReturnLarge();
@@ -93,11 +93,11 @@ static PetscErrorCode supple(int argc, char *argv[])
 
   /* -help, -version, -options_table: print, without a simulation */
   if (command.help) {
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.topic));
+    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.help));
   } else if (command.version) {
     PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
-  } else if (command.table[0]) {
+  } else if (command.table) {
     PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
   } else {
     /* check options; nothing is computed yet */
@@ -113,7 +113,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     if (command.view) {
       PetscViewer viewer;
 
-      PetscCall(SbViewerOpen(PETSC_COMM_WORLD, command.view_file, &viewer));
+      PetscCall(SbViewerOpen(PETSC_COMM_WORLD, command.view, &viewer));
       PetscCall(SbOptionsView(viewer));
       PetscCall(PetscViewerDestroy(&viewer));
     } else

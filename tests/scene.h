@@ -190,3 +190,16 @@ static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3]
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* The number behind these words in what PCView() prints, -1: they are not there. Collective. */
+static inline PetscErrorCode test_pc_number(PC pc, const char *words, double *number)
+{
+  char text[4096];
+  const char *at;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_pc_view(pc, sizeof(text), text));
+  at = strstr(text, words);
+  *number = at ? atof(at + strlen(words)) : -1.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

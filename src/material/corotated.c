@@ -103,7 +103,7 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
     const PetscReal q = s[0][l] + s[1][l] + s[2][l];
     PetscReal v[9], w[3];
 
-    SbPackGet(9, (const SbPack *)V, l, v);
+    SbPackGet(9, V, l, v);
     for (int k = 0; k < 3; k++) {
       const PetscReal sum = q - s[k][l] > SMALLEST_SUM ? q - s[k][l] : SMALLEST_SUM, limit = -mu * sum;
 
@@ -128,13 +128,13 @@ SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9];
 
-    SbStretchTensor(F, (const SbPack *)R, l, r, S);
+    SbStretchTensor(F, R, l, r, S);
     kappa[l] = lambda * (S[0][l] + S[3][l] + S[5][l] - 3) - 2 * mu;
   }
   if (m->tangent == SB_TANGENT_EXACT_SPD)
-    twist_spd(mu, (const SbPack *)S, kappa, W);
+    twist_spd(mu, S, kappa, W);
   else
-    twist_exact((const SbPack *)S, kappa, W);
+    twist_exact(S, kappa, W);
 }
 
 /* C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and

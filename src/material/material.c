@@ -90,6 +90,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscCall(SbOptionReal(&scope, "density", &density));
   PetscCall(SbMaterialCreateElastic(law, E, nu, density, material));
   m = *material;
+  PetscCall(PetscStrncpy(m->name, body->instance, sizeof(m->name)));
   if (SbOptionFind(&scope, "tangent")) {
     /* auto, then the tangents of the law: all or, without a warped one, the two exact ones */
     PetscCall(SbOptionChoice(&scope, "tangent", &choice));
@@ -143,7 +144,7 @@ SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPa
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
 
-    SbPackGet(9, (const SbPack *)R, l, r);
+    SbPackGet(9, R, l, r);
     SbPackGet(9, H, l, h);
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);

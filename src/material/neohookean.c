@@ -94,8 +94,7 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
       twist[k][l] = shear + p * s[k][l];
     }
   }
-  SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
-                    (const SbPack *)twist, C);
+  SbSpectralTangent(U, V, hessian, flip, twist, C);
 }
 
 SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],

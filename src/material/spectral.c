@@ -108,9 +108,9 @@ SB_KERNEL void SbStretches(const SbPack F[restrict 9], SbPack U[restrict 9], SbP
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9];
 
-    SbStretchTensor(F, (const SbPack *)R, l, r, S);
+    SbStretchTensor(F, R, l, r, S);
   }
-  SbSymEig((const SbPack *)S, s, V);
+  SbSymEig(S, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], v[9], u[9];
 
@@ -165,7 +165,7 @@ SB_KERNEL void SbSpectralTangent(const SbPack U[restrict 9], const SbPack V[rest
 
   for (int k = 0; k < 3; k++) shear_modes(U, V, (k + 1) % 3, (k + 2) % 3, flip[k], twist[k], E[k], E[3 + k]);
   SbSymEig(hessian, m, Q);
-  for (int k = 0; k < 3; k++) stretch_mode(U, V, m[k], (const SbPack *)Q, k, E[6 + k]);
+  for (int k = 0; k < 3; k++) stretch_mode(U, V, m[k], Q, k, E[6 + k]);
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = ij; kl < 9; kl++) {
       SbPack c;

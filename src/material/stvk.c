@@ -78,8 +78,7 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
     twist[1][l] = p + mu * (c * c - c * a + a * a);
     twist[2][l] = p + mu * (a * a - a * b + b * b);
   }
-  SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
-                    (const SbPack *)twist, C);
+  SbSpectralTangent(U, V, hessian, flip, twist, C);
 }
 
 SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],

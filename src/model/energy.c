@@ -8,23 +8,15 @@
 #include "model_impl.h"
 #include "sblog.h"
 
-typedef enum {
-  KINETIC,
-  STRAIN,
-  VOLUME,
-  INVERTED,
-  MOMENTUM,
-  ANGULAR = MOMENTUM + 3,
-  CENTRE = ANGULAR + 3,
-  NSUM = CENTRE + 3
-} Sum;
-
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {
   SbSpace s = m->space;
   SbEvaluation at = {.U = U, .V = V};
   const PetscReal *u, *v;
-  PetscReal sum[NSUM] = {0.}, extreme[3] = {0.}, *p; /* extremes: speed^2, displacement^2, -min J */
+  struct {
+    PetscReal kinetic, strain, volume, inverted, momentum[3], angular[3], centre[3];
+  } sum = {0};
+  PetscReal extreme[3] = {0.}, *p; /* extremes: speed^2, displacement^2, -min J */
   PetscInt ninverted;
 
   PetscFunctionBeginUser;
@@ -32,46 +24,43 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   PetscCall(SbEvaluationBegin(m, 0., &at));
   u = at.stage.u;
   v = at.stage.v;
-  SbSpaceStrainEnergy(s, u, NULL, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]);
-  sum[INVERTED] = (PetscReal)ninverted;
+  SbSpaceStrainEnergy(s, u, NULL, &sum.strain, &extreme[2], &ninverted, &sum.volume);
+  sum.inverted = (PetscReal)ninverted;
   extreme[2] = -extreme[2];
   /* p = M v */
   PetscCall(PetscCalloc1(3 * s->nnode, &p));
   if (V) SbSpaceAddInertia(s, &(SbStage){.a = v}, p);
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal x[3], v2 = 0., u2 = 0.;
+    PetscReal x[3], L[3];
 
     for (PetscInt k = 0; k < 3; k++) {
       x[k] = s->node_x[3 * i + k] + u[3 * i + k];
-      u2 += u[3 * i + k] * u[3 * i + k];
-      sum[CENTRE + k] += s->node_mass[i] * x[k];
+      sum.centre[k] += s->node_mass[i] * x[k];
+      sum.momentum[k] += p[3 * i + k];
     }
-    extreme[1] = PetscMax(extreme[1], u2);
-    for (PetscInt k = 0; v && k < 3; k++) {
-      const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-
-      v2 += v[3 * i + k] * v[3 * i + k];
-      sum[KINETIC] += 0.5 * v[3 * i + k] * p[3 * i + k];
-      sum[MOMENTUM + k] += p[3 * i + k];
-      sum[ANGULAR + k] += x[k1] * p[3 * i + k2] - x[k2] * p[3 * i + k1];
-    }
-    extreme[0] = PetscMax(extreme[0], v2);
+    SbCross(x, p + 3 * i, L);
+    for (PetscInt k = 0; k < 3; k++) sum.angular[k] += L[k];
+    extreme[1] = PetscMax(extreme[1], SbDot3(u + 3 * i, u + 3 * i));
+    if (!v) continue;
+    extreme[0] = PetscMax(extreme[0], SbDot3(v + 3 * i, v + 3 * i));
+    sum.kinetic += 0.5 * SbDot3(v + 3 * i, p + 3 * i);
   }
   PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(PetscFree(p));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, NSUM, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, &sum, sizeof(sum) / sizeof(PetscReal), MPIU_REAL, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
-  e->kinetic = sum[KINETIC];
-  e->strain = sum[STRAIN];
-  e->volume = sum[VOLUME];
-  e->ninverted = (PetscInt)sum[INVERTED];
+  e->kinetic = sum.kinetic;
+  e->strain = sum.strain;
+  e->volume = sum.volume;
+  e->ninverted = (PetscInt)sum.inverted;
   e->max_speed = PetscSqrtReal(extreme[0]);
   e->max_displacement = PetscSqrtReal(extreme[1]);
   e->min_J = -extreme[2];
   for (PetscInt k = 0; k < 3; k++) {
-    e->momentum[k] = sum[MOMENTUM + k];
-    e->angular[k] = sum[ANGULAR + k];
-    e->centre[k] = sum[CENTRE + k] / m->mass;
+    e->momentum[k] = sum.momentum[k];
+    e->angular[k] = sum.angular[k];
+    e->centre[k] = sum.centre[k] / m->mass;
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

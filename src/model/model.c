@@ -29,7 +29,6 @@ PetscErrorCode SbModelDestroy(SbModel *model)
     }
   }
   PetscCall(PetscFree3(m->body, m->element, m->start));
-  PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
   PetscCall(PetscFree(m->set));
   PetscCall(PetscFree(*model));
@@ -52,7 +51,7 @@ static PetscErrorCode check_inclusions(SbModel m)
       PetscCheck(
         count[i], m->comm, PETSC_ERR_USER_INPUT,
         "-body_%s_inclusions: '%s' holds no tetrahedra of this body that an earlier inclusion has not taken",
-        m->body[b].name, m->inclusion[i - m->nbody]);
+        m->body[b].name, m->material[i]->name);
     }
   }
   PetscCall(PetscFree(count));

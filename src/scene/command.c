@@ -67,28 +67,20 @@ static PetscBool take_option(const char *name, const char *value, SbCommand *com
 {
   if (is_option(name, "help") || !strcmp(name, "-h")) {
     if (value && !strcasecmp(value, "petsc")) return PETSC_TRUE;
-    command->help = PETSC_TRUE;
-    (void)snprintf(command->topic, sizeof(command->topic), "%s", value ? value : "");
-    return PETSC_FALSE;
-  }
-  if (is_option(name, "scenario_view")) {
-    command->view = PETSC_TRUE;
-    (void)snprintf(command->view_file, sizeof(command->view_file), "%s", value ? value : "");
-    return PETSC_FALSE;
-  }
-  if (is_option(name, "options_table")) {
-    (void)snprintf(command->table, sizeof(command->table), "%s", value ? value : "-");
-    return PETSC_FALSE;
-  }
-  if (is_option(name, "version")) {
+    command->help = value ? value : "";
+  } else if (is_option(name, "scenario_view")) {
+    command->view = value ? value : "";
+  } else if (is_option(name, "options_table")) {
+    command->table = value ? value : "-";
+  } else if (is_option(name, "version")) {
     command->version = PETSC_TRUE;
-    return PETSC_FALSE;
-  }
-  if (value && (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
+  } else if (value && (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
     SbErrorSetFile(value);
     return readable(value, command);
+  } else {
+    return PETSC_TRUE;
   }
-  return PETSC_TRUE;
+  return PETSC_FALSE;
 }
 
 PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
@@ -112,8 +104,7 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
     } else if (i == 1) {
       argv[kept++] = argv[1];
       SbErrorSetFile(argv[1]);
-      if (readable(argv[1], command))
-        (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[1]);
+      if (readable(argv[1], command)) command->scenario = argv[1];
     } else if (!command->problem[0]) {
       (void)snprintf(command->problem, sizeof(command->problem),
                      strpbrk(argv[i], "./")

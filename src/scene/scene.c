@@ -212,9 +212,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
              "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name, n,
              SB_INCLUSION_MAX);
   PetscCall(PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
-  PetscCall(PetscRealloc((size_t)(model->nmaterial + n - model->nbody + 1) * SB_NAME_MAX, &model->inclusion));
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], inclusions[k], SB_NAME_MAX));
     SbScopeSet(&scope, "inclusion", "", inclusions[k]);
     PetscCall(read_type(&scope, "material", SbMaterialList, law));
     PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
@@ -373,7 +371,7 @@ static PetscErrorCode read_sets(SbModel model)
     SbBody *body = &model->body[b];
 
     for (PetscInt k = 0; k < body->ninclusion && model->nset <= SB_SET_MAX; k++) {
-      const char *name = model->inclusion[body->inclusion[k].material - model->nbody];
+      const char *name = model->material[body->inclusion[k].material]->name;
 
       PetscCall(use_name(model, name));
       body->inclusion[k].set = find_set(model, name);

@@ -101,13 +101,13 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
   /* keep the old order while its factor is not too large */
   b->factor = NULL;
   if (old && before == b->N) {
-    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, old, &b->factor));
+    PetscCall(SbFactorCreate(b->N, SB_FACTOR_EXACT, b->ia, b->ja, old, &b->factor));
     SbFactorCost(b->factor, &flops, &size);
     if (size > WORSE * b->dissected) PetscCall(SbFactorDestroy(&b->factor));
   }
   PetscCall(SbFactorDestroy(&old));
   if (!b->factor) {
-    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, NULL, &b->factor));
+    PetscCall(SbFactorCreate(b->N, SB_FACTOR_EXACT, b->ia, b->ja, NULL, &b->factor));
     SbFactorCost(b->factor, &flops, &b->dissected);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

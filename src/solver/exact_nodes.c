@@ -59,7 +59,7 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
     }
     ia[k + 1] = nz;
   }
-  PetscCall(SbFactorCreate(e->n, 0, ia, ja, &e->factor));
+  PetscCall(SbFactorCreate(e->n, 0, ia, ja, NULL, &e->factor));
   PetscCall(SbFactorNumeric(e->factor, ia, ja, block, NULL, &ok));
   PetscCall(PetscFree3(ia, ja, block));
   /* an indefinite block: no node is solved exactly */

@@ -44,8 +44,9 @@ struct _p_SbFactor {
 };
 
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                              SbFactor *factor)
+                              SbFactor old, SbFactor *factor)
 {
+  const PetscBool exact = (PetscBool)(nkeep == SB_FACTOR_EXACT);
   const SbElimination *e;
   SbFactor f;
 
@@ -54,8 +55,20 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscCall(PetscNew(&f));
   *factor = f;
   e = &f->e;
-  PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
-  PetscCall(PetscMalloc1(e->nsuper + e->nfree / PANEL, &f->panel));
+  PetscCall(SbEliminationCreate(n, exact ? 0 : nkeep, ia, ja, old ? old->e.order : NULL, &f->e));
+  if (exact) {
+    // positions of the supernodes' columns in L
+    PetscCall(PetscCalloc1(e->nsuper + 1, &f->column));
+    for (PetscInt g = 0; g < e->nsuper; g++) {
+      const PetscInt ncol = 3 * (e->first[g + 1] - e->first[g]), nall = 3 * (e->start[g + 1] - e->start[g]);
+
+      f->column[g + 1] = f->column[g] + (size_t)ncol * (size_t)nall;
+      f->tallest = PetscMax(f->tallest, nall);
+    }
+    PetscCall(PetscMalloc2(f->column[e->nsuper], &f->L, 3 * n + f->tallest, &f->y));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc3(e->nsuper + e->nfree / PANEL, &f->panel, 6 * e->nfree, &f->scale, 3 * n, &f->w));
   // a supernode is divided evenly into panels of at most PANEL nodes: their rows below and position of words
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
@@ -70,34 +83,9 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
     }
     f->tallest = PetscMax(f->tallest, 3 * nall);
   }
-  // storage of the panels, with room for reads beyond the end, and work arrays of a solve
+  // storage of the panels, with room for reads beyond the end, and of the rows below one of them
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
-  PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
-  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
   PetscCall(allocate_pages(sizeof(float) * (size_t)(f->tallest + ROWS), &f->below));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[], SbFactor old,
-                                   SbFactor *factor)
-{
-  const SbElimination *e;
-  SbFactor f;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&f));
-  *factor = f;
-  e = &f->e;
-  PetscCall(SbEliminationCreate(n, 0, ia, ja, old ? old->e.order : NULL, &f->e));
-  // positions of the supernodes' columns in L
-  PetscCall(PetscCalloc1(e->nsuper + 1, &f->column));
-  for (PetscInt g = 0; g < e->nsuper; g++) {
-    const PetscInt ncol = 3 * (e->first[g + 1] - e->first[g]), nall = 3 * (e->start[g + 1] - e->start[g]);
-
-    f->column[g + 1] = f->column[g] + (size_t)ncol * (size_t)nall;
-    f->tallest = PetscMax(f->tallest, nall);
-  }
-  PetscCall(PetscMalloc2(f->column[e->nsuper], &f->L, 3 * n + f->tallest, &f->y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,12 +94,10 @@ PetscErrorCode SbFactorDestroy(SbFactor *f)
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbEliminationDestroy(&(*f)->e));
-  PetscCall(PetscFree((*f)->panel));
+  PetscCall(PetscFree3((*f)->panel, (*f)->scale, (*f)->w));
   PetscCall(PetscFree((*f)->column));
   PetscCall(PetscFree2((*f)->L, (*f)->y));
   free((*f)->word);
-  free((*f)->scale);
-  free((*f)->w);
   free((*f)->below);
   PetscCall(PetscFree(*f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -33,13 +33,11 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
                                    const PetscInt order[], SbElimination *e);
 PetscErrorCode SbEliminationDestroy(SbElimination *e);
 
-/* SbFactorCreate - symbolic factorisation (arguments as above). Not collective. */
+#define SB_FACTOR_EXACT -1 /* for nkeep: an exact factor, in double precision, without kept nodes */
+/* SbFactorCreate - symbolic factorisation (arguments as above), in the order of elimination of an old factor
+   or (NULL) of METIS. Not collective. */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                              SbFactor *f);
-/* The same for an exact factor, in double precision, without kept nodes, in the order of elimination of an
-   old factor or (NULL) of METIS. Not collective. */
-PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[], SbFactor old,
-                                   SbFactor *f);
+                              SbFactor old, SbFactor *f);
 /*
   SbFactorNumeric - numeric factorisation.
 
@@ -59,7 +57,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 */
 void SbFactorForward(SbFactor f, const float b[], float kept[]);
 void SbFactorBackward(SbFactor f, const float kept[], float x[]);
-/* A x = b with a factor of SbFactorCreateExact(); b and x [n][3] may be the same. Not collective. */
+/* A x = b with an exact factor; b and x [n][3] may be the same. Not collective. */
 PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[]);
 /* Multiplications and additions of an exact factorisation; number of entries of the factor. */
 void SbFactorCost(SbFactor f, PetscReal *flops, PetscReal *entries);

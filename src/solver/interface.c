@@ -117,10 +117,9 @@ PetscErrorCode SbInterfaceCreate(SbSpace s, SbInterface *face)
   PetscCall(PetscMalloc1(s->nnode, &f->index));
   PetscCall(choose_nodes(s, f->index, &f->n));
   f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
-  PetscCall(PetscMalloc2(f->n, &f->mine, f->nblock, &f->rows));
+  PetscCall(PetscMalloc3(f->n, &f->mine, f->nblock, &f->rows, 6 * f->n, &f->scale));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (f->index[i] >= 0) f->mine[f->nmine++] = i;
-  PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->n, &f->scale));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->sum));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->y));
   *face = f;
@@ -132,11 +131,10 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
   free((*f)->word);
-  free((*f)->scale);
   free((*f)->sum);
   free((*f)->y);
   PetscCall(PetscFree((*f)->index));
-  PetscCall(PetscFree2((*f)->mine, (*f)->rows));
+  PetscCall(PetscFree3((*f)->mine, (*f)->rows, (*f)->scale));
   PetscCall(PetscFree(*f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

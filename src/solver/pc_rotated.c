@@ -160,7 +160,7 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
-    PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
+    PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &p->factor));
     PetscCall(
       PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n, &p->diagonal));
     PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n, &p->x,
@@ -303,17 +303,24 @@ static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
 
 static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 {
-  PetscReal flops, entries = 0.;
+  PetscReal flops, entries, all, most;
   Rotated *p;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  if (p->factor) SbFactorCost(p->factor, &flops, &entries);
-  PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "  factor of a past operator turned with the nodes: %" PetscInt_FMT
-                                   " factorisations, rank 0: %g million entries, %" PetscInt_FMT
-                                   " nodes exact, interface of %" PetscInt_FMT " nodes\n",
-                                   p->nfactor, 1e-6 * (double)entries, p->exact.n, p->face ? p->face->n : 0));
+  if (!p->factor) PetscFunctionReturn(PETSC_SUCCESS);
+  SbFactorCost(p->factor, &flops, &entries);
+  /* an application reads the factor of the interior twice */
+  all = most =
+    1e-6 * (PetscReal)(2 * SbFactorBytes(p->factor) + (PetscInt64)(sizeof(*p->face->word) * p->face->nword));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_REAL, MPI_SUM, p->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, p->space->comm));
+  PetscCall(PetscViewerASCIIPrintf(
+    viewer,
+    "  factor of a past operator turned with the nodes: %" PetscInt_FMT
+    " factorisations, rank 0: %g million entries, %" PetscInt_FMT " nodes exact, interface of %" PetscInt_FMT
+    " nodes; an application reads %g MB, at most %g of them on one rank\n",
+    p->nfactor, 1e-6 * (double)entries, p->exact.n, p->face->n, (double)all, (double)most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -359,19 +366,5 @@ PetscErrorCode SbPCRotatedCreate(SbSpace s, PC pc)
   PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Rotated));
   PetscCall(PCShellSetView(pc, PCView_Rotated));
   PetscCall(PCShellSetDestroy(pc, PCDestroy_Rotated));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
-                                   PetscInt *nface)
-{
-  Rotated *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &p));
-  if (nfactor) *nfactor = p->nfactor;
-  if (interior) *interior = p->factor ? 2 * SbFactorBytes(p->factor) : 0;
-  if (interface) *interface = p->face ? (PetscInt64)(sizeof(*p->face->word) * p->face->nword) : 0;
-  if (nface) *nface = p->face ? p->face->n : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

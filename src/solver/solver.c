@@ -364,13 +364,6 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbSolverSetDefaults("", preset->options, PETSC_TRUE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
   SbMatrixKind kind = preset->matrix;

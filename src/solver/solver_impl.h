@@ -59,11 +59,6 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
 
-/* Adds options, such as "-key value", with a prefix to PETSc's database unless the user set them, or (clear)
-   removes those whose values are still the same. -ksp_type and -pc_type are skipped: they are set by calls,
-   so that types in the database are always the user's. Not collective. */
-PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear);
-
 /* The context of a PCSHELL with this name, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context);
 

@@ -140,7 +140,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 
       if (model->material[k]->linear || model->material[k]->tangent == SB_TANGENT_EXACT) continue;
       SbFormat(sizeof(option), option, "-%s_%s_tangent", k < model->nbody ? "body" : "inclusion",
-               k < model->nbody ? model->body[k].name : model->inclusion[k - model->nbody]);
+               model->material[k]->name);
       PetscCall(PetscOptionsHasName(NULL, NULL, option, &given));
       PetscCheck(!given, model->comm, PETSC_ERR_USER_INPUT,
                  "-static_control arc_length needs exact tangents: leave %s out, or make it exact", option);

@@ -90,7 +90,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscFunctionBeginUser;
   /* remove the options of the old solver and its settings of the KSP, except tolerances */
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
-  PetscCall(SbSolverClear(old));
+  PetscCall(SbSolverSetDefaults("", old->options, PETSC_TRUE));
   PetscCall(KSPReset(ksp));
   PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
   PetscCall(PCCreate(PetscObjectComm((PetscObject)ksp), &pc));

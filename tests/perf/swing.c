@@ -9,32 +9,23 @@
 #include "sbsolver.h"
 #include "perf.h"
 
-/* Bytes that one application of a factor that turns reads: on the busiest rank, and of that the interface; of all ranks. */
+/* Bytes that one application of a factor that turns reads, on the busiest rank and on all. */
 static PetscErrorCode tell_work(SNES snes)
 {
-  PetscInt64 work[3] = {0}, all[3];
-  PetscInt nface;
-  const char *name;
-  PetscBool shell;
+  double nface, most, all;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &shell));
-  if (!shell) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCShellGetName(pc, &name));
-  if (!name || strcmp(name, "rotated factor")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbPCRotatedGetStats(pc, NULL, &work[0], &work[1], &nface));
-  work[2] = work[0] + work[1];
-  PetscCallMPI(MPI_Allreduce(work, all, 3, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
-  PetscCall(perf_fact("interface_nodes", (double)nface));
-  PetscCall(perf_fact("busiest_interior_bytes", (double)all[0]));
-  PetscCall(perf_fact("busiest_interface_bytes", (double)all[1]));
-  PetscCall(perf_fact("busiest_bytes", (double)all[2]));
-  PetscCallMPI(MPI_Allreduce(&work[2], &all[2], 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
-  PetscCall(perf_fact("bytes", (double)all[2]));
+  PetscCall(test_pc_number(pc, "interface of ", &nface));
+  if (nface < 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(test_pc_number(pc, "at most ", &most));
+  PetscCall(test_pc_number(pc, "reads ", &all));
+  PetscCall(perf_fact("interface_nodes", nface));
+  PetscCall(perf_fact("busiest_bytes", 1e6 * most));
+  PetscCall(perf_fact("bytes", 1e6 * all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -75,7 +75,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   PetscCall(PetscMalloc1(m + 1, &kept));
   for (PetscInt i = 0; i < m; i++)
     for (PetscInt j = 0; j < m; j++) schur[i * m + j] = p->dense[(free + i) * n + free + j];
-  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &f));
+  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &f));
   for (int again = 0; again < 2; again++) {
     PetscReal *work = NULL;
 
@@ -120,7 +120,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     PetscReal *z;
 
     PetscCall(PetscMalloc1(n, &z));
-    PetscCall(SbFactorCreateExact(p->n, p->ia, p->ja, old, &f));
+    PetscCall(SbFactorCreate(p->n, SB_FACTOR_EXACT, p->ia, p->ja, old, &f));
     PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, NULL, &ok));
     SB_CHECK(ok, "%s: not positive definite when kept as it is", name);
     for (PetscInt i = 0; i < n; i++) {
@@ -150,7 +150,7 @@ static PetscErrorCode check_schur(Problem *p)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(m * m, &mine));
   for (PetscInt i = 0; i < m * m; i++) mine[i] = p->dense[(free + i / m) * n + free + i % m];
-  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &f));
+  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &f));
   PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, mine, &ok));
   PetscCall(SbFactorDestroy(&f));
   for (PetscInt k = 0; k < free; k++) {
@@ -174,7 +174,7 @@ static PetscErrorCode check_indefinite(Problem *p)
   PetscBool ok = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFactorCreate(p->n, 0, p->ia, p->ja, &f));
+  PetscCall(SbFactorCreate(p->n, 0, p->ia, p->ja, NULL, &f));
   for (PetscInt k = p->ia[5]; k < p->ia[6]; k++)
     if (p->ja[k] == 5) p->block[9 * k] = -1.;
   PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, NULL, &ok));

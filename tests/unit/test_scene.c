@@ -226,9 +226,8 @@ static PetscErrorCode test_command(void)
   SB_CHECK(argc == 8 && !argv[8], "%d words are left", argc);
   for (int i = 0; i < PetscMin(argc, 8); i++)
     SB_CHECK(!strcmp(argv[i], expected[i]), "word %d is %s", i, argv[i]);
-  SB_CHECK(command.help && command.version && command.view && !strcmp(command.view_file, "v.opts"),
-           "requests");
-  SB_CHECK(!command.scenario[0] && !command.table[0], "scenario '%s'", command.scenario);
+  SB_CHECK(command.help && command.version && command.view && !strcmp(command.view, "v.opts"), "requests");
+  SB_CHECK(!command.scenario && !command.table, "a scenario or a table nobody asked for");
   SB_CHECK(!strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"), "%s",
            command.problem);
   argc = 2;
