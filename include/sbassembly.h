@@ -96,9 +96,10 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
   Nodal values that strains are computed from, u[3 nnode]: of the cells' nodes; for DG the means m = p + w (u
   - p) of the own node u and the one across the face p.
 */
-static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                                    SbPack u[30])
+static inline void sb_gather_strain(SbSpace s, PetscInt b, const PetscReal x[], SbPack u[30])
 {
+  const SbRegion *region = s->batch_region[b];
+
   /* loops of constant length */
   if (region->nnode == 4)
     sb_gather_nodes(4, sb_batch_nodes(s, b), x, u);
@@ -130,9 +131,10 @@ SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, co
 }
 
 /* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
-static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbPack fe[30],
-                                     PetscReal f[])
+static inline void sb_scatter_strain(SbSpace s, PetscInt b, SbPack fe[30], PetscReal f[])
 {
+  const SbRegion *region = s->batch_region[b];
+
   if (region->broken) {
     SbPack p[12];
 
@@ -196,6 +198,7 @@ typedef struct {
   Mat part[2];         /* the second one NULL on one rank */
   PetscScalar *value[2];
 } SbMatBlocks;
-/* To read a block matrix, BAIJ or SBAIJ. Not collective. Error: PETSC_ERR_SUP for another kind. */
-PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *blocks);
+/* Lends the values of a block matrix, BAIJ or SBAIJ or, if `aij`, AIJ; its state stays. Not collective.
+   Error: PETSC_ERR_SUP for another kind. */
+PetscErrorCode SbMatGetBlocks(Mat A, PetscBool aij, SbMatBlocks *blocks);
 PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *blocks);

@@ -23,11 +23,9 @@ typedef struct {
   PetscInt body;
   SbMaterial material;   /* borrowed from the model */
   SbElement element;     /* borrowed */
-  PetscInt cstart, cend; /* local cells */
   PetscInt bstart, bend; /* batches; the last one may be partly filled */
-  PetscBool owned;
-  PetscBool broken;    /* DG: strains come from the means of the two sides of each face */
-  PetscBool quadratic; /* P2: strains at the points of SbRuleQuadratic, or SbRuleQuintic where curved */
+  PetscBool broken;      /* DG: strains come from the means of the two sides of each face */
+  PetscBool quadratic;   /* P2: strains at the points of SbRuleQuadratic, or SbRuleQuintic where curved */
   /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points
      [batch][SB_POINTS]([9]), lumped mass / (density V) [batch][10]; their memory is the space's */
   SbPack *curve_g, *curve_weight, *curve_mass;
@@ -62,14 +60,15 @@ struct _p_SbSpace {
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
-  SbRegion *region;     /* [nregion] */
-  PetscInt nbatch;      /* SB_BATCH cells side by side; a batch never mixes regions */
-  PetscInt *batch_cell; /* [nbatch] first local cell */
-  PetscInt *batch_n;    /* [nbatch] cells in it, 1..SB_BATCH */
-  PetscInt *batch_node; /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  PetscInt width;       /* nodes that the stress of a cell acts on at most: 4, 8 with DG, 10 with P2 */
-  /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of
-     P2 at the edges (again its own where there is no other); batch_node itself when width is 4 */
+  SbRegion *region;        /* [nregion] */
+  PetscInt nbatch;         /* SB_BATCH cells side by side; a batch never mixes regions */
+  PetscInt nbatch_owned;   /* those of owned cells come first */
+  SbRegion **batch_region; /* [nbatch] */
+  PetscInt *batch_cell;    /* [nbatch] first local cell */
+  PetscInt *batch_n;       /* [nbatch] cells in it, 1..SB_BATCH */
+  PetscInt width;          /* nodes that the stress of a cell acts on at most: 4, 8 with DG, 10 with P2 */
+  /* [nbatch][width][SB_BATCH] these nodes (padding repeats the first cell): the four, then those across the
+     faces, or those of P2 at the edges (again its own where there is no other) */
   PetscInt *batch_clique;
   SbPack *batch_weight;      /* [nbatch][4] of a cell's own node in the mean of the two; NULL without DG */
   SbJump jump;               /* NULL without face nodes */
@@ -164,12 +163,10 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt
    the callers. */
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
-/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u. Right on owned nodes. Not collective. */
-void SbSpaceAddVolumeForce(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
-                           PetscReal f[]);
-/* A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
-PetscErrorCode SbSpaceAddVolumeTangent(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
-                                       Mat A);
+/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with f NULL, A +=
+   factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
+PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
+                                PetscReal f[], Mat A);
 
 /* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks with the node do it. */
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);

@@ -247,7 +247,7 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b]) SbSpaceAddVolumeForce(space, b, u, -p, f);
+    if (load->whole[b]) PetscCall(SbSpaceAddVolume(space, b, u, -p, f, NULL));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
       PetscReal side[2][3] = {{0}}, N[3];
@@ -273,7 +273,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b]) PetscCall(SbSpaceAddVolumeTangent(space, b, stage->u, p, A));
+    if (load->whole[b]) PetscCall(SbSpaceAddVolume(space, b, stage->u, p, NULL, A));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     PetscReal c[SB_CELL_NODES][SB_CELL_NODES][3] = {{{0}}};
     FacetPoint at;

@@ -28,7 +28,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     PetscCall(SbMatrixFreeAddRows(A, n, node, ia, block));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbValuesBegin(A, &b));
+  PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &b));
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = node ? node[k] : k, nd = p->di[i + 1] - p->di[i];
 

@@ -10,47 +10,36 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, PetscReal f[])
-{
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbPack U[30], F[SB_POINTS][9], P[9], fe[30];
-
-      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
-      for (int l = 0; l < SB_BATCH; l++) {
-        PetscReal one[9], cofactor[9];
-
-        SbPackGet(9, (const SbPack *)F[0], l, one);
-        SbMatCofactor(one, cofactor);
-        for (int k = 0; k < 9; k++) P[k][l] = factor * cofactor[k];
-      }
-      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
-      sb_scatter_strain(s, region, b, fe, f);
-    }
-  }
-}
-
-PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, Mat A)
+PetscErrorCode SbSpaceAddVolume(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor,
+                                PetscReal f[], Mat A)
 {
   SbMatBlocks values;
 
   PetscFunctionBeginUser;
-  PetscCall(SbValuesBegin(A, &values));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  if (!f) PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &values));
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    SbPack U[30], F[SB_POINTS][9], P[9], fe[30], C[81], scale, K[10][9] __attribute__((aligned(64)));
 
-    for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbPack U[30], F[SB_POINTS][9], C[81] = {{0}}, scale, K[10][9] __attribute__((aligned(64)));
-
-      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
+    if (s->batch_region[b]->body != body) continue;
+    SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
+    if (!f) {
+      memset(C, 0, sizeof(C));
       for (int l = 0; l < SB_BATCH; l++) scale[l] = s->block_scale * factor;
       SbAddCofactorTangent((const SbPack *)F[0], scale, C);
       SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)C, K);
-      SbInsertBatch(s, &values, b, 10, region->broken, (const SbPack(*)[9])K);
+      SbInsertBatch(s, &values, b, 10, s->batch_region[b]->broken, (const SbPack(*)[9])K);
+      continue;
     }
+    for (int l = 0; l < SB_BATCH; l++) {
+      PetscReal one[9], cofactor[9];
+
+      SbPackGet(9, (const SbPack *)F[0], l, one);
+      SbMatCofactor(one, cofactor);
+      for (int k = 0; k < 9; k++) P[k][l] = factor * cofactor[k];
+    }
+    SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
+    sb_scatter_strain(s, b, fe, f);
   }
-  PetscCall(SbValuesEnd(&values));
+  if (!f) PetscCall(SbMatRestoreBlocks(&values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,9 +31,6 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /* tangent.c: the table of SbMatrixSetAssembly(), NULL for a matrix of blocks. */
 PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly);
-/* Borrows the values of any matrix; its state increases in SbSpaceFinishTangent(). Not collective. */
-PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x);
-PetscErrorCode SbValuesEnd(SbMatBlocks *x);
 
 /* Address of block k (as in SbPlan.offset) of a row, and the distances between its rows and columns. */
 static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row, PetscInt k,
@@ -78,15 +75,15 @@ typedef struct {
   const SbPack *g, *V;     /* gradients; V[0]: volume of the cell */
   const SbPack *weight;    /* [n] fractions of the volume */
 } SbPoints;
-SbPoints SbBatchPoints(SbSpace space, const SbRegion *region, PetscInt b);
+SbPoints SbBatchPoints(SbSpace space, PetscInt b);
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
 }
 /* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: less I). */
-void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
-                      SbPack U[30], SbPack F[SB_POINTS][9]);
+void SbBatchGradients(SbSpace space, PetscInt b, const PetscReal x[], PetscBool rate, SbPack U[30],
+                      SbPack F[SB_POINTS][9]);
 /* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one point). */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /* The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
@@ -99,14 +96,13 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
   return at->step ? at->rule : &SbRuleCubic;
 }
 /* Evaluates the law at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
-void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
-                  SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
-                  SbPack pressure[SB_POINTS]);
+void SbBatchState(SbSpace space, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
+                  SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS]);
 /* residual.c: f += elastic forces of a region (if `elastic`) and of damping by beta, s; u NULL: rest. */
 void SbRegionForces(SbSpace space, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[]);
 /* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair, m^3. */
-void SbBatchMass(SbSpace space, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS]);
+void SbBatchMass(SbSpace space, PetscInt b, SbPack mass[SB_PAIRS]);
 
 /* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means at faces. K is
    32-byte aligned. */

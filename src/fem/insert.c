@@ -48,7 +48,7 @@ SB_INLINE void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npa
   PetscReal weight[8], k[9];
 
   for (int l = 0; l < s->batch_n[b]; l++) {
-    const PetscInt *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
+    const PetscInt *node = sb_batch_nodes(s, b) + l;
     const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
 
     for (int a = 0; a < 4 && broken; a++) {
@@ -176,7 +176,7 @@ void SbInsertBatch(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, Petsc
                    const SbPack K[][9])
 {
   const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH,
-                 *node = s->batch_node + 4 * SB_BATCH * b;
+                 *node = sb_batch_nodes(s, b);
   PetscInt last = 0;
 
   if (broken)

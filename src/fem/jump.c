@@ -181,10 +181,9 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 
 /* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
    twist modes; keep: m may not decrease. Returns whether some m changed. */
-static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                              PetscReal factor, PetscBool keep)
+static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal factor, PetscBool keep)
 {
-  const SbMaterial m = region->material;
+  const SbMaterial m = s->batch_region[b]->material;
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
   PetscBool changed = PETSC_FALSE;
@@ -194,7 +193,7 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
     before[l] = modulus[l];
     if (!keep) modulus[l] = m->mu;
   }
-  sb_gather_strain(s, region, b, x, u);
+  sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
   m->ops.stress(m, (const SbPack *)F, P);
 
@@ -354,12 +353,9 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
   PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
 
   s->jump->renew = PETSC_FALSE;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
-
-    for (PetscInt b = region->bstart; jumps && b < region->bend; b++)
-      if (follow_batch(s, region, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED))) any = PETSC_TRUE;
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear) continue;
+    if (follow_batch(s, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED))) any = PETSC_TRUE;
   }
   return any;
 }

@@ -299,57 +299,42 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a
-   face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting does not depend on
-   the volumes and moduli on the two sides (docs/reference/theory.md). */
+/* Nodes of the batches, for DG with those opposite across the faces, and the weights of both sides. The mean of
+   the two sides of a face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting
+   does not depend on the volumes and moduli on the two sides (docs/reference/theory.md). */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
   PetscReal *stiffness;
   PetscBool broken = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  s->width = s->edge_node ? SB_CELL_NODES : 4;
-  s->batch_clique = s->batch_node;
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    if (!s->element[b]->nodes_per[3]) continue;
-    broken = PETSC_TRUE;
-    s->width = PetscMax(8, s->width);
-  }
-  if (s->width == 4) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt b = 0; b < s->mesh->nbody; b++)
+    if (s->element[b]->nodes_per[3]) broken = PETSC_TRUE;
+  s->width = s->edge_node ? SB_CELL_NODES : broken ? 8 : 4;
   PetscCall(PetscMalloc1(s->nbatch * s->width * SB_BATCH, &s->batch_clique));
-  for (PetscInt k = 0; k < s->width * SB_BATCH * s->nbatch; k++) {
-    const PetscInt b = k / (s->width * SB_BATCH), a = k / SB_BATCH % s->width, l = k % SB_BATCH,
-                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
-
-    s->batch_clique[k] = s->edge_node && a >= 4 && s->edge_node[6 * cell] != UNKNOWN
-                           ? s->edge_node[6 * cell + a - 4]
-                           : s->cell_node[4 * cell + a % 4];
-  }
-  if (!broken) PetscFunctionReturn(PETSC_SUCCESS);
+  if (broken) PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
   PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
   for (PetscInt b = 0; b < s->nbatch; b++)
-    for (PetscInt l = 0, c = s->batch_cell[b]; l < s->batch_n[b]; l++, c++)
-      stiffness[c] = SbMaterialWaveModulus(s->material[s->mesh->cell_material[c]]) / s->batch_V[b][l];
-  PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
-  for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
-    const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH,
-                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++)
+      stiffness[s->batch_cell[b] + l] =
+        SbMaterialWaveModulus(s->batch_region[b]->material) / s->batch_V[b][l];
+  for (PetscInt k = 0; k < s->width * SB_BATCH * s->nbatch; k++) {
+    const PetscInt b = k / (s->width * SB_BATCH), a = k / SB_BATCH % s->width, l = k % SB_BATCH,
+                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0), face = 4 * cell + a % 4;
+    PetscInt *node = &s->batch_clique[k];
 
-    PetscInt *node = &s->batch_clique[(s->width * b + 4 + a) * SB_BATCH + l];
-    PetscReal *weight = &s->batch_weight[4 * b + a][l];
-
-    /* the node opposite across face a, and the weight of the cell's own node in the mean */
-    *weight = 1.;
-    if (!SbSpaceCellElement(s, cell)->nodes_per[3]) continue;
-    *node = s->cell_node[4 * cell + a];
-    if (s->neighbour[4 * cell + a] >= 0) {
-      const PetscInt other = s->neighbour[4 * cell + a];
+    *node = s->batch_region[b]->quadratic && a >= 4 ? s->edge_node[6 * cell + a - 4] : s->cell_node[face];
+    if (broken && a < 4) s->batch_weight[4 * b + a][l] = 1.;
+    if (!s->batch_region[b]->broken || a / 4 != 1) continue;
+    /* the node opposite across the face, and the weight of the cell's own node in the mean */
+    if (s->neighbour[face] >= 0) {
+      const PetscInt other = s->neighbour[face];
 
       *node = s->cell_node[4 * other + face_towards(s, other, cell)];
-      *weight = stiffness[cell] / (stiffness[cell] + stiffness[other]);
-    } else if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] != UNKNOWN) {
-      *node = s->dirichlet_node[4 * cell + a];
-      *weight = 0.;
+      s->batch_weight[4 * b + a - 4][l] = stiffness[cell] / (stiffness[cell] + stiffness[other]);
+    } else if (s->dirichlet_node && s->dirichlet_node[face] != UNKNOWN) {
+      *node = s->dirichlet_node[face];
+      s->batch_weight[4 * b + a - 4][l] = 0.;
     }
   }
   PetscCall(PetscFree(stiffness));

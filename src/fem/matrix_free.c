@@ -103,11 +103,11 @@ SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscR
 }
 
 /* q += A p for the batches of one region, gradients `stride` apart. Padding lanes have volume zero. */
-SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscInt stride,
+SB_KERNEL static void apply_region(PetscInt nbatch, PetscInt width, const PetscInt *node, PetscInt stride,
                                    const SbPack *gradients, const SbPack *volume, PetscReal lambda,
                                    PetscReal mu, const PetscReal *p, PetscReal *q)
 {
-  for (PetscInt b = 0; b < nbatch; b++, node += 4 * SB_BATCH) {
+  for (PetscInt b = 0; b < nbatch; b++, node += width * SB_BATCH) {
     const Eight *h = (const Eight *)(gradients + stride * b), *V = (const Eight *)(volume + b);
     Eight u[4][3], H[9], f[4][3];
 
@@ -203,8 +203,8 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
     if (region->quadratic)
       apply_quadratic(n, s->width, sb_batch_nodes(s, b), h, V, lambda, o->mu[r], o->p, o->q);
     else
-      apply_region(n, s->batch_node + 4 * SB_BATCH * b, 9 * sb_rotation_points(s), h, V, o->lambda[r],
-                   o->mu[r], o->p, o->q);
+      apply_region(n, s->width, sb_batch_nodes(s, b), 9 * sb_rotation_points(s), h, V, o->lambda[r], o->mu[r],
+                   o->p, o->q);
   }
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
@@ -364,54 +364,50 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
     wanted[i] = k;
     for (PetscInt c = 0; c < 3; c++) block[9 * (ia[k] + p->diagonal[i] - p->di[i]) + 4 * c] += o->inertia[i];
   }
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
     const PetscBool mean = (PetscBool)(region->quadratic && region->pointwise != region->material);
-    const PetscInt npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscInt r = (PetscInt)(region - s->region), npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscInt *corner = sb_batch_nodes(s, b);
+    const SbPoints points = SbBatchPoints(s, b);
+    PetscBool any = PETSC_FALSE;
+    SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), B[4][10][9] __attribute__((aligned(64)));
+    SbPack factor, volume[30] = {{0}};
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const PetscInt *corner = s->batch_clique + s->width * SB_BATCH * b;
-      const SbPoints points = SbBatchPoints(s, region, b);
-      PetscBool any = PETSC_FALSE;
-      SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), B[4][10][9] __attribute__((aligned(64)));
-      SbPack factor, volume[30] = {{0}};
+    for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
+    if (!any) continue;
+    // the points, and for P2 lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
+    for (int q = 0; q < points.n; q++) {
+      const SbPack *R = (const SbPack *)o->R + 9 * (sb_rotation_points(s) * b + q);
+      SbPack V;
 
-      for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++)
-        any = (PetscBool)(any || wanted[corner[l]] >= 0);
-      if (!any) continue;
-      // the points, and for P2 lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
-      for (int q = 0; q < points.n; q++) {
-        const SbPack *R = (const SbPack *)o->R + 9 * (sb_rotation_points(s) * b + q);
-        SbPack V;
+      SbPointVolume(&points, q, V);
+      SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
+      if (region->quadratic) SbPointForce(&points, q, R, volume);
+    }
+    for (PetscInt l = 0; l < SB_BATCH; l++) {
+      const PetscReal V = s->batch_V[b][l];
 
-        SbPointVolume(&points, q, V);
-        SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
-        if (region->quadratic) SbPointForce(&points, q, R, volume);
-      }
-      for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscReal V = s->batch_V[b][l];
+      factor[l] = mean && V > 0. ? o->lambda[r] / V : 0.;
+    }
+    if (region->quadratic)
+      SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
+    else
+      memcpy(K, B[0], sizeof(B[0]));
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const size_t start = (size_t)b * s->width * s->width * SB_BATCH + l;
 
-        factor[l] = mean && V > 0. ? o->lambda[r] / V : 0.;
-      }
-      if (region->quadratic)
-        SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
-      else
-        memcpy(K, B[0], sizeof(B[0]));
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const size_t start = (size_t)b * s->width * s->width * SB_BATCH + l;
+      for (PetscInt turn = 0; turn < 2 * npair; turn++) {
+        const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],
+                       c = turn % 2 ? SbPairA[pair] : SbPairB[pair];
+        const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
 
-        for (PetscInt turn = 0; turn < 2 * npair; turn++) {
-          const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],
-                         c = turn % 2 ? SbPairA[pair] : SbPairB[pair];
-          const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
+        if (k < 0 || (a == c && turn % 2)) continue;
+        const PetscInt position = p->offset[start + (size_t)(SB_BATCH * (s->width * a + c))];
+        const PetscInt at =
+          ia[k] + (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
 
-          if (k < 0 || (a == c && turn % 2)) continue;
-          const PetscInt position = p->offset[start + (size_t)(SB_BATCH * (s->width * a + c))];
-          const PetscInt at =
-            ia[k] + (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
-
-          for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][turn % 2 ? 3 * (e % 3) + e / 3 : e][l];
-        }
+        for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][turn % 2 ? 3 * (e % 3) + e / 3 : e][l];
       }
     }
   }

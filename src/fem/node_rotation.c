@@ -14,17 +14,14 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
 {
   const PetscInt stride = 9 * sb_rotation_points(s);
 
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
+    SbPack U[30], F[SB_POINTS][9];
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      SbPack U[30], F[SB_POINTS][9];
-
-      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
-      /* for a curved cell at the first four of its points */
-      for (int q = 0; q < (region->quadratic ? 4 : 1); q++)
-        SbMaterialRotation(region->material, (const SbPack *)F[q], R + stride * b + 9 * q);
-    }
+    SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
+    /* for a curved cell at the first four of its points */
+    for (int q = 0; q < (region->quadratic ? 4 : 1); q++)
+      SbMaterialRotation(region->material, (const SbPack *)F[q], R + stride * b + 9 * q);
   }
 }
 
@@ -47,7 +44,7 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal no
   PetscCall(PetscCalloc1(9 * s->nnode, &sum));
   /* sum[nnode][9] += V R of every cell at its nodes. */
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b;
+    const PetscInt *node = sb_batch_nodes(s, b);
 
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       const PetscInt n = cell_rotation(s, R, b, l, r);
@@ -77,7 +74,7 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal no
   if (spread) {
     for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
     for (PetscInt b = 0; b < s->nbatch; b++) {
-      const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b;
+      const PetscInt *node = sb_batch_nodes(s, b);
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscInt n = cell_rotation(s, R, b, l, r);

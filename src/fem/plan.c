@@ -154,7 +154,7 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 
   /* a pair of nodes belongs to the row of the lower one; ~u: its block has to be transposed */
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b,
+    const PetscInt *node = sb_batch_nodes(s, b),
                    *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
     PetscInt *upper = p->upper + (size_t)(b * p->npair) * SB_BATCH;
 

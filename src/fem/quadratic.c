@@ -17,10 +17,11 @@
 */
 #include "fem_impl.h"
 
-SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
+SbPoints SbBatchPoints(SbSpace s, PetscInt b)
 {
   static const SbPack one[1] = {{[0 ... SB_BATCH - 1] = 1.}},
                       quarter[4] = {[0 ... 3] = {[0 ... SB_BATCH - 1] = 0.25}};
+  const SbRegion *region = s->batch_region[b];
   const PetscInt k = SB_POINTS * (b - region->bstart);
   SbPoints at = {1, 0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b, one};
 
@@ -33,20 +34,20 @@ SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
   return at;
 }
 
-void SbBatchGradients(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
-                      SbPack U[30], SbPack F[SB_POINTS][9])
+void SbBatchGradients(SbSpace s, PetscInt b, const PetscReal x[], PetscBool rate, SbPack U[30],
+                      SbPack F[SB_POINTS][9])
 {
-  const SbPoints at = SbBatchPoints(s, region, b);
+  const SbPoints at = SbBatchPoints(s, b);
 
   if (x)
-    sb_gather_strain(s, region, b, x, U);
+    sb_gather_strain(s, b, x, U);
   else
     memset(U, 0, 30 * sizeof(SbPack));
   for (int q = 0; q < at.n; q++) {
     const SbPack *g = at.g + at.step * q;
-    SbPack here[12], *u = region->quadratic ? here : U;
+    SbPack here[12], *u = at.rule ? here : U;
 
-    if (region->quadratic) SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
+    if (at.rule) SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
     if (rate)
       SbCellGradientRate(g, (const SbPack *)u, F[q]);
     else
@@ -108,9 +109,10 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   }
 }
 
-void SbBatchMass(SbSpace s, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS])
+void SbBatchMass(SbSpace s, PetscInt b, SbPack mass[SB_PAIRS])
 {
-  const SbPoints at = SbBatchPoints(s, region, b);
+  const SbRegion *region = s->batch_region[b];
+  const SbPoints at = SbBatchPoints(s, b);
   const int npair = region->quadratic ? SB_PAIRS : 10;
 
   for (int k = 0; k < npair; k++) {
@@ -133,14 +135,15 @@ void SbBatchMass(SbSpace s, const SbRegion *region, PetscInt b, SbPack mass[SB_P
   }
 }
 
-void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
-                  SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
+void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9],
+                  SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
+  const SbRegion *region = s->batch_region[b];
   const SbMaterial m = region->pointwise;
-  const SbPoints at = SbBatchPoints(s, region, b);
+  const SbPoints at = SbBatchPoints(s, b);
   SbPack U[30], p;
 
-  SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
+  SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
   for (int q = 0; q < at.n; q++) {
     if (P) m->ops.stress(m, (const SbPack *)F[q], P[q]);
     if (psi) m->ops.energy(m, (const SbPack *)F[q], psi[q]);
@@ -181,37 +184,34 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
   if (!s->pressure) PetscCall(PetscCalloc1(s->nbatch, &s->pressure));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   if (step) PetscCall(SbSpaceGetLocalRead(s, step, &du));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
     const SbMaterial m = region->material;
     const PetscReal lambda = m->lambda;
+    const SbPoints at = SbBatchPoints(s, b);
+    SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p, change = {0.};
 
     /* regions whose tangents use these pressures */
     if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p, change = {0.};
+    SbBatchGradients(s, b, u, PETSC_FALSE, x, F);
+    if (step) SbBatchGradients(s, b, du, PETSC_TRUE, dx, H);
+    if (region->quadratic)
+      SbQuadraticVolume(m, &at, (const SbPack *)x, (const SbPack(*)[9])F, p, step ? D : NULL);
+    else {
+      m->ops.pressure(m, (const SbPack *)F[0], p);
+      m->ops.volumetric(m, (const SbPack *)F[0], D);
+      for (int l = 0; l < SB_BATCH; l++) p[l] = -p[l];
+    }
+    for (int k = 0; step && k < (region->quadratic ? 30 : 9); k++) {
+      const PetscReal *way = region->quadratic ? dx[k] : H[0][k];
 
-      SbBatchGradients(s, region, b, u, PETSC_FALSE, x, F);
-      if (step) SbBatchGradients(s, region, b, du, PETSC_TRUE, dx, H);
-      if (region->quadratic)
-        SbQuadraticVolume(m, &at, (const SbPack *)x, (const SbPack(*)[9])F, p, step ? D : NULL);
-      else {
-        m->ops.pressure(m, (const SbPack *)F[0], p);
-        m->ops.volumetric(m, (const SbPack *)F[0], D);
-        for (int l = 0; l < SB_BATCH; l++) p[l] = -p[l];
-      }
-      for (int k = 0; step && k < (region->quadratic ? 30 : 9); k++) {
-        const PetscReal *way = region->quadratic ? dx[k] : H[0][k];
+      for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
+    }
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->pressure[b][l] : 0.;
+      const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
 
-        for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
-      }
-      for (int l = 0; l < SB_BATCH; l++) {
-        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->pressure[b][l] : 0.;
-        const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
-
-        s->pressure[b][l] = step ? old + part * (goal - old) : goal;
-      }
+      s->pressure[b][l] = step ? old + part * (goal - old) : goal;
     }
   }
   if (step) PetscCall(SbSpaceRestoreLocalRead(s, step, &du));

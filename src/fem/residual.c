@@ -23,18 +23,18 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const SbPoints at = SbBatchPoints(s, region, b);
+    const SbPoints at = SbBatchPoints(s, b);
     SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30], p = {0};
 
     if (at.rule) memset(fe, 0, sizeof(fe));
-    SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
+    SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
       for (int k = 0; k < 30; k++)
         for (int l = 0; l < SB_BATCH; l++) fe[k][l] = p[l] * b10[k][l];
     }
     if (beta != 0.) {
-      SbBatchGradients(s, region, b, stage->v, PETSC_TRUE, U, H);
+      SbBatchGradients(s, b, stage->v, PETSC_TRUE, U, H);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
       for (int q = 0; q < at.n && mean; q++) {
         SbMaterialRotation(m, (const SbPack *)F[q], R);
@@ -53,7 +53,7 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
       }
       SbPointForce(&at, q, (const SbPack *)P, fe);
     }
-    sb_scatter_strain(s, region, b, fe, f);
+    sb_scatter_strain(s, b, fe, f);
   }
 }
 
@@ -83,30 +83,27 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
     if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
   }
   /* the consistent mass times w = a + alpha v */
-  for (PetscInt r = 0; s->consistent_mass && r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; s->consistent_mass && b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
     const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
     const int n = (int)region->nnode, npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscInt *node = sb_batch_nodes(s, b);
+    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const PetscInt *node = sb_batch_nodes(s, b);
-      SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
+    if (stage->a) sb_gather_nodes(n, node, stage->a, w);
+    if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
+    for (int k = 0; alpha != 0. && k < 3 * n; k++)
+      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+    SbBatchMass(s, b, mass);
+    for (int k = 0; k < 3 * npair; k++) {
+      const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
 
-      if (stage->a) sb_gather_nodes(n, node, stage->a, w);
-      if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
-      for (int k = 0; alpha != 0. && k < 3 * n; k++)
-        for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
-      SbBatchMass(s, region, b, mass);
-      for (int k = 0; k < 3 * npair; k++) {
-        const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
-
-        for (int l = 0; l < SB_BATCH; l++) {
-          fe[i][l] += density * mass[p][l] * w[j][l];
-          fe[j][l] += i == j ? 0. : density * mass[p][l] * w[i][l];
-        }
+      for (int l = 0; l < SB_BATCH; l++) {
+        fe[i][l] += density * mass[p][l] * w[j][l];
+        fe[j][l] += i == j ? 0. : density * mass[p][l] * w[i][l];
       }
-      sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
     }
+    sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
   }
 }
 
@@ -122,38 +119,34 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
 {
   static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
 
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPoints at = SbBatchPoints(s, b);
+    SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS], pressures[SB_POINTS];
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS], pressures[SB_POINTS];
+    /* means over the points */
+    SbBatchState(s, b, x, F, sigma ? P : NULL, psi ? energy : NULL, pressure ? pressures : NULL);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt c = s->batch_cell[b] + l;
 
-      /* means over the points */
-      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, pressure ? pressures : NULL);
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscInt c = s->batch_cell[b] + l;
+      if (J) J[c] = 0.;
+      if (psi) psi[c] = 0.;
+      if (pressure) pressure[c] = 0.;
+      for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
+      for (int q = 0; q < at.n; q++) {
+        const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
 
-        if (J) J[c] = 0.;
-        if (psi) psi[c] = 0.;
-        if (pressure) pressure[c] = 0.;
-        for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
-        for (int q = 0; q < at.n; q++) {
-          const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
+        if (J) J[c] += part * det;
+        if (psi) psi[c] += part * energy[q][l];
+        if (pressure) pressure[c] += part * pressures[q][l];
+        /* Cauchy stress P F^T / J; for small strain it is P itself */
+        for (int k = 0; sigma && k < 6; k++) {
+          const int i = row[k], j = column[k];
+          const SbPack *p = (const SbPack *)P[q] + 3 * i, *f = (const SbPack *)F[q] + 3 * j;
 
-          if (J) J[c] += part * det;
-          if (psi) psi[c] += part * energy[q][l];
-          if (pressure) pressure[c] += part * pressures[q][l];
-          /* Cauchy stress P F^T / J; for small strain it is P itself */
-          for (int k = 0; sigma && k < 6; k++) {
-            const int i = row[k], j = column[k];
-            const SbPack *p = (const SbPack *)P[q] + 3 * i, *f = (const SbPack *)F[q] + 3 * j;
-
-            sigma[6 * c + k] +=
-              part * (region->material->linear
-                        ? p[j][l]
-                        : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
-          }
+          sigma[6 * c + k] += part * (region->material->linear
+                                        ? p[j][l]
+                                        : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
         }
       }
     }
@@ -188,30 +181,27 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
   *volume = 0.;
   *minJ = PETSC_MAX_REAL;
   *ninverted = 0;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPoints at = SbBatchPoints(s, b);
     const PetscReal before = *energy;
+    SbPack F[SB_POINTS][9], psi[SB_POINTS], exact = {0}, lowest;
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack F[SB_POINTS][9], psi[SB_POINTS], exact = {0}, lowest;
+    SbBatchState(s, b, x, F, NULL, psi, NULL);
+    if (region->quadratic) quadratic_volume(s, b, &at, x, exact, lowest);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
 
-      SbBatchState(s, region, b, x, F, NULL, psi, NULL);
-      if (region->quadratic) quadratic_volume(s, b, &at, x, exact, lowest);
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
+      for (int q = 0; q < at.n; q++) {
+        const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] * at.weight[q][l];
 
-        for (int q = 0; q < at.n; q++) {
-          const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] * at.weight[q][l];
-
-          *energy += part * psi[q][l];
-          *volume += region->quadratic ? 0. : part * det;
-          least = PetscMin(least, det);
-        }
-        *volume += exact[l];
-        *minJ = PetscMin(*minJ, least);
-        *ninverted += least <= 0.;
+        *energy += part * psi[q][l];
+        *volume += region->quadratic ? 0. : part * det;
+        least = PetscMin(least, det);
       }
+      *volume += exact[l];
+      *minJ = PetscMin(*minJ, least);
+      *ninverted += least <= 0.;
     }
     if (body) body[region->body] += *energy - before;
   }
@@ -226,9 +216,11 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscReal beta = s->beta[s->region[r].body];
+    const SbRegion *region = &s->region[r];
+    const PetscReal beta = s->beta[region->body];
 
-    if (s->region[r].owned && beta != 0.) SbRegionForces(s, &s->region[r], PETSC_FALSE, beta, &stage, f);
+    if (region->bend <= s->nbatch_owned && beta != 0.)
+      SbRegionForces(s, region, PETSC_FALSE, beta, &stage, f);
   }
   *power = s->jump ? 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL) : 0.;
   for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * f[i];

@@ -31,39 +31,44 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Finds the regions: owned and ghost cells are sorted by body, inclusion and curved edges, so that a region
-   is a range of cells. */
-static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
+/* Finds the regions and batches: owned and ghost cells are sorted by body, inclusion and curved edges, so that
+   a region is a range of cells. */
+static PetscErrorCode find_regions(SbSpace s)
 {
   SbMesh mesh = s->mesh;
-  PetscInt nmaterial = mesh->nbody;
+  PetscInt nmaterial = mesh->nbody, most;
+  SbRegion *r = NULL;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < mesh->nbody; b++) nmaterial += mesh->body[b].ninclusion;
   s->linear = PETSC_TRUE;
-  for (PetscInt k = 0; k < nmaterial; k++) s->linear = (PetscBool)(s->linear && material[k]->linear);
+  for (PetscInt k = 0; k < nmaterial; k++) s->linear = (PetscBool)(s->linear && s->material[k]->linear);
   PetscCall(PetscCalloc1(4 * nmaterial, &s->region));
+  most = mesh->ncell / SB_BATCH + 4 * nmaterial;
+  PetscCall(PetscMalloc3(most, &s->batch_region, most, &s->batch_cell, most, &s->batch_n));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt body = mesh->cell_body[c], m = mesh->cell_material[c];
 
     if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1] ||
         m != mesh->cell_material[c - 1] || is_curved(s, c) != is_curved(s, c - 1)) {
-      SbRegion *r = &s->region[s->nregion++];
-
-      *r = (SbRegion){.body = body, .material = material[m], .pointwise = material[m]};
-      r->element = element[body];
-      r->cstart = c;
-      r->bstart = s->nbatch;
-      r->owned = (PetscBool)(c < mesh->ncell_owned);
+      r = &s->region[s->nregion++];
+      *r = (SbRegion){.body = body, .material = s->material[m], .pointwise = s->material[m]};
+      r->element = s->element[body];
+      r->bstart = r->bend = s->nbatch;
       r->broken = (PetscBool)(r->element->nodes_per[3] > 0);
       r->quadratic = (PetscBool)(r->element->nodes_per[1] > 0);
       r->nnode = r->quadratic ? SB_CELL_NODES : 4;
-      if (r->quadratic && r->element->mean_volume && material[m]->lambda != 0.)
-        PetscCall(SbMaterialGetShear(material[m], &r->pointwise));
+      if (r->quadratic && r->element->mean_volume && r->material->lambda != 0.)
+        PetscCall(SbMaterialGetShear(r->material, &r->pointwise));
     }
-    s->region[s->nregion - 1].cend = c + 1;
-    if ((c - s->region[s->nregion - 1].cstart) % SB_BATCH == 0) s->nbatch++;
-    s->region[s->nregion - 1].bend = s->nbatch;
+    if (r->bstart == r->bend || s->batch_n[s->nbatch - 1] == SB_BATCH) {
+      s->batch_region[s->nbatch] = r;
+      s->batch_cell[s->nbatch] = c;
+      s->batch_n[s->nbatch] = 0;
+      r->bend = ++s->nbatch;
+      if (c < mesh->ncell_owned) s->nbatch_owned = s->nbatch;
+    }
+    s->batch_n[s->nbatch - 1]++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -95,20 +100,16 @@ static void tabulate_curved(SbSpace s, SbRegion *region, PetscInt b, PetscInt ce
   if (l < s->batch_n[b]) s->batch_V[b][l] = V;
 }
 
-/* Gradients, volumes and nodes of each batch; padding lanes repeat the first cell with volume zero. */
+/* Gradients and volumes of each batch; padding lanes repeat the first cell with volume zero. */
 static PetscErrorCode tabulate_batches(SbSpace s)
 {
   const size_t each = SB_POINTS * 10 + SB_CELL_NODES;
-  size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbPack);
+  size_t packs = (size_t)s->nbatch * 10;
   SbPack *curve;
 
   PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++)
-    if (is_curved(s, s->region[r].cstart))
-      bytes += each * (size_t)(s->region[r].bend - s->region[r].bstart) * sizeof(SbPack);
-  PetscCall(PetscMalloc3(s->nbatch, &s->batch_cell, s->nbatch, &s->batch_n, s->nbatch * 4 * SB_BATCH,
-                         &s->batch_node));
-  PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
+  for (PetscInt b = 0; b < s->nbatch; b++) packs += is_curved(s, s->batch_cell[b]) ? each : 0;
+  PetscCall(PetscMalloc(packs * sizeof(SbPack) + 64, &s->batch_memory));
   s->batch_g = (SbPack *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
   s->batch_V = s->batch_g + (size_t)s->nbatch * 9;
   curve = s->batch_V + s->nbatch;
@@ -116,7 +117,7 @@ static PetscErrorCode tabulate_batches(SbSpace s)
     SbRegion *region = &s->region[r];
     const PetscInt n = region->bend - region->bstart;
 
-    if (is_curved(s, region->cstart)) {
+    if (is_curved(s, s->batch_cell[region->bstart])) {
       region->curve_g = curve;
       region->curve_weight = region->curve_g + 9 * SB_POINTS * n;
       region->curve_mass = region->curve_weight + SB_POINTS * n;
@@ -125,18 +126,12 @@ static PetscErrorCode tabulate_batches(SbSpace s)
 
     PetscCall(PetscLogEventBegin(region->element->event, 0, 0, 0, 0));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const PetscInt first = region->cstart + (b - region->bstart) * SB_BATCH;
-
-      s->batch_cell[b] = first;
-      s->batch_n[b] = PetscMin(SB_BATCH, region->cend - first);
       for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscInt cell = l < s->batch_n[b] ? first + l : first, *node = s->cell_node + 4 * cell;
+        const PetscInt cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
         PetscReal x[4][3], g[3][3], V;
 
-        for (PetscInt a = 0; a < 4; a++) {
-          for (PetscInt i = 0; i < 3; i++) x[a][i] = s->mesh->x[3 * s->mesh->cell[4 * cell + a] + i];
-          s->batch_node[(4 * b + a) * SB_BATCH + l] = node[a];
-        }
+        for (PetscInt k = 0; k < 12; k++)
+          x[k / 3][k % 3] = s->mesh->x[3 * s->mesh->cell[4 * cell + k / 3] + k % 3];
         region->element->ops.tabulate((const PetscReal(*)[3])x, g, &V);
         for (PetscInt k = 0; k < 9; k++) s->batch_g[9 * b + k][l] = g[k / 3][k % 3];
         s->batch_V[b][l] = l < s->batch_n[b] ? V : 0.;
@@ -165,38 +160,35 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   s->element = element;
   s->material = material;
   PetscCall(SbLayoutNodes(s));
-  PetscCall(find_regions(s, material, element));
+  PetscCall(find_regions(s));
   PetscCall(tabulate_batches(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces) PetscCall(SbJumpCreate(s, &s->jump));
   PetscCall(PetscCalloc3(s->nnode, &s->node_mass, mesh->nbody, &s->alpha, mesh->nbody, &s->beta));
   s->node_share = s->node_mass;
   if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbElementOps *e = &region->element->ops;
+    const SbPack *curved =
+      region->curve_mass ? (const SbPack *)region->curve_mass + SB_CELL_NODES * (b - region->bstart) : NULL;
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscReal m = region->material->density * s->batch_V[b][l];
-        const SbPack *curved = region->curve_mass
-                                 ? (const SbPack *)region->curve_mass + SB_CELL_NODES * (b - region->bstart)
-                                 : NULL;
-        PetscReal share[SB_CELL_NODES];
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscReal m = region->material->density * s->batch_V[b][l];
+      PetscReal share[SB_CELL_NODES];
 
-        /* the integrals of the basis functions of P2 */
-        for (int a = 0; a < SB_CELL_NODES; a++)
-          share[a] = !region->quadratic ? region->element->ops.mass_lumped : a < 4 ? -0.05 : 0.2;
-        if (region->curve_g) {
-          (void)SbSpaceCurvedIntegrals(s, s->batch_cell[b] + l, NULL, share);
-          for (int a = 0; a < SB_CELL_NODES; a++) share[a] /= s->batch_V[b][l];
-        }
-        for (PetscInt a = 0; a < region->nnode; a++) {
-          const PetscInt node = sb_batch_nodes(s, b)[a * SB_BATCH + l];
-          const SbElementOps *e = &region->element->ops;
+      /* the integrals of the basis functions of P2 */
+      for (int a = 0; a < SB_CELL_NODES; a++)
+        share[a] = !region->quadratic ? e->mass_lumped : a < 4 ? -0.05 : 0.2;
+      if (curved) {
+        (void)SbSpaceCurvedIntegrals(s, s->batch_cell[b] + l, NULL, share);
+        for (int a = 0; a < SB_CELL_NODES; a++) share[a] /= s->batch_V[b][l];
+      }
+      for (PetscInt a = 0; a < region->nnode; a++) {
+        const PetscInt node = sb_batch_nodes(s, b)[a * SB_BATCH + l];
 
-          s->node_mass[node] += m * (curved ? curved[a][l] : a < 4 ? e->mass_lumped : e->mass_lumped_edge);
-          if (s->edge_node) s->node_share[node] += share[a] * m;
-        }
+        s->node_mass[node] += m * (curved ? curved[a][l] : a < 4 ? e->mass_lumped : e->mass_lumped_edge);
+        if (s->edge_node) s->node_share[node] += share[a] * m;
       }
     }
   }
@@ -224,10 +216,10 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(SbConstraintsDestroy(&s->constraints));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));
-  if (s->width > 4) PetscCall(PetscFree(s->batch_clique));
+  PetscCall(PetscFree(s->batch_clique));
   PetscCall(PetscFree(s->batch_weight));
   PetscCall(PetscFree(s->region));
-  PetscCall(PetscFree3(s->batch_cell, s->batch_n, s->batch_node));
+  PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));
   PetscCall(PetscFree(s->batch_memory));
   PetscCall(PetscFree(s->pressure));
   if (s->node_share != s->node_mass) PetscCall(PetscFree(s->node_share));
@@ -251,12 +243,9 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   }
   for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++)
     PetscCheck(s->gnode[i] > s->gnode[i - 1], PETSC_COMM_SELF, PETSC_ERR_PLIB, "Ghost nodes are not sorted");
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++)
-      for (PetscInt l = 0; l < SB_BATCH; l++) sums[1] += region->material->density * s->batch_V[b][l];
-  }
+  for (PetscInt b = 0; b < s->nbatch_owned; b++)
+    for (PetscInt l = 0; l < SB_BATCH; l++)
+      sums[1] += s->batch_region[b]->material->density * s->batch_V[b][l];
   PetscCallMPI(MPI_Allreduce(sums, all, 2, MPIU_REAL, MPI_SUM, s->comm));
   /* the tolerance includes rounding, which grows with the number of equal terms */
   PetscCheck(

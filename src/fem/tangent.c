@@ -41,7 +41,7 @@ PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x)
+PetscErrorCode SbMatGetBlocks(Mat A, PetscBool aij, SbMatBlocks *x)
 {
   static const char *const types[5] = {MATSEQAIJ, MATMPIAIJ, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ};
   static PetscErrorCode (*const get[3])(Mat, PetscScalar **) = {MatSeqAIJGetArray, MatSeqBAIJGetArray,
@@ -56,22 +56,14 @@ PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x)
     PetscCall(PetscObjectTypeCompare((PetscObject)A, types[type], &same));
     if (same) break;
   }
-  PetscCheck(type < 5, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
+  PetscCheck(type < 5 && (aij || type > 1), PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "%s and SBAIJ matrices, and this one is %s: leave -mat_type alone",
+             aij ? "Assembly takes AIJ, BAIJ" : "This preconditioner takes BAIJ",
+             ((PetscObject)A)->type_name);
   *x = (SbMatBlocks){(SbMatrixKind)(type / 2), (PetscBool)(type == 4), {A, NULL}, {NULL, NULL}};
   if (type == 1) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
   if (type == 3) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
   for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(get[x->kind](x->part[q], &x->value[q]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode (*const restore_array[3])(Mat, PetscScalar **) = {
-  MatSeqAIJRestoreArray, MatSeqBAIJRestoreArray, MatSeqSBAIJRestoreArray};
-
-PetscErrorCode SbValuesEnd(SbMatBlocks *x)
-{
-  PetscFunctionBeginUser;
-  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(restore_array[x->kind](x->part[q], &x->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,24 +78,14 @@ PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScala
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
+PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *x)
 {
-  PetscBool blocks;
+  static PetscErrorCode (*const restore[3])(Mat, PetscScalar **) = {
+    MatSeqAIJRestoreArray, MatSeqBAIJRestoreArray, MatSeqSBAIJRestoreArray};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &blocks, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ, ""));
-  PetscCheck(blocks, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
-             ((PetscObject)A)->type_name);
-  PetscCall(SbValuesBegin(A, b));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
-{
-  PetscFunctionBeginUser;
-  for (int q = 0; q < 2 && b->part[q]; q++)
-    PetscCall(SbMatRestoreRead(b->part[q], restore_array[b->kind], &b->value[q]));
+  for (int q = 0; q < 2 && x->part[q]; q++)
+    PetscCall(SbMatRestoreRead(x->part[q], restore[x->kind], &x->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -224,7 +206,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
 {
   const SbMaterial m = region->material, law = region->pointwise;
-  const SbPoints points = SbBatchPoints(s, region, batch);
+  const SbPoints points = SbBatchPoints(s, batch);
   const SbPack *V = points.V;
   const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin),
                   split = (PetscBool)(out && mean && x->lambda > 0.);
@@ -232,7 +214,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     b[30] = {{0}};
   Factors at = *x;
 
-  SbBatchGradients(s, region, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
+  SbBatchGradients(s, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     if (s->linear_pressure) memcpy(p, s->pressure[batch], sizeof(p));
@@ -305,7 +287,7 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   if (inertia != 0.) {
     SbPack mass[SB_PAIRS];
 
-    SbBatchMass(s, region, b, mass);
+    SbBatchMass(s, b, mass);
     for (int k = 0; k < 3 * npair; k++)
       for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
   }
@@ -337,7 +319,7 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       Factors at = factors;
       SbPack p;
 
-      if (!m->linear) SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
+      if (!m->linear) SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
       if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
         m->ops.pressure(m, (const SbPack *)F[0], p);
         for (int l = 0; l < SB_BATCH; l++) p[l] += s->pressure[b][l];
@@ -374,7 +356,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < n; k++) {
     fill[k] = (Fill){.space = space[k], .faces = space[k]->jump ? stage : NULL, .beta = s->beta};
-    PetscCall(SbValuesBegin(A[k], &fill[k].x));
+    PetscCall(SbMatGetBlocks(A[k], PETSC_TRUE, &fill[k].x));
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
@@ -392,7 +374,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
       for (size_t c = 0; c < 3; c++)
         v[c * (rs + cs)] += (stage->shift_a + stage->shift_v * s->alpha[to->node_body[i]]) * to->node_mass[i];
     }
-    PetscCall(SbValuesEnd(&fill[k].x));
+    PetscCall(SbMatRestoreBlocks(&fill[k].x));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -423,12 +405,12 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
   if (node[0] >= s->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFindInt(cell, s->nbatch, s->batch_cell, &batch));
   if (batch < 0) batch = -batch - 2; /* not the first cell of its batch */
-  PetscCall(SbValuesBegin(A, &x));
+  PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &x));
   sb_insert_block(
     s, &x, node[0], node[1],
     s->plan->offset[(size_t)(batch * w * w + w * a + b) * SB_BATCH + cell - s->batch_cell[batch]],
     s->block_scale, PETSC_FALSE, block);
-  PetscCall(SbValuesEnd(&x));
+  PetscCall(SbMatRestoreBlocks(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -456,7 +438,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
     if (own->finish) PetscCall((own->finish)(A));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbValuesBegin(A, &x));
+  PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &x));
   /* clear rows and columns of prescribed unknowns, keeping the magnitude on the diagonal */
   for (PetscInt n = 0; n < p->nfix; n++) {
     const int rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
@@ -478,7 +460,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
     }
   }
   if (s->constraints) SbConstraintsFinishTangent(s, &x);
-  PetscCall(SbValuesEnd(&x));
+  PetscCall(SbMatRestoreBlocks(&x));
   /* assembly of the parts invalidates their cached diagonals; of the parallel one the state is enough */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));

@@ -113,7 +113,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
   PetscFunctionBeginUser;
   c->ok = PETSC_TRUE;
   if (!c->N && !c->direct) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbMatGetBlocks(A, &x));
+  PetscCall(SbMatGetBlocks(A, PETSC_FALSE, &x));
   for (int q = 0; q < 2 && x.part[q]; q++)
     PetscCall(SbMatGetPattern(x.part[q], &nrow, &start[q], &column[q]));
   PetscCall(PetscMalloc6(w, &row.unit, c->n + c->nother, &row.slot, w, &row.tall, w, &row.W, w, &row.column,

@@ -210,7 +210,7 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
   SbMatBlocks b;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMatGetBlocks(c->A, &b));
+  PetscCall(SbMatGetBlocks(c->A, PETSC_FALSE, &b));
   for (int q = 0; q < 2; q++) to[q] = b.value[q];
   for (PetscInt i = 0; i < rows->n; i++) {
     for (PetscInt k = rows->ia[i]; k < rows->ia[i + 1]; k++) {

@@ -111,7 +111,7 @@ PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[],
   /* l1-Gauss-Seidel: half the sums of the magnitudes of each row in the columns of other ranks */
   if (extra) {
     PetscCall(PetscArrayzero(extra, 3 * n));
-    PetscCall(SbMatGetBlocks(A, &b));
+    PetscCall(SbMatGetBlocks(A, PETSC_FALSE, &b));
     if (b.part[1]) PetscCall(SbMatGetPattern(b.part[1], &n, &far, &column));
     for (PetscInt i = 0; i < n && far; i++)
       for (PetscInt k = 9 * far[i]; k < 9 * far[i + 1]; k++)

@@ -243,7 +243,8 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     /* stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj */
     PetscCall(SbSpaceGetLocalRead(s, v->r[0], &own));
     for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
-      const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i];
+      const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4,
+                     i = sb_batch_nodes(s, b)[k % (4 * SB_BATCH)], j = v->across[i];
       const PetscInt at =
         p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH + (size_t)(k % SB_BATCH)];
       const PetscReal w = v->weight[i];

@@ -40,19 +40,16 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   PetscCall(VecRestoreArray(op->u, &x));
   PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
   /* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
+    SbPack cell_u[30], sum = {0};
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
-      SbPack cell_u[30], sum = {0};
-
-      sb_gather_strain(s, region, b, local, cell_u);
-      for (int k = 0; k < 3 * region->nnode; k++)
-        for (int l = 0; l < SB_BATCH; l++)
-          sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
-    }
+    sb_gather_strain(s, b, local, cell_u);
+    for (int k = 0; k < 3 * region->nnode; k++)
+      for (int l = 0; l < SB_BATCH; l++)
+        sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
   }
   PetscCall(SbSpaceRestoreLocalRead(s, op->u, &local));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,20 +67,16 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
   PetscCall(SbSpaceGetLocalWrite(s, op->u, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
   /* f = B^T p, complete on owned nodes */
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
+    const PetscReal *value = op->p + s->batch_cell[b];
+    SbPack force[30], lane = {0};
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
-      const PetscReal *value = op->p + s->batch_cell[b];
-      SbPack force[30], lane = {0};
-
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
-      for (int k = 0; k < 3 * region->nnode; k++)
-        for (int l = 0; l < SB_BATCH; l++)
-          force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
-      sb_scatter_strain(s, region, b, force, f);
-    }
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
+    for (int k = 0; k < 3 * region->nnode; k++)
+      for (int l = 0; l < SB_BATCH; l++) force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
+    sb_scatter_strain(s, b, force, f);
   }
   clear_fixed(s, f);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
@@ -164,23 +157,20 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   s = op->space;
   PetscCall(PetscCalloc1(3 * s->nnode, &y));
   /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned nodes. */
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
+    for (PetscInt k = 0; k < 3 * region->nnode; k++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
+                        square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
+        const PetscInt node = s->batch_clique[(s->width * b + k / 3) * SB_BATCH + l];
 
-      for (PetscInt k = 0; k < 3 * region->nnode; k++) {
-        for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-          const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
-                          square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
-          const PetscInt node = s->batch_clique[(s->width * b + k / 3) * SB_BATCH + l];
-
-          y[3 * node + k % 3] += square * PetscSqr(weight);
-          if (region->broken)
-            y[3 * s->batch_clique[(s->width * b + 4 + k / 3) * SB_BATCH + l] + k % 3] +=
-              square * PetscSqr(1. - weight);
-        }
+        y[3 * node + k % 3] += square * PetscSqr(weight);
+        if (region->broken)
+          y[3 * s->batch_clique[(s->width * b + 4 + k / 3) * SB_BATCH + l] + k % 3] +=
+            square * PetscSqr(1. - weight);
       }
     }
   }
@@ -234,25 +224,20 @@ static PetscErrorCode finish(Mat K)
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
   /* C, its inverse, S and weight of the cells, from the moduli of the last assembly */
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt c = s->batch_cell[b] + l;
+      const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
+      PetscReal square = 0.;
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscInt c = s->batch_cell[b] + l;
-        const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
-        PetscReal square = 0.;
-
-        for (int k = 0; k < 3 * region->nnode; k++)
-          square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
-        op->Cinv[c] = modulus / V;
-        op->C[c] = modulus > 0. ? V / modulus : 1.;
-        op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
-        op->weight[c] = 1.;
-        if (modulus > 0.)
-          op->weight[c] =
-            PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
-      }
+      for (int k = 0; k < 3 * s->batch_region[b]->nnode; k++)
+        square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
+      op->Cinv[c] = modulus / V;
+      op->C[c] = modulus > 0. ? V / modulus : 1.;
+      op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
+      op->weight[c] = 1.;
+      if (modulus > 0.)
+        op->weight[c] = PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
     }
   }
   PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* increases the object state */

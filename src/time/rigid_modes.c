@@ -42,7 +42,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   for (PetscInt b = 0; s->batch_weight && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
-        (void)SbUnionJoin(parent, s->batch_node[4 * SB_BATCH * b + k],
+        (void)SbUnionJoin(parent, s->batch_clique[s->width * b * SB_BATCH + k],
                           s->batch_clique[(s->width * b + 4) * SB_BATCH + k]);
     }
   }

@@ -42,7 +42,7 @@ static void bend(const PetscReal x[3], PetscReal v[3])
 static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9])
 {
   const SbMaterial m = region->material;
-  const PetscInt *node = w->s->batch_node + 4 * SB_BATCH * b;
+  const PetscInt *node = w->s->batch_clique + w->s->width * SB_BATCH * b;
   SbPack u[12], F[9], R[9];
 
   for (int a = 0; a < 4; a++) {
@@ -90,7 +90,7 @@ static PetscErrorCode insert(Bench *w, DM dm, Mat A)
   for (PetscInt r = 0; r < w->s->nregion; r++) {
     const SbRegion *region = &w->s->region[r];
 
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+    for (PetscInt b = region->bstart; b < region->bend && b < w->s->nbatch_owned; b++) {
       SbPack K[10][9] __attribute__((aligned(64)));
 
       blocks(w, region, b, K);

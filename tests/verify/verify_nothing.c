@@ -181,8 +181,8 @@ static PetscErrorCode check_plain_space(void)
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
   SB_CHECK(!s->faces && !s->neighbour && !s->dirichlet_node && !s->jump && !s->batch_weight && s->width == 4,
            "a space of vertices holds something of faces");
-  SB_CHECK(s->batch_clique == s->batch_node && s->node_body == s->mesh->vert_body &&
-             s->node_set == s->mesh->vert_set && s->node_orig == s->mesh->vert_orig,
+  SB_CHECK(s->node_body == s->mesh->vert_body && s->node_set == s->mesh->vert_set &&
+             s->node_orig == s->mesh->vert_orig,
            "a space of vertices has copies of what the mesh holds");
   SB_CHECK(s->plan && !s->plan->face_term[0] && !s->plan->face_term[1], "the plan has face terms");
   PetscCall(MatDestroy(&A));
