@@ -192,7 +192,7 @@ PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, 
 /* The same for vertices, value[nvert][n]. */
 PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
-PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
+extern const SbOption SbMeshRows[];
 /* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not collective. */
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);

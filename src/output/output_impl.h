@@ -283,7 +283,6 @@ void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
-PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* Name of the column of history.csv for a component of a field. */

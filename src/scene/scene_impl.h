@@ -5,10 +5,7 @@
 #include "sbledger.h"
 #include "sbscene.h"
 
-/* Register the options of the command line and of the scene. */
-PetscErrorCode SbCommandRegister(void);
-PetscErrorCode SbSceneRegister(void);
-PetscErrorCode SbSetsRegister(void);
+extern const SbOption SbCommandRows[], SbRunRows[], SbBodyRows[], SbInclusionRows[], SbSetRows[];
 
 /* Reads the sets of -sets, then those that effects name without one, into model->set. Not collective. */
 PetscErrorCode SbSceneReadSets(SbModel model);

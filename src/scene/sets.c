@@ -8,19 +8,13 @@
 */
 #include "scene_impl.h"
 
-static const SbOption set_rows[] = {
+const SbOption SbSetRows[] = {
   {"at", SB_OPTION_STRING, 1, "", NULL, "",
    "shape of the set in the reference configuration, after scale, rotate, translate (m): "
    "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, halfspace:nx,ny,nz,d (n.x "
    "<= d), or group:name, body:name, boundary"},
+  {0},
 };
-
-PetscErrorCode SbSetsRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("set", "", PETSC_STATIC_ARRAY_LENGTH(set_rows), set_rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Index of the body of this name, or of its first copy. */
 static PetscInt find_body(SbModel model, const char *name)
