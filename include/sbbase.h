@@ -52,7 +52,8 @@ typedef struct {
 } SbScope;
 extern const SbScope SbRunScope; /* of the program-wide options */
 
-/* Adds rows to the table. Names and rows must live as long as the program. Not collective. */
+/* Adds n rows to the table, PETSC_DECIDE: up to one without a key. Names and rows must live as long as the
+   program. Not collective. */
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);
 void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
@@ -73,24 +74,18 @@ PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, void *choic
 PetscErrorCode SbOptionSecond(const SbScope *scope, const char *key, PetscBool *second);
 /* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>. */
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from);
-PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
-
+/* Whether the user gives it; does not count as reading for SbOptionsView(). */
+PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given);
 /* Reads and checks a value that is asked for only later, when much has been computed already. */
 PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key);
 /* The row of a key in the scope; NULL if there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
-/* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
 
 /* Full name, e.g. "-body_liver_young", for messages. */
 void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
-/*
-  SbOptionsCheck - examines the options of ours that nobody read. One that exists and is of no use in this run
-  is warned of, with the reason; one that does not exist ends the run, with the nearest names.
-  Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two
-  edits of, a program-wide option of ours and does not belong to PETSc. Of an instance that was not read an
-  option exists when the class has its key and SbOptionsFile() found the instance in a list. Collective.
-*/
+/* Examines the options of ours that nobody read (src/base/option_check.c): warns of one that is of no use in
+   this run, with the reason; one that does not exist ends the run, with the nearest names. Collective. */
 PetscErrorCode SbOptionsCheck(void);
 /* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line may
    override. After all rows are registered. Collective. */
@@ -241,11 +236,12 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
 
-  SetUp: file, and the options -live_...; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
+  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0:
+  no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
   its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an
   accepted step that ended at t, reads new targets from the file. Collective.
 */
-PetscErrorCode SbLiveSetUp(const char *file);
+void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);
 const char *SbLiveColumn(PetscInt i, const char **unit);
 PetscReal SbLiveGet(PetscInt i, PetscReal t);

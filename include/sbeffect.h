@@ -208,6 +208,7 @@ PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
     PetscCall(PetscLogEventEnd(sb_e_->event, 0, 0, 0, 0));   \
   } while (0)
 
+extern const SbOption SbEffectRows[]; /* of all types */
 /* Adds a type, which must live as long as the program, and its option rows. Not collective. */
 PetscErrorCode SbEffectRegister(const SbEffectType *type);
 /* Names of all types. Not collective. */

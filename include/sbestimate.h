@@ -5,14 +5,11 @@
 #include "sbmodel.h"
 
 /*
-  Estimate of the error of the space discretisation in the energy norm,
-
-    |e|^2 = 1/2 int (P - P_h) : C^-1 : (P - P_h),
-
-  P the first Piola-Kirchhoff stress of the continuum under the loads, inertia and prescribed displacements of
-  the moment, P_h that of the element, C Hooke's tensor turned by the rotation of the cell (the strain energy
-  norm of the linear law). sqrt(body2 / strain) is the relative error. For CR and DG it is the error inside of
-  cells, without the energy of jumps at faces; for P2 that of the deviator and of each cell's mean pressure.
+  Estimate of the error |e| of the space discretisation in the energy norm: of the first Piola-Kirchhoff
+  stress, to that of the continuum under the loads, inertia and prescribed displacements of the moment, in the
+  strain energy norm of Hooke's law in the rotated frame of the cell. sqrt(body2 / strain) is the relative
+  error. For CR and DG it is the error inside of cells, without the energy of jumps at faces; for P2 that of
+  the deviator and of each cell's mean pressure.
 */
 typedef struct _p_SbSpaceEstimate *SbSpaceEstimate;
 struct _p_SbSpaceEstimate {

@@ -102,7 +102,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
                              SbSpace *space);
 PetscErrorCode SbSpaceDestroy(SbSpace *space);
 PetscErrorCode SbSpaceValidate(SbSpace space);
-PetscErrorCode SbSpaceRegister(void);
+extern const SbOption SbSpaceRows[];
 
 /* A zeroed vector with the layout of the unknowns (3 per node, with ghosts). Collective. Caller destroys. */
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);

@@ -8,7 +8,7 @@
   The ledger examines each solved step (SbRun.post_solve) and is a monitor. Without -ledger, -accuracy or
   -step_time_budget there is none: no vector, no callback, no column. With -ledger alone it changes no result.
 
-  Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(),
+  Order of calls: SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(),
   SbLedgerAttach(), SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().
 */
 #pragma once
@@ -27,8 +27,7 @@ typedef enum {
 
 typedef struct _p_SbLedger *SbLedger;
 
-PetscErrorCode SbLedgerRegister(void); /* option rows */
-
+extern const SbOption SbLedgerRows[];
 /*
   SbLedgerSetFromOptions - reads the options -ledger, -ledger_..., -accuracy, -step_time_budget. Collective.
 

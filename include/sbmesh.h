@@ -182,7 +182,7 @@ PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const P
 PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
 PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf, void *root);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
-PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
+extern const SbOption SbMeshRows[];
 /* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not collective. */
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);

@@ -2,7 +2,7 @@
   sboutput.h - layer 7: one folder per run. fields.h5 and its indices, history.csv, run.json, checkpoints.
 
   Everything here attaches to a run as a monitor; output that the scenario does not select is not attached.
-  Order: SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(),
+  Order: SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(),
   SbRunSetUp(), SbOutputAttach(), SbReportHeader(), SbRunSolve(), SbReportSummary(), SbRunDestroy().
 
   Everything in the files is in original order: bodies as the scenario names them, vertices and cells as in
@@ -49,7 +49,7 @@ struct SbField {
   void (*of_stress)(const PetscReal sigma[6], PetscReal value[]); /* value[ncomp] from xx yy zz xy yz xz */
 };
 
-PetscErrorCode SbOutputRegister(void); /* option rows */
+extern const SbOption SbOutputRows[], SbProbeRows[];
 
 /* Every field that there is. Not collective. */
 const SbField *SbFieldGetAll(PetscInt *n);

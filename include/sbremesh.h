@@ -30,7 +30,7 @@ PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscRe
   instead of SbRunSolve(); SbRemeshDestroy().
 */
 typedef struct _p_SbRemesh *SbRemesh;
-PetscErrorCode SbRemeshRegister(void); /* option rows */
+extern const SbOption SbRemeshRows[], SbRemeshBodyRows[];
 /* Options read: -remesh_..., -body_<name>_remesh_quality. remesh: NULL when none asks for it. Collective. */
 PetscErrorCode SbRemeshSetFromOptions(SbModel model, SbRemesh *remesh);
 /* Who makes the tets, instead of SbMesherDefault(). Not collective. */

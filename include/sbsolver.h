@@ -17,7 +17,7 @@ typedef struct _SbSolverPreset {
   PetscBool by_type;                                    /* the name is a -pc_type of the user */
 } SbSolverPreset;
 
-PetscErrorCode SbSolverRegister(void);
+extern const SbOption SbSolverRows[];
 /* Reads -solver: "auto" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
 /* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row whose

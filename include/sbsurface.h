@@ -43,4 +43,4 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface, con
 
 /* The reader of a body that is a surface, which becomes tets by body->tet. */
 PetscErrorCode SbImportRead_Surface(const char *path, SbImport *body);
-PetscErrorCode SbTetRegister(void); /* rows of the option table */
+extern const SbOption SbTetRows[];

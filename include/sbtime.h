@@ -35,7 +35,7 @@ typedef struct _p_SbRun *SbRun;
 
 /*
   A step as solved, before it becomes the state: the solver can still evaluate its equations at U. All vectors
-  are lent; V, A and those of the start are NULL in a static run, where t is the load factor.
+  are lent; velocities and accelerations are NULL in a static run, where t is the load factor.
 */
 typedef struct {
   PetscReal t, dt;  /* start and length, s */
@@ -180,7 +180,8 @@ struct _p_SbRun {
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
 /* X = (K + H)^-1 B, K the last tangent, H the Hessian of barrier contact; solved: any contact. Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
-PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
+extern const SbOption SbTimeRows[];
+PetscErrorCode SbTimeRegister(void); /* the TSType and the SNESType */
 /* Reads the options -time, -solver, ...; nothing is computed yet. */
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run);
 /* Name of the integrator, e.g. "newmark". */

@@ -125,13 +125,10 @@ static const struct {
 /* Rows of the output in the option table: the n rows registered with output_dir. */
 static inline const SbOptionRow *part_output_rows(PetscInt *n)
 {
-  const SbOptionRow *first = NULL;
+  const SbOptionRow *first = SbTheOptions.row;
 
-  *n = 0;
-  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
-    if (strcmp(SbTheOptions.row[i].rows[0].key, "output_dir")) continue;
-    if (!(*n)++) first = &SbTheOptions.row[i];
-  }
+  while (first->row != SbOutputRows) first++;
+  for (*n = 0; SbOutputRows[*n].key;) (*n)++;
   return first;
 }
 

@@ -190,10 +190,7 @@ static void print_error(void)
 
 int SbErrorFinish(PetscErrorCode ierr)
 {
-  enum {
-    SPEAKER, /* encoded: lowest rank with a user error, else lowest rank with any error */
-    FAILED
-  };
+  enum { SPEAKER, FAILED }; /* SPEAKER, encoded: lowest rank with a user error, else with any error */
   const int failed = ierr ? 1 : state.posted ? state.code : 0;
   int mine[2], all[2], done = 0;
   PetscMPIInt rank, size;

@@ -43,7 +43,7 @@ static const struct {
   {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},  {"tanh", 1, tanh, NULL, NULL},
   {"step", 1, step_of, NULL, NULL}, {"ramp", 1, ramp_of, NULL, NULL}, {"clamp", 3, NULL, NULL, clamp_of},
 };
-static const char *const variables[] = {"t", "x", "y", "z"};
+static const char *const variables[] = {"t", "x", "y", "z", "pi"}; /* and a constant */
 
 #define SUM "+-" /* operators of a rank; PRODUCT binds closer */
 #define PRODUCT "*/"
@@ -106,14 +106,10 @@ static PetscErrorCode word(Parser *p)
   for (; isalnum((unsigned char)*p->next) || *p->next == '_'; p->next++)
     if (n + 1 < sizeof(name)) name[n++] = *p->next;
   name[n] = 0;
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 5; i++) {
     if (strcmp(name, variables[i])) continue;
-    p->formula->uses[i > 0] = PETSC_TRUE;
-    PetscCall(emit(p, 'v', i, 0, 1));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (!strcmp(name, "pi")) {
-    PetscCall(emit(p, 'n', 0, PETSC_PI, 1));
+    if (i < 4) p->formula->uses[i > 0] = PETSC_TRUE;
+    PetscCall(emit(p, i < 4 ? 'v' : 'n', i, PETSC_PI, 1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
@@ -130,8 +126,7 @@ static PetscErrorCode word(Parser *p)
   }
   // an unknown name: suggest similar ones
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[nknown++] = functions[i].name;
-  for (int i = 0; i < 4; i++) known[nknown++] = variables[i];
-  known[nknown++] = "pi";
+  for (int i = 0; i < 5; i++) known[nknown++] = variables[i];
   if (n > 1) SbSuggestNames(name, nknown, known, sizeof(near), near);
   PetscCall(PetscSNPrintf(
     what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,

@@ -86,15 +86,13 @@ void SbLiveForget(SbFormula formula)
   }
 }
 
-PetscErrorCode SbLiveSetUp(const char *file)
+void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace)
 {
-  PetscFunctionBeginUser;
   SbFormat(sizeof(live.file), live.file, "%s", file);
-  PetscCall(SbOptionReal(&SbRunScope, "live_speed", &live.speed));
-  PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &live.angular_speed));
-  PetscCall(SbOptionReal(&SbRunScope, "live_pace", &live.pace));
+  live.speed = speed;
+  live.angular_speed = angular_speed;
+  live.pace = pace;
   live.clock = 0.;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscInt SbLiveCount(void)

@@ -24,6 +24,8 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
   PetscInt at = -1;
 
   PetscFunctionBeginUser;
+  if (n == PETSC_DECIDE)
+    for (n = 0; rows[n].key;) n++;
   /* in the order of the manual: at the end of its class, rows of all types before those of one */
   for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
     if (strcmp(r[i].klass, klass)) continue;
@@ -56,7 +58,7 @@ void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char 
 const SbOption *SbOptionFind(const SbScope *scope, const char *key)
 {
   for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++)
-    if (!strcmp(r->row->key, key) && !strcmp(r->klass, scope->klass) &&
+    if (!strcasecmp(r->row->key, key) && !strcmp(r->klass, scope->klass) &&
         (!r->type[0] || !strcmp(r->type, scope->type)))
       return r->row;
   return NULL;
@@ -213,13 +215,6 @@ PetscErrorCode SbOptionsRemember(void)
   PetscCall(SbOptionUsersGet(&SbTheOptions.nuser, &SbTheOptions.user));
   SbTheOptions.remembered = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool SbOptionIsRead(const char *name)
-{
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
-    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
-  return PETSC_FALSE;
 }
 
 /* Whether an option, without its dash, is a list of names: -effects, -body_liver_inclusions. */

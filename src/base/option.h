@@ -43,8 +43,6 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 
 /* SbOptionFind(), an internal error if there is none. */
 PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOption **row);
-/* Whether the option of this full name, without its dash, has been read. */
-PetscBool SbOptionIsRead(const char *name);
 /* Value of an option, given for the instance or for one from which it inherits, and the scope in which it is
    recorded: its own, or that of the original of a copy. */
 PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,

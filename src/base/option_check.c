@@ -14,15 +14,6 @@
 */
 #include "option.h"
 
-/* Row of a program-wide option, by its name without dash; NULL if there is none. */
-static const SbOption *program_row(const char *name)
-{
-  for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
-    if (!SbTheOptions.row[i].klass[0] && !strcasecmp(SbTheOptions.row[i].row->key, name))
-      return SbTheOptions.row[i].row;
-  return NULL;
-}
-
 /* Prefixes of PETSc's options that occur in runs of supple. */
 static PetscBool looks_like_petsc(const char *name)
 {
@@ -162,7 +153,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
 {
   char near[3 * SB_OPTION_NAME_MAX] = "", dashed[SB_OPTION_NAME_MAX], why[1024] = "";
   const char *klass = class_of(name);
-  const SbOption *row = program_row(name);
+  const SbOption *row = SbOptionFind(&SbRunScope, name);
   PetscInt n = 0, room = SbTheOptions.nrecord;
   const char **list;
   char(*names)[SB_OPTION_NAME_MAX], **words;
@@ -207,7 +198,6 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
 
       SbScopeSet(&scope, r->klass, "", instance);
       SbOptionName(&scope, r->row->key, sizeof(*names), names[n]);
-      if (SbOptionIsRead(names[n] + 1)) continue;
       list[n] = names[n];
       n++;
     }
@@ -267,7 +257,7 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
     if (strncasecmp(names[i], r->name + 1, before)) continue;
     key = names[i] + before;
     if (before ? !SbOptionFind(&r->scope, key)
-               : !class_of(key) && !looks_like_petsc(key) && !program_row(key))
+               : !class_of(key) && !looks_like_petsc(key) && !SbOptionFind(&SbRunScope, key))
       list[n++] = names[i];
   }
   SbSuggestNames(r->name + 1, n, list, sizeof(near), near);
@@ -333,7 +323,7 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
     if (!users ||
         SbHasPrefix(names[i], "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
                               "nox objects_dump options_left options_view saw_options x_virtual") ||
-        class_of(names[i]) || program_row(names[i]))
+        class_of(names[i]) || SbOptionFind(&SbRunScope, names[i]))
       continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
                         values[i] ? values[i] : ""));

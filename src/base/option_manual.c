@@ -7,10 +7,6 @@
 */
 #include "option.h"
 
-#define USAGE                                    \
-  "  supple SCENARIO.opts [-option value ...]\n" \
-  "  mpirun -n 4 supple SCENARIO.yml [-option value ...]\n"
-
 /* Options of a first scenario: [class, type, key]. */
 static const char *const first_options[][3] = {
   {"", "", "bodies"},      {"body", "", "mesh"},    {"body", "", "material"}, {"body", "", "young"},
@@ -106,12 +102,14 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
   if (!topic[0] || all) {
     char word[SB_NAME_MAX], words[1024] = " ";
 
-    PetscCall(PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n%s",
-                                     SB_VERSION, USAGE));
     PetscCall(PetscViewerASCIIPrintf(
       viewer,
+      "supple %s - soft bodies by finite elements on PETSc\n\n"
+      "  supple SCENARIO.opts [-option value ...]\n"
+      "  mpirun -n 4 supple SCENARIO.yml [-option value ...]\n"
       "  supple -help [TOPIC]\n\nSI units. The last value given wins. Scenarios to start from: scenarios/\n\n"
-      "A first scene\n"));
+      "A first scene\n",
+      SB_VERSION));
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(first_options); k++) {
       const char *const *o = first_options[k];
 

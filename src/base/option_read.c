@@ -60,19 +60,16 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
   PetscBool in;
   const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
   char open, close;
-  char lo_text[64], hi_text[64];
-  PetscReal lo, hi;
+  double lo, hi;
 
   PetscFunctionBeginUser;
   /* whether x is in "[a, b)"; an empty range has all numbers but NaN; an invalid one is an internal error */
   in = (PetscBool)(x == x);
   if (r->row->range[0]) {
-    PetscCheck(sscanf(r->row->range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
-                 strchr("([", open) && strchr(")]", close),
+    PetscCheck(sscanf(r->row->range, "%c%lf,%lf%c", &open, &lo, &hi, &close) == 4 && strchr("([", open) &&
+                 strchr(")]", close),
                PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table",
                r->row->range);
-    lo = strtod(lo_text, NULL);
-    hi = strtod(hi_text, NULL);
     in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
   }
   PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank,

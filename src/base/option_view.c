@@ -30,22 +30,17 @@ static PetscErrorCode print_value(PetscViewer viewer, const char *value, int wid
 static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, PetscBool with_presets)
 {
   const SbOption *row = r->row;
-  const int used = (int)strlen(r->name), help = (int)strlen(row->help);
+  const char *mark = strpbrk(r->text, "#\"")
+                       ? "# an option file cannot hold this value; give it on the command line:\n# "
+                     : r->given || (with_presets && r->text[0]) ? ""
+                                                                : "# ";
 
   PetscFunctionBeginUser;
-  if (strpbrk(r->text, "#\""))
-    PetscCall(PetscViewerASCIIPrintf(
-      viewer, "# an option file cannot hold this value; give it on the command line:\n# "));
-  else if (!r->given && (!with_presets || !r->text[0]))
-    PetscCall(PetscViewerASCIIPrintf(viewer, "# "));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", r->name));
-  PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - used)));
-  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%.*s", r->given ? "" : "default; ",
-                                   help && row->help[help - 1] == '.' ? help - 1 : help, row->help));
-  if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, ", %s", row->unit));
-  if (row->range[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, ", %s%s", strchr("[(", row->range[0]) ? "in " : "", row->range));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s%s", mark, r->name));
+  PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - (int)strlen(r->name))));
+  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%s%s%s%s%s%s\n", r->given ? "" : "default; ", row->help,
+                                   row->unit[0] ? ", " : "", row->unit, row->range[0] ? ", " : "",
+                                   row->range[0] == '[' || row->range[0] == '(' ? "in " : "", row->range));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,8 +90,11 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
   if (!SbTheOptions.remembered) PetscCall(SbOptionUsersGet(&n, &users));
   for (PetscInt i = 0; i < n; i++) {
     const char *value = users[i].value;
+    PetscBool ours = PETSC_FALSE;
 
-    if (SbOptionIsRead(users[i].name)) continue;
+    for (const SbOptionRecord *r = records; r < end && !ours; r++)
+      ours = (PetscBool)!strcasecmp(r->name + 1, users[i].name);
+    if (ours) continue;
     if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
     any = PETSC_TRUE;
     PetscCall(

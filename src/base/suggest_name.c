@@ -8,12 +8,10 @@
 #include <stdlib.h>
 #include "option.h"
 
-#define WORD_MAX SB_OPTION_NAME_MAX
-
 static PetscInt edit_distance(const char *a, const char *b)
 {
-  PetscInt row[3][WORD_MAX + 1];
-  const size_t na = PetscMin(strlen(a), WORD_MAX), nb = PetscMin(strlen(b), WORD_MAX);
+  PetscInt row[3][SB_OPTION_NAME_MAX + 1];
+  const size_t na = PetscMin(strlen(a), SB_OPTION_NAME_MAX), nb = PetscMin(strlen(b), SB_OPTION_NAME_MAX);
 
   for (size_t j = 0; j <= nb; j++) row[0][j] = (PetscInt)j;
   for (size_t i = 1; i <= na; i++) {

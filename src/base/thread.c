@@ -10,15 +10,16 @@
 #include <link.h>
 #include "sbbase.h"
 
-/* Functions of a library that set and get its number of threads. */
+/* Functions of a library that set its number of threads, and get it unless another one returns 0. */
 static const struct {
-  const char *set, *ask;
+  const char *set;
   int one; /* argument for one thread */
+  const char *ask, *unless;
 } controls[] = {
-  {"omp_set_max_active_levels", NULL, 0},
-  {"openblas_set_num_threads", "openblas_get_num_threads", 1},
-  {"MKL_Set_Num_Threads", "MKL_Get_Max_Threads", 1},
-  {"bli_thread_set_num_threads", NULL, 1},
+  {"omp_set_max_active_levels", 0, "omp_get_max_threads", "omp_get_max_active_levels"},
+  {"openblas_set_num_threads", 1, "openblas_get_num_threads", NULL},
+  {"MKL_Set_Num_Threads", 1, "MKL_Get_Max_Threads", NULL},
+  {"bli_thread_set_num_threads", 1, NULL, NULL},
 };
 
 /* Callback for one loaded library: limits its threads, and finds the largest number that remains. */
@@ -31,22 +32,14 @@ static int set_library(struct dl_phdr_info *info, size_t size, void *most)
   if (!library) return 0;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(controls); k++) {
     void (*set)(int) = NULL;
-    int (*ask)(void) = NULL;
+    int (*ask)(void) = NULL, (*unless)(void) = NULL;
 
     /* conversion to a function pointer as described by POSIX */
     *(void **)&set = dlsym(library, controls[k].set);
     if (controls[k].ask) *(void **)&ask = dlsym(library, controls[k].ask);
+    if (controls[k].unless) *(void **)&unless = dlsym(library, controls[k].unless);
     if (set) (*set)(controls[k].one);
-    if (ask) *threads = PetscMax(*threads, (*ask)());
-  }
-
-  /* OpenMP without active levels to limit, or one that ignored the call */
-  {
-    int (*levels)(void) = NULL, (*ask)(void) = NULL;
-
-    *(void **)&levels = dlsym(library, "omp_get_max_active_levels");
-    *(void **)&ask = dlsym(library, "omp_get_max_threads");
-    if (ask && (!levels || (*levels)() > 0)) *threads = PetscMax(*threads, (*ask)());
+    if (ask && (!unless || (*unless)() > 0)) *threads = PetscMax(*threads, (*ask)());
   }
   (void)dlclose(library);
   return 0;

@@ -10,12 +10,13 @@
 static const SbEffectType *types[SB_EFFECT_TYPES];
 static PetscInt ntype;
 
-static const SbOption common_rows[] = {
+const SbOption SbEffectRows[] = {
   {"type", SB_OPTION_STRING, 1, "", "", "", "type of the effect; default: its name"},
   {"from", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
    "time from which a load, support or prescribed displacement acts (static: load factor)"},
   {"until", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
    "time until which the effect acts; a support is released at the end of the step that reaches it"},
+  {0},
 };
 
 PetscErrorCode SbEffectRegister(const SbEffectType *type)
@@ -28,7 +29,7 @@ PetscErrorCode SbEffectRegister(const SbEffectType *type)
   PetscCheck(i < SB_EFFECT_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for effects of type %s",
              type->name);
   if (i == ntype) types[ntype++] = type;
-  PetscCall(SbOptionsRegister("effect", "", PETSC_STATIC_ARRAY_LENGTH(common_rows), common_rows));
+  PetscCall(SbOptionsRegister("effect", "", PETSC_DECIDE, SbEffectRows));
   PetscCall(SbOptionsRegister("effect", type->name, type->nrow, type->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,17 +13,11 @@
 #include "sblog.h"
 #include "sbtet.h"
 
-static const SbOption rows[] = {
+const SbOption SbSpaceRows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",
    "mass matrix: lumped at the nodes, or consistent with the basis"},
+  {0},
 };
-
-PetscErrorCode SbSpaceRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Whether a cell is a P2 cell with curved edges. */
 static PetscBool is_curved(SbSpace s, PetscInt cell)

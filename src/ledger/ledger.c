@@ -18,7 +18,7 @@
 const char *const SbErrorNames[SB_ERROR_COUNT] = {"space",  "time",    "nonlinear",
                                                   "linear", "contact", "rounding"};
 
-static const SbOption rows[] = {
+const SbOption SbLedgerRows[] = {
   {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
    "estimate the error of the result by its sources (mesh, time step, iterations, contact), and print a "
    "table of them with the seconds spent on each, the error ledger"},
@@ -37,14 +37,8 @@ static const SbOption rows[] = {
    "barrier; 0: as given by their options"},
   {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "wall time that a step may take: tolerances are chosen as tight as it allows; 0: no limit"},
+  {0},
 };
-
-PetscErrorCode SbLedgerRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
 {
@@ -207,37 +201,25 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
 /* Lists the accumulated errors for checkpoints. */
 static PetscErrorCode carry(SbLedger l)
 {
-  const struct {
-    const char *name;
-    PetscReal *value;
-    int n;
-  } all[] = {{"error", l->error, SB_ERROR_COUNT},
-             {"derivative", l->derivative, 4},
-             {"mean", l->mean, 4},
-             {"lost", &l->lost, 1},
-             {"tau", &l->tau, 1},
-             {"span", &l->span, 1},
-             {"stored", &l->stored, 1},
-             {"step_time", &l->step_time, 1},
-             {"step_linear", &l->step_linear, 1},
-             {"step_nonlinear", &l->step_nonlinear, 1},
-             {"offset", &l->offset, 1},
-             {"residual", &l->residual, 1},
-             {"seen_residual", &l->seen_residual, 1},
-             {"kept_part", &l->kept_part, 1},
-             {"work", &l->work, 1},
-             {"own_work", &l->own_work, 1},
-             {"least", &l->quantity.least, 1},
-             {"most", &l->quantity.most, 1}};
+  static const char *const names[] = {
+    "error",         "derivative", "mean",        "lost",           "tau",    "span",
+    "stored",        "step_time",  "step_linear", "step_nonlinear", "offset", "residual",
+    "seen_residual", "kept_part",  "work",        "own_work",       "least",  "most"};
+  static const int sizes[] = {SB_ERROR_COUNT, 4, 4}; /* of the first ones; 1 of the others */
+  PetscReal *const values[PETSC_STATIC_ARRAY_LENGTH(names)] = {
+    l->error,     l->derivative,      l->mean,           &l->lost,        &l->tau,
+    &l->span,     &l->stored,         &l->step_time,     &l->step_linear, &l->step_nonlinear,
+    &l->offset,   &l->residual,       &l->seen_residual, &l->kept_part,   &l->work,
+    &l->own_work, &l->quantity.least, &l->quantity.most};
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(all); k++) {
-    for (int i = 0; i < all[k].n; i++, n++) {
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(names); k++) {
+    for (int i = 0; i < (k < PETSC_STATIC_ARRAY_LENGTH(sizes) ? sizes[k] : 1); i++, n++) {
       PetscCheck(n < SB_LEDGER_CARRIED, PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d numbers",
                  SB_LEDGER_CARRIED);
-      PetscCall(PetscSNPrintf(l->carried[n].name, SB_NAME_MAX, "ledger_%s_%d", all[k].name, i));
-      l->carried[n].value = all[k].value + i;
+      PetscCall(PetscSNPrintf(l->carried[n].name, SB_NAME_MAX, "ledger_%s_%d", names[k], i));
+      l->carried[n].value = values[k] + i;
     }
   }
   l->run->carried = l->carried;

@@ -3,7 +3,7 @@
 #include "sbsurface.h"
 #include "sblog.h"
 
-static const SbOption rows[] = {
+const SbOption SbMeshRows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
    "how the mesh is partitioned: METIS (small interfaces between ranks; computed on rank 0), recursive "
    "bisection (in parallel), auto: METIS up to 50,000 tets"},
@@ -13,15 +13,8 @@ static const SbOption rows[] = {
    "from 50,000 tets on. Other meshes are read by rank 0"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
+  {0},
 };
-
-PetscErrorCode SbMeshRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscCall(SbTetRegister());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh)

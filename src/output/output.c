@@ -5,7 +5,7 @@
 #include <time.h>
 #include "output_impl.h"
 
-static const SbOption rows[] = {
+const SbOption SbOutputRows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
   {"output_overwrite", SB_OPTION_BOOL, 1, "", "false", "",
@@ -45,15 +45,8 @@ static const SbOption rows[] = {
    "history.csv"},
   {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a progress line"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
+  {0},
 };
-
-PetscErrorCode SbOutputRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscCall(SbProbesRegister());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet)
 {
@@ -138,9 +131,13 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   /* live.txt, which has the values of live formulas */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
+    PetscReal speed, angular_speed, pace;
 
+    PetscCall(SbOptionReal(&SbRunScope, "live_speed", &speed));
+    PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &angular_speed));
+    PetscCall(SbOptionReal(&SbRunScope, "live_pace", &pace));
     PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
-    PetscCall(SbLiveSetUp(path));
+    SbLiveSetUp(path, speed, angular_speed, pace);
   }
 
   /* console output */

@@ -267,7 +267,6 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
-PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */

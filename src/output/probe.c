@@ -22,7 +22,7 @@ static const char *const number_names[NNUMBER] = {"x", "y", "z", "body"};
 
 static const char *const keys[] = {"at", "on", "in"}; /* options that say where it is, by SbProbeKind */
 
-static const SbOption rows[] = {
+const SbOption SbProbeRows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
    "position of the probe in the reference configuration (after scale, rotate, translate); the nearest "
    "vertex is taken, of p2 also the middle of an edge"},
@@ -35,14 +35,8 @@ static const SbOption rows[] = {
    "columns of history.csv: displacement, position, velocity, acceleration, stress, von_mises, pressure, "
    "mean_pressure, J, energy_density; quantities of tets are averaged over the tets around the vertex, or "
    "behind the facets"},
+  {0},
 };
-
-PetscErrorCode SbProbesRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("probe", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 {

@@ -42,7 +42,7 @@ struct _p_SbRemesh {
   SbColumn *column; /* columns of the ledger and remesh_loss */
 };
 
-static const SbOption rows[] = {
+const SbOption SbRemeshRows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
    "a body is re-meshed when the radius ratio 3 r/R (inscribed and circumscribed sphere) of a tet falls "
    "below this (1: regular, 0: flat, negative: inverted); 0: off"},
@@ -56,18 +56,12 @@ static const SbOption rows[] = {
   {"remesh_size", SB_OPTION_REAL, 1, "", "1", "[0.1, 10]",
    "edge length of new tets inside a body, relative to the mean edge of its surface, whose triangles are "
    "kept"},
+  {0},
 };
-static const SbOption body_rows[] = {
+const SbOption SbRemeshBodyRows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "value for this body in place of -remesh_quality"},
+  {0},
 };
-
-PetscErrorCode SbRemeshRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {

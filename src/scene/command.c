@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include "scene_impl.h"
 
-static const SbOption rows[] = {
+const SbOption SbCommandRows[] = {
   {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
    "print the stack of calls with every error, also of the input"},
   {"help", SB_OPTION_BOOL, 1, "", "false", "",
@@ -25,14 +25,8 @@ static const SbOption rows[] = {
   {"options_table", SB_OPTION_STRING, 1, "", "", "",
    "write the table of options as tab-separated text, one option per line, to this file (without one: "
    "standard output), and end"},
+  {0},
 };
-
-PetscErrorCode SbCommandRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Whether a word is this option, with one dash or two. */
 static PetscBool is_option(const char *word, const char *key)

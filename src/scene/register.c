@@ -16,6 +16,15 @@ PetscErrorCode SbRegisterAll(void)
                                                 &SbEffectPrescribedDisplacement,
                                                 &SbEffectDamping,
                                                 &SbEffectContact};
+  static const struct {
+    const char *klass;
+    const SbOption *rows;
+  } tables[] = {{"", SbRunRows},          {"body", SbBodyRows},       {"inclusion", SbInclusionRows},
+                {"effect", SbEffectRows}, {"", SbMeshRows},           {"body", SbTetRows},
+                {"", SbSpaceRows},        {"", SbTimeRows},           {"", SbSolverRows},
+                {"", SbOutputRows},       {"probe", SbProbeRows},     {"", SbLedgerRows},
+                {"", SbRemeshRows},       {"body", SbRemeshBodyRows}, {"", SbCommandRows},
+                {"set", SbSetRows}};
 
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
@@ -24,17 +33,11 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(PetscPartitionerInitializePackage());
 
   /* in the order of the manual */
-  PetscCall(SbSceneRegister());
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
-  PetscCall(SbMeshRegister());
-  PetscCall(SbSpaceRegister());
-  PetscCall(SbTimeRegister());
-  PetscCall(SbOutputRegister());
-  PetscCall(SbLedgerRegister());
-  PetscCall(SbRemeshRegister());
-  PetscCall(SbCommandRegister());
-
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(tables); i++)
+    PetscCall(SbOptionsRegister(tables[i].klass, "", PETSC_DECIDE, tables[i].rows));
   PetscCall(SbElementRegisterAll());
   PetscCall(SbMaterialRegisterAll());
+  PetscCall(SbTimeRegister());
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

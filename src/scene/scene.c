@@ -16,7 +16,7 @@
 /* Materials registered by SbMaterialRegisterAll(), for the manual. */
 #define LAWS "linear|corotated|stvk|neohookean"
 
-static const SbOption run_rows[] = {
+const SbOption SbRunRows[] = {
   {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, separated by commas"},
   {"sets", SB_OPTION_NAMES, 1, "", "", "",
    "names of sets that are defined by a shape; physical groups of the meshes, bodies, `all` and `boundary` "
@@ -24,8 +24,9 @@ static const SbOption run_rows[] = {
   {"effects", SB_OPTION_NAMES, 1, "", "", "", "names of the effects: loads, supports, damping and contact"},
   {"validate", SB_OPTION_BOOL, 1, "", "false", "",
    "check the invariants of the mesh and of the finite-element space after set-up"},
+  {0},
 };
-static const SbOption body_rows[] = {
+const SbOption SbBodyRows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
    "mesh of tetrahedra: a file (.msh .mesh .vtk .vtu .unv .inp .bdf .ele .vol .h5 and others: "
    "docs/reference/meshes.md), a closed surface to fill (.stl .obj .off .ply .poly .smesh), or "
@@ -59,27 +60,20 @@ static const SbOption body_rows[] = {
    "initial velocity: numbers or formulas of the reference position x, y, z"},
   {"angular_velocity", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
    "initial angular velocity about the centre of mass"},
+  {0},
 };
-static const SbOption inclusion_rows[] = {
+const SbOption SbInclusionRows[] = {
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
+  {0},
 };
 
-static const SbOption set_rows[] = {
+const SbOption SbSetRows[] = {
   {"at", SB_OPTION_STRING, 1, "", NULL, "",
    "shape of the set in the reference configuration, after scale, rotate, translate (m): "
    "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, halfspace:nx,ny,nz,d (n.x "
    "<= d), or group:name, body:name, boundary"},
+  {0},
 };
-
-PetscErrorCode SbSceneRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
-  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
-  PetscCall(SbOptionsRegister("set", "", PETSC_STATIC_ARRAY_LENGTH(set_rows), set_rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Describes what is wrong with a name; NULL if it is valid. */
 static const char *name_problem(const char *name)

@@ -5,9 +5,7 @@
 #include "sbledger.h"
 #include "sbscene.h"
 
-/* Register the options of the command line and of the scene. */
-PetscErrorCode SbCommandRegister(void);
-PetscErrorCode SbSceneRegister(void);
+extern const SbOption SbCommandRows[], SbRunRows[], SbBodyRows[], SbInclusionRows[], SbSetRows[];
 
 /* Placement of a copy of a body. */
 typedef struct {

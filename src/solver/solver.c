@@ -90,7 +90,7 @@ static const SbSolverPreset by_type[] = {
   {"", SB_MATRIX_AIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
 };
 
-static const SbOption rows[] = {
+const SbOption SbSolverRows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_hypre|"
    "gauss_seidel|sor|cholmod|umfpack|mumps|rotated|realtime|pressure",
@@ -105,14 +105,8 @@ static const SbOption rows[] = {
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "bitwise identical results of every run on the same number of ranks: matrices are factored on one rank, "
    "and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival of messages"},
+  {0},
 };
-
-PetscErrorCode SbSolverRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
 {

@@ -9,7 +9,7 @@
 
 #define WELD 1e-7 /* default merge tolerance over the diagonal: the precision of text files */
 
-static const SbOption rows[] = {
+const SbOption SbTetRows[] = {
   {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
    "edge length of the tets made from a surface; default: the mean edge of its triangles"},
   {"tet_surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
@@ -25,14 +25,8 @@ static const SbOption rows[] = {
   {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
    "largest displacement of vertices that removes small self-intersections of a surface; default: half its "
    "mean edge"},
+  {0},
 };
-
-PetscErrorCode SbTetRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("body", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscBool SbMeshFileIsSurface(const char *path)
 {

@@ -28,7 +28,7 @@ void SbRunIntegrator(SbRun run, size_t size, char name[])
   SbFormat(size, name, "%.*s", (int)strcspn(word, "|"), word);
 }
 
-static const SbOption rows[] = {
+const SbOption SbTimeRows[] = {
   {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit", NAMES, "time integrator, or static equilibrium"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",
    "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the "
@@ -86,13 +86,12 @@ static const SbOption rows[] = {
   {"static_longest_step", SB_OPTION_REAL, 1, "", "10", "(0, inf)",
    "arc_length: largest increment of arc length, as a multiple of the first one, whose load increment is "
    "1/-static_steps"},
+  {0},
 };
 
 PetscErrorCode SbTimeRegister(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscCall(SbSolverRegister());
   PetscCall(TSRegister(SB_TS_SECOND_ORDER, SbSecondOrderCreate));
   PetscCall(SNESRegister(SB_SNES_NEWTON, SbNewtonCreate));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,8 +191,8 @@ static SbMethodSettings method_settings(SbRun run)
   return set;
 }
 
-/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w):
-   the root of p = m d^2 + w^2 f g below, q its derivative. */
+/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w): of
+   m d^2 + w^2 f g = 0 below, by fixed-point iteration, as w is small. */
 static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 {
   double complex z = cexp(I * w);
@@ -201,12 +200,8 @@ static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
   for (int i = 0; i < 50; i++) {
     const double complex d = z - 1, m = 1 - s->alpha_m + s->alpha_m * z, f = 1 - s->alpha_f + s->alpha_f * z;
     const double complex g = 1 - s->gamma + s->gamma * z + (0.5 - s->beta + s->beta * z) * d;
-    const double complex p = m * d * d + w * w * f * g;
-    const double complex q =
-      s->alpha_m * d * d + 2 * m * d +
-      w * w * (s->alpha_f * g + f * (s->gamma + 0.5 - s->beta + s->beta * z + s->beta * d));
 
-    z -= p / q;
+    z = 1 + I * w * csqrt(f * g / m);
   }
   return z;
 }
@@ -214,28 +209,17 @@ static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 {
   const SbMethodSettings s = method_settings(run);
+  const PetscBool alpha = (PetscBool)(s.method == SB_METHOD_GENERALIZED_ALPHA),
+                  symplectic = (PetscBool)(s.method == SB_METHOD_EULER_SYMPLECTIC);
   const double w = 0.03;
-  double complex z;
+  const double complex z = s.method == SB_METHOD_EULER_IMPLICIT   ? 1 / (1 - I * w)
+                           : s.method == SB_METHOD_EULER_EXPLICIT ? 1 + I * w
+                           : symplectic ? cexp(2 * I * asin(w / 2)) /* the method is central differences */
+                                        : alpha_eigenvalue(&s, w);
 
-  *ahead = 0;
-  *order = 1;
-  switch (s.method) {
-  case SB_METHOD_GENERALIZED_ALPHA:
-    z = alpha_eigenvalue(&s, w);
-    if (PetscAbsReal(s.gamma - 0.5 - s.alpha_m + s.alpha_f) < 1e-9) *order = 2;
-    break;
-  case SB_METHOD_EULER_IMPLICIT:
-    z = 1 / (1 - I * w);
-    break;
-  case SB_METHOD_EULER_EXPLICIT:
-    z = 1 + I * w;
-    break;
-  default:
-    z = cexp(2 * I * asin(w / 2)); /* the method is central differences */
-    *order = 2;
-    *ahead = 0.5;
-  }
+  *order = symplectic || (alpha && PetscAbsReal(s.gamma - 0.5 - s.alpha_m + s.alpha_f) < 1e-9) ? 2 : 1;
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
+  *ahead = symplectic ? 0.5 : 0;
 }
 
 /* SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units.

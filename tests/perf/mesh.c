@@ -11,6 +11,7 @@
   and of the largest other rank, less that of the process at its start. One run per process: freed pages may remain.
 */
 #include "perf.h"
+#include <sbsurface.h>
 #include "../../src/mesh/mesh_impl.h"
 
 /* A line of /proc/self/status in MiB. */
@@ -134,7 +135,8 @@ int main(int argc, char **argv)
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   SbMemoryReturnLarge();
-  PetscCall(SbMeshRegister());
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
   PetscCall(PetscMemzero(&body, sizeof(body)));
   body.scale = 1;
   body.edge_nodes = PETSC_TRUE;

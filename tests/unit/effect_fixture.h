@@ -12,6 +12,7 @@
 #include "test.h"
 #include <sblog.h>
 #include <sbeffect.h>
+#include <sbsurface.h>
 
 typedef struct {
   PetscInt nbody, nset;
@@ -41,8 +42,9 @@ static inline PetscErrorCode fixture_register(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
-  PetscCall(SbMeshRegister());
-  PetscCall(SbSpaceRegister());
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbSpaceRows));
   PetscCall(SbMaterialRegisterAll());
   PetscCall(SbElementRegisterAll());
   PetscCall(SbEffectRegister(&SbEffectGravity));

@@ -2,6 +2,7 @@
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
+#include <sbsurface.h>
 #include <sblog.h>
 
 #define DATA "tests/data/"
@@ -207,7 +208,8 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbLogInitialize());
-  PetscCall(SbMeshRegister());
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
   PetscCall(test_scene("metis", PETSC_FALSE));
   PetscCall(test_scene("metis", PETSC_TRUE));
   PetscCall(test_scene("bisection", PETSC_FALSE));

@@ -2,6 +2,7 @@
 // @ranks 1 2 3
 #include <hdf5.h>
 #include "mesh_same.h"
+#include <sbsurface.h>
 
 #define DATA "tests/data/"
 
@@ -428,7 +429,8 @@ int main(int argc, char **argv)
   char path[512], index[512];
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbMeshRegister());
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   /* the .h5 file and its .xmf give every rank the same sums as the .msh */
   PetscCall(test_path_of_all("cubes.h5", path));

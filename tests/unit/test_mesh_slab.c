@@ -2,6 +2,7 @@
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
+#include <sbsurface.h>
 
 enum { NSET = 8 };
 
@@ -214,7 +215,8 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbMeshRegister());
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
   PetscCall(test_same_mesh(PETSC_FALSE, "metis"));
   PetscCall(test_same_mesh(PETSC_FALSE, "bisection"));
   PetscCall(test_same_mesh(PETSC_TRUE, "metis"));
