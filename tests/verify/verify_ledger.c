@@ -259,7 +259,7 @@ static PetscErrorCode gaps(void)
   PetscCall(test_open(&reference, "%s -effect_tool_barrier_width 1e-6", ball));
   PetscCall(verify_solve(&reference, "ball"));
   for (int i = 0; i < 2; i++) {
-    PetscReal error, mesh, stored;
+    PetscReal error, mesh = 0., stored;
 
     PetscCall(test_open(&t, "%s -accuracy %g", plate, asked[i]));
     PetscCall(verify_solve(&t, "plate"));
