@@ -210,7 +210,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
   PetscFunctionBeginUser;
   /* parts of this rank, numbered across all ranks */
-  PetscCall(PetscMalloc1(im->nvert, &part));
+  PetscCall(PetscMalloc3(im->nvert, &part, s->start[s->nkept], &got, s->start[s->nkept], &pair));
   SbImportJoin(im, part, &n);
   total = n;
   PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -218,10 +218,8 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
   /* pairs of parts that share a vertex, each pair once */
-  PetscCall(PetscMalloc2(s->start[s->nkept], &got, s->start[s->nkept], &pair));
   PetscCall(PetscSFGatherBegin(s->vert, MPIU_INT, part, got));
   PetscCall(PetscSFGatherEnd(s->vert, MPIU_INT, part, got));
-  PetscCall(PetscFree(part));
   for (PetscInt v = 0; v < s->nkept; v++)
     for (PetscInt k = s->start[v] + 1; k < s->start[v + 1]; k++)
       pair[npair++] = (PetscInt64)SbKeyOfPair(got[k - 1], got[k]);
@@ -241,7 +239,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(PetscFree(all));
   PetscCall(SbRouteDestroy(&route));
   PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
-  PetscCall(PetscFree2(got, pair));
+  PetscCall(PetscFree3(part, got, pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
