@@ -1,28 +1,12 @@
 /*
   sbgmsh.h - layer 2: the gmsh library at work in a process of its own: it makes tetrahedra. Rank 0 only.
 
-  How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads
-  libgmsh, calls the function with a fresh, empty model, and what the function puts into its SbImport comes
-  back to the caller. The function sees all memory of the caller as it was (its ctx may point anywhere), but
-  what it changes there stays in the child. A PETSc error in the function is raised in the caller with the
-  same code and text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the
-  memory of gmsh goes with the child. A scene that does not call SbGmshRun() never loads the library.
-
-    static PetscErrorCode work(const SbGmsh *gmsh, void *ctx, SbImport *result)
-    {
-      PetscFunctionBeginUser;
-      SB_GMSH(gmsh, ModelAddDiscreteEntity, 2, 1, NULL, 0);
-      SB_GMSH(gmsh, ModelMeshAddNodes, 2, 1, tags, n, x, 3 * n, NULL, 0);
-      SB_GMSH(gmsh, ModelMeshAddElementsByType, 1, 2, NULL, 0, nodes, 3 * ntri);
-      ...
-      SB_GMSH(gmsh, ModelMeshGenerate, 3);
-      SB_GMSH(gmsh, ModelMeshGetElementsByType, 4, &tag, &ntag, &node, &nnode, -1, 0, 1);
-      ...
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-
-    const SbGmshJob job = {im->where, "made tetrahedra", 600, work, &mine};
-    PetscCall(SbGmshRun(&job, im));
+  SbGmshRun() forks; the child loads libgmsh and calls a function of type SbGmshWork with a fresh, empty
+  model. What this puts into its SbImport comes back to the caller. It sees all memory of the caller as it was
+  (its ctx may point anywhere), but what it changes there stays in the child. A PETSc error in the function is
+  raised in the caller with the same code and text. A crash of gmsh, or one that does not end in time, is an
+  error of the caller too; the memory of gmsh goes with the child. A scene that does not call SbGmshRun()
+  never loads the library. For an example see src/surface/tet_gmsh.c.
 
   The functions are those of gmshc.h without the prefix `gmsh` (reference manual of gmsh, "Gmsh API"; one that
   is missing below is a line more), with the same arguments but the last, the error code, which SB_GMSH() adds

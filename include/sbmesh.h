@@ -167,12 +167,8 @@ struct _p_SbMesh {
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
-/*
-  SbMeshEdges - edges of the local cells, each once.
-
-  Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13
-  23; PetscFree().
-*/
+/* Edges of the local cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03 12 13 23;
+   PetscFree(). Not collective. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
 /* Star forest of the leaves 0, 1, ... n - 1 with the roots root[n], of which this rank has the next nroot.
    Collective; the caller destroys it. */
@@ -208,12 +204,15 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);
 typedef struct {
   MPI_Comm comm;
   PetscInt nsend, nrecv;
+  PetscInt *which;    /* [nsend] which of the caller's items they are, or NULL */
+  PetscMPIInt *dest;  /* [nsend] rank to which each goes */
   PetscInt *position; /* [nsend] of a record among those that leave, by rank */
   PetscMPIInt size, *scount, *sfirst, *rcount, *rfirst; /* [size] to and from each rank, the first of them */
 } SbRoute;
 
-/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
-PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
+/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. The route takes over
+   which and dest. Collective. */
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest, SbRoute *route);
 PetscErrorCode SbRouteDestroy(SbRoute *route);
 /* Sends records of `unit` bytes, of which record[which[i]] (NULL: record[i]) goes to dest[i];
    received[nrecv] by rank, PetscFree(). Collective. */

@@ -26,6 +26,12 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 
 /* check.c, quality.c */
 
+/* Adds "what: n" to a note, unless n is 0. */
+static inline void SbNoteCount(size_t size, char note[], const char *what, PetscInt n)
+{
+  if (n) SbAppend(size, note, "%s%s: %" PetscInt_FMT, note[0] ? ", " : "", what, n);
+}
+
 /* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and nlost. */
 PetscErrorCode SbImportDropUnused(SbImport *import);
 /* Removes unused vertices, orients cells, checks for defects; builds the faces. */

@@ -118,8 +118,8 @@ PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, ui
   if (cell && mine[1]) SB_CATCH(&caught, refuse(im, number, least, n[1]));
   PetscCall(SbCaughtRaise(comm, &caught));
   body->volume += volume;
-  SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
-           body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n[0]);
+  SbNoteCount(sizeof(body->note), body->note,
+              body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n[0]);
   if (n[1])
     SbAppend(sizeof(body->note), body->note,
              ", folded over themselves, which p2 refuses: %" PetscInt_FMT " (the first: tetrahedron %lld)",

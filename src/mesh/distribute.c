@@ -22,10 +22,12 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends cells which[] (NULL: all) to ranks dest[] of the route; `owned`: their vertices have owners. */
+/* Sends the cells which[] (NULL: all) of the route; `owned`: their vertices have owners. */
 static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
-                                 const PetscInt which[], const PetscMPIInt dest[], SbLocalMesh *to)
+                                 SbLocalMesh *to)
 {
+  const PetscInt *which = route->which;
+  const PetscMPIInt *dest = route->dest;
   PetscInt *at, *order, *position, *count;
   PetscMPIInt *mark;
   SbRouteList list = {0};
@@ -52,7 +54,7 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
     }
   }
   PetscCall(PetscFree4(order, position, count, mark));
-  PetscCall(SbRouteCreate(route->comm, list.n, list.rank, &vertices));
+  PetscCall(SbRouteCreate(route->comm, list.n, list.item, list.rank, &vertices));
   PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
   PetscCall(PetscFree(at));
   to->ncell = route->nrecv;
@@ -64,8 +66,6 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list.item, from->vertex, &to->vertex));
   if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list.item, from->owner, &to->owner));
   PetscCall(SbRouteDestroy(&vertices));
-  PetscCall(PetscFree(list.item));
-  PetscCall(PetscFree(list.rank));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,7 +97,7 @@ typedef struct {
 /* Shared vertices of this rank with the ranks that have them, from the directory. */
 static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
 {
-  const PetscInt n = local->nvert_cells;
+  const PetscInt n = local->nvert;
   const PetscSFNode *home;
   PetscInt nroot = PETSC_DECIDE, nlist = 0, *orig, *start, *begin, *end;
   PetscMPIInt *holder;
@@ -166,8 +166,8 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
 
   PetscFunctionBeginUser;
   // position of each vertex in border->vert, -1: not shared
-  PetscCall(PetscMalloc2(local->nvert_cells, &shared, size, &mark));
-  for (PetscInt v = 0; v < local->nvert_cells; v++) shared[v] = -1;
+  PetscCall(PetscMalloc2(local->nvert, &shared, size, &mark));
+  for (PetscInt v = 0; v < local->nvert; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
   // a cell goes once to each rank that owns one of its vertices (`all`: that has one)
   for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
@@ -194,7 +194,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
 {
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
-  PetscInt *orig, *number, *order, *position, n = 0;
+  PetscInt *orig, *number, *order, *position, n = 0, nvert;
   SbRouteList copies = {0};
   SbRoute route;
   SbLocalMesh owned, ghost;
@@ -204,12 +204,11 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   whole.ncell = whole.ncell_owned = w->ncell;
-  whole.nvert = whole.nvert_cells = w->nvert;
+  whole.nvert = w->nvert;
   // partition the mesh, and take over its arrays, on one rank without a copy
   PetscCall(PetscMalloc1(w->ncell, &dest));
   PetscCall(SbPartition(comm, type, w, dest));
-  PetscCall(PetscFree(w->neighbour));
-  PetscCall(PetscFree(w->remote));
+  PetscCall(PetscFree2(w->neighbour, w->remote));
   w->cell = NULL;
   w->data = NULL;
   w->vertex = NULL;
@@ -220,10 +219,9 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   // each cell goes to its owner
-  PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
-  PetscCall(send_cells(&whole, PETSC_FALSE, &route, NULL, dest, &owned));
+  PetscCall(SbRouteCreate(comm, w->ncell, NULL, dest, &route));
+  PetscCall(send_cells(&whole, PETSC_FALSE, &route, &owned));
   PetscCall(SbRouteDestroy(&route));
-  PetscCall(PetscFree(dest));
   PetscCall(SbLocalMeshDestroy(&whole));
   // sort owned cells and their vertices by original number; a vertex may have come from several ranks
   *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
@@ -235,7 +233,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     if (!n || local->vertex[n - 1].orig != number[order[i]]) local->vertex[n++] = owned.vertex[order[i]];
     position[order[i]] = n - 1;
   }
-  local->nvert = local->nvert_cells = n;
+  local->nvert = nvert = n;
   PetscCall(PetscFree(owned.vertex));
   PetscCall(ascending(owned.ncell, sizeof(*owned.data), owned.data, number, order));
   PetscCall(PetscMalloc1(4 * (size_t)owned.ncell, &local->cell));
@@ -251,7 +249,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
   PetscCall(border_create(comm, w->Nvert, local, &border));
   // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
-  for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
+  for (PetscInt v = 0; v < local->nvert; v++) local->owner[v] = rank;
   if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
   for (PetscInt i = 0; i < border.n; i += n) {
     Shared *s = border.vert + i;
@@ -268,25 +266,22 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   }
   PetscCall(list_copies(local, &border, all, rank, size, &copies));
   PetscCall(PetscFree2(border.vert, border.rank));
-  PetscCall(SbRouteCreate(comm, copies.n, copies.rank, &route));
-  PetscCall(send_cells(local, PETSC_TRUE, &route, copies.item, copies.rank, &ghost));
+  PetscCall(SbRouteCreate(comm, copies.n, copies.item, copies.rank, &route));
+  PetscCall(send_cells(local, PETSC_TRUE, &route, &ghost));
   PetscCall(SbRouteDestroy(&route));
-  PetscCall(PetscFree(copies.item));
-  PetscCall(PetscFree(copies.rank));
   // append the ghost cells, and those of their vertices that this rank does not have
-  n = local->nvert;
-  PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,
-                         &position));
-  for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
+  n = nvert;
+  PetscCall(PetscMalloc4(nvert, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert, &position));
+  for (PetscInt v = 0; v < nvert; v++) orig[v] = local->vertex[v].orig;
   PetscCall(ascending(ghost.nvert, sizeof(*ghost.vertex), ghost.vertex, number, order));
   PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
   PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
   for (PetscInt i = 0; i < ghost.nvert; i++) {
     const PetscInt v = order[i];
 
-    PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
+    PetscCall(PetscFindInt(number[v], nvert, orig, &position[v]));
     if (position[v] >= 0) continue;
-    if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
+    if (n == nvert || local->vertex[n - 1].orig != number[v]) {
       local->vertex[n] = ghost.vertex[v];
       local->owner[n++] = ghost.owner[v];
     }

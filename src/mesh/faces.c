@@ -1,5 +1,5 @@
 /*
-  faces.c - face connectivity of a tet mesh: which cells share a face.
+  faces.c - connectivity of a tet mesh: which cells share a face; the edges of the cells.
 
   Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about
   twenty faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no
@@ -37,8 +37,8 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
   PetscFunctionBeginUser;
   *faces = (SbFaces){.ncell = ncell};
   // buckets of the faces by lowest vertex
-  PetscCall(PetscCalloc1(nvert + 1, &faces->start));
-  PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->face));
+  PetscCall(PetscMalloc2(nvert + 1, &faces->start, 4 * (size_t)ncell, &faces->face));
+  PetscCall(PetscArrayzero(faces->start, nvert + 1));
   for (PetscInt s = 0; s < 4 * ncell; s++) faces->start[slot_key(cell, s, &key) + 1]++;
   for (PetscInt v = 0; v < nvert; v++) faces->start[v + 1] += faces->start[v];
   PetscCall(PetscMalloc1(nvert, &next));
@@ -84,8 +84,7 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
 PetscErrorCode SbFacesDestroy(SbFaces *faces)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(faces->start));
-  PetscCall(PetscFree(faces->face));
+  PetscCall(PetscFree2(faces->start, faces->face));
   PetscCall(PetscFree(faces->neighbour));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -101,4 +100,35 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
   for (PetscInt i = SbKeysFind(end, face, key); i >= 0 && n < 2 && i < end && face[i].key == key; i++)
     slots[n++] = face[i].slot;
   return n;
+}
+
+/* Counting sort: each edge is in the bucket of its lower vertex, where equal higher vertices are one edge. */
+PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
+{
+  const PetscInt n = 6 * mesh->ncell;
+  PetscInt *low, *high, *start, *item;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(n, &low, n, &high));
+  PetscCall(PetscMalloc1(n, edge));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt *v = mesh->cell + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]], b = v[SbTetEdge[i % 6][1]];
+
+    low[i] = PetscMin(a, b);
+    high[i] = PetscMax(a, b);
+  }
+  PetscCall(SbBucketByKey(n, low, mesh->nvert, &start, &item));
+  *nedge = 0;
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    for (PetscInt i = start[v]; i < start[v + 1]; i++) {
+      PetscInt j = start[v];
+
+      while (high[item[j]] != high[item[i]]) j++;
+      (*edge)[item[i]] = j < i ? (*edge)[item[j]] : (*nedge)++;
+    }
+  }
+  PetscCall(PetscFree2(low, high));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(item));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,36 +1,5 @@
-/* forest.c - edges of the cells; star forests, for the exchange of data between ranks. */
+/* forest.c - star forests: exchange of data between ranks by numbers that all of them know. */
 #include "mesh_impl.h"
-
-/* Counting sort: each edge is in the bucket of its lower vertex, where equal higher vertices are one edge. */
-PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
-{
-  const PetscInt n = 6 * mesh->ncell;
-  PetscInt *low, *high, *start, *item;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(n, &low, n, &high));
-  PetscCall(PetscMalloc1(n, edge));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *v = mesh->cell + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]], b = v[SbTetEdge[i % 6][1]];
-
-    low[i] = PetscMin(a, b);
-    high[i] = PetscMax(a, b);
-  }
-  PetscCall(SbBucketByKey(n, low, mesh->nvert, &start, &item));
-  *nedge = 0;
-  for (PetscInt v = 0; v < mesh->nvert; v++) {
-    for (PetscInt i = start[v]; i < start[v + 1]; i++) {
-      PetscInt j = start[v];
-
-      while (high[item[j]] != high[item[i]]) j++;
-      (*edge)[item[i]] = j < i ? (*edge)[item[j]] : (*nedge)++;
-    }
-  }
-  PetscCall(PetscFree2(low, high));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(item));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const PetscInt root[],
                               PetscSF *forest)

@@ -31,94 +31,57 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* First numbers of a body: original vertex and cell numbers; vertex, cell and remote numbers on this rank. */
-typedef struct {
-  PetscInt orig_vert, orig_cell, vert, cell, remote;
-} Begin;
-
-static void next_body(const SbBody *body, const SbImport *im, const SbPart *part, Begin *at)
-{
-  at->orig_vert += body->nvert;
-  at->orig_cell += body->ncell;
-  at->vert += im->nvert;
-  at->cell += im->item[3].n;
-  at->remote += part->nremote;
-}
-
 /* Appends all bodies to the merged mesh. */
-static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], SbPart part[],
-                            SbMergedMesh *w)
+static PetscErrorCode merge(PetscInt nbody, SbImport im[], SbPart part[], SbMergedMesh *w)
 {
-  Begin at = {0};
+  PetscInt ncurved = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
-  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
-  PetscCall(PetscMalloc1(w->nremote, &w->remote));
+  PetscCall(PetscMalloc2(4 * (size_t)w->ncell, &w->neighbour, w->nremote, &w->remote));
   for (PetscInt b = 0; b < nbody; b++) {
     const PetscInt ncell = im[b].item[3].n;
+    SbPart *q = &part[b];
 
     // append the tets of the body, then free its items
     for (PetscInt i = 0; i < 4 * ncell; i++) {
-      const PetscInt n = part[b].faces.neighbour[i];
+      const PetscInt n = q->faces.neighbour[i];
 
-      w->cell[4 * at.cell + i] = at.vert + im[b].item[3].vert[i];
-      w->neighbour[4 * at.cell + i] = n < 0 ? -1 : n < ncell ? at.cell + n : w->ncell + at.remote + n - ncell;
+      w->cell[4 * q->cell0 + i] = q->vert0 + im[b].item[3].vert[i];
+      w->neighbour[4 * q->cell0 + i] = n < 0       ? -1
+                                       : n < ncell ? q->cell0 + n
+                                                   : w->ncell + q->remote0 + n - ncell;
     }
-    PetscCall(PetscArraycpy(w->remote + at.remote, part[b].remote, part[b].nremote));
-    PetscCall(SbFacesDestroy(&part[b].faces));
+    PetscCall(PetscArraycpy(w->remote + q->remote0, q->remote, q->nremote));
+    PetscCall(SbFacesDestroy(&q->faces));
     for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im[b].item[d]));
     im[b].item[3].n = ncell; /* the count is used below */
-    next_body(&body[b], &im[b], &part[b], &at);
+    for (PetscInt c = 0; c < ncell; c++) w->ncurved += q->masks.cell[c] & SB_CURVED ? 1 : 0;
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
-  for (PetscInt b = 0; b < nbody; b++)
-    for (PetscInt c = 0; c < im[b].item[3].n; c++) w->ncurved += part[b].masks.cell[c] & SB_CURVED ? 1 : 0;
-  PetscCall(PetscMalloc1(w->ncurved, &w->curved));
-  PetscCall(PetscMalloc1(18 * (size_t)w->ncurved, &w->edge_off));
-  w->ncurved = 0;
-  at = (Begin){0};
+  PetscCall(PetscMalloc2(w->ncurved, &w->curved, 18 * (size_t)w->ncurved, &w->edge_off));
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscInt ncurved = 0;
+    const SbPart *q = &part[b];
+    const PetscInt before = ncurved;
 
     // data of the cells and vertices of body b
     for (PetscInt c = 0; c < im[b].item[3].n; c++) {
-      SbCellData *p = &w->data[at.cell + c];
+      SbCellData *p = &w->data[q->cell0 + c];
 
-      *p = (SbCellData){.orig = at.orig_cell + part[b].first + c, .body = b, .set = part[b].masks.cell[c]};
-      PetscCall(PetscArraycpy(p->face, part[b].masks.face + 4 * c, 4));
-      if (p->set & SB_CURVED) w->curved[w->ncurved + ncurved++] = p->orig;
+      *p = (SbCellData){.orig = q->orig_cell + q->first + c, .body = b, .set = q->masks.cell[c]};
+      PetscCall(PetscArraycpy(p->face, q->masks.face + 4 * c, 4));
+      if (p->set & SB_CURVED) w->curved[ncurved++] = p->orig;
     }
-    PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)w->ncurved, part[b].edge_off, 18 * (size_t)ncurved));
+    PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)before, q->edge_off, 18 * (size_t)(ncurved - before)));
     PetscCall(PetscFree(part[b].edge_off));
-    w->ncurved += ncurved;
     for (PetscInt v = 0; v < im[b].nvert; v++) {
       const PetscReal *x = im[b].x + 3 * v;
 
-      w->vertex[at.vert + v] = (SbVertexData){
-        at.orig_vert + (part[b].orig ? part[b].orig[v] : v), b, part[b].masks.vert[v], {x[0], x[1], x[2]}};
+      w->vertex[q->vert0 + v] =
+        (SbVertexData){q->orig_vert + (q->orig ? q->orig[v] : v), b, q->masks.vert[v], {x[0], x[1], x[2]}};
     }
-    next_body(&body[b], &im[b], &part[b], &at);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Errors on rank 0: more tets than PetscInt can number; sets without members. */
-static PetscErrorCode check_all(PetscInt nbody, const SbBody body[], const SbImport im[], PetscInt nset,
-                                const SbSet set[])
-{
-  PetscInt nvert = 0, ncell = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < nbody; b++) {
-    PetscCheck(ncell <= PETSC_MAX_INT / 8 - body[b].ncell && nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
-               PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "body '%s': all bodies together have more tets than this build can number", body[b].name);
-    ncell += body[b].ncell;
-    nvert += body[b].nvert;
-  }
-  PetscCall(SbSetsCheck(nbody, body, im, nset, set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,7 +91,6 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
 {
   SbCaughtError caught = {0, ""};
   PetscMPIInt rank;
-  SbMemoryMesh **in_memory;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -140,26 +102,32 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
       if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, shared, &im[b], &part[b]));
       PetscCall(SbCaughtRaise(comm, &caught));
     }
-    PetscCall(PetscFree(part[b].faces.face)); /* no longer needed: neighbours are known */
-    PetscCall(PetscFree(part[b].faces.start));
+    PetscCall(PetscFree2(part[b].faces.start, part[b].faces.face)); /* neighbours are known */
+    part[b].vert0 = w->nvert;
+    part[b].cell0 = w->ncell;
+    part[b].remote0 = w->nremote;
     w->ncell += im[b].item[3].n;
     w->nvert += im[b].nvert;
     w->nremote += part[b].nremote;
   }
-  if (!rank) SB_CATCH(&caught, check_all(nbody, body, im, nset, set));
+  if (!rank) SB_CATCH(&caught, SbSetsCheck(nbody, body, im, nset, set));
   PetscCall(SbCaughtRaise(comm, &caught));
   // broadcast bodies and sets of rank 0; pointers to meshes in memory are local to each rank
-  PetscCall(PetscMalloc1(nbody, &in_memory));
-  for (PetscInt b = 0; b < nbody; b++) in_memory[b] = body[b].in_memory;
-  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
-  for (PetscInt b = 0; b < nbody; b++) body[b].in_memory = in_memory[b];
-  PetscCall(PetscFree(in_memory));
   PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
   for (PetscInt b = 0; b < nbody; b++) {
+    SbMemoryMesh *const own = body[b].in_memory;
+
+    PetscCallMPI(MPI_Bcast(&body[b], (int)sizeof(*body), MPI_BYTE, 0, comm));
+    body[b].in_memory = own;
+    PetscCheck(w->Ncell <= PETSC_MAX_INT / 8 - body[b].ncell && w->Nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
+               comm, PETSC_ERR_USER_INPUT,
+               "body '%s': all bodies together have more tets than this build can number", body[b].name);
+    part[b].orig_vert = w->Nvert;
+    part[b].orig_cell = w->Ncell;
     w->Nvert += body[b].nvert;
     w->Ncell += body[b].ncell;
   }
-  PetscCall(merge(nbody, body, im, part, w));
+  PetscCall(merge(nbody, im, part, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,11 +172,9 @@ PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *w)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree(w->cell));
-  PetscCall(PetscFree(w->neighbour));
-  PetscCall(PetscFree(w->remote));
+  PetscCall(PetscFree2(w->neighbour, w->remote));
   PetscCall(PetscFree(w->data));
   PetscCall(PetscFree(w->vertex));
-  PetscCall(PetscFree(w->curved));
-  PetscCall(PetscFree(w->edge_off));
+  PetscCall(PetscFree2(w->curved, w->edge_off));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -34,13 +34,13 @@ PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], 
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
-/* Copies the statistics to the "found" fields of the body. */
-void SbShapeKeep(const SbShape *shape, SbBody *body);
+/* Size and shape of the cells of all ranks of comm: sets those of the "found" fields. Collective. */
+PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Writes repairs and warnings to the note of the body, whose number of parts is known. */
 void SbImportNote(const SbImport *import, SbBody *body);
 /* Connected parts: parent[nvert] is the lowest vertex of the part that each vertex belongs to. */
 void SbImportJoin(const SbImport *import, PetscInt parent[], PetscInt *npart);
-/* Volume, shape quality, bounding box and number of parts: sets the "found" fields of the body. */
+/* The same of a whole body, its number of parts and its note: all "found" fields. */
 PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Volume, cosines of the six dihedral angles, radius ratio of a tet. */
 void SbTetShape(const PetscReal x[], const PetscInt vert[4], PetscReal *V, PetscReal cosine[6],
@@ -85,7 +85,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
 /* route.c: see sbmesh.h */
 
-/* A growing list of items that go to other ranks, zeroed at first; free both arrays. */
+/* A growing list of items that go to other ranks, zeroed at first; its arrays become those of a route. */
 typedef struct {
   PetscInt n, room[2];
   PetscInt *item;    /* [n] */
@@ -143,9 +143,11 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
 typedef struct {
   SbFaces faces; /* neighbour ncell + k is remote[k] */
   SbMasks masks;
-  PetscInt first;      /* original number of the first cell */
-  PetscInt *orig;      /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
-  PetscReal *edge_off; /* [][6][3] of cells with SB_CURVED */
+  PetscInt first;                 /* original number of the first cell, from the body's first one */
+  PetscInt orig_vert, orig_cell;  /* original numbers of the body's first vertex and cell */
+  PetscInt vert0, cell0, remote0; /* numbers of its first vertex, cell and remote cell on this rank */
+  PetscInt *orig;                 /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
+  PetscReal *edge_off;            /* [][6][3] of cells with SB_CURVED */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
 } SbPart;
@@ -169,7 +171,6 @@ typedef struct {
   SbCellData *data;     /* [ncell] */
   SbVertexData *vertex; /* [nvert] */
   PetscMPIInt *owner;   /* [nvert] */
-  PetscInt nvert_cells; /* number of vertices of owned cells */
 } SbLocalMesh;
 
 PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *local);

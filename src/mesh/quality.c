@@ -59,22 +59,14 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
 
 void SbImportNote(const SbImport *im, SbBody *body)
 {
-  const struct {
-    PetscInt n;
-    const char *text;
-  } notes[] = {
-    {im->nunused, "unused vertices left out"},
-    {im->nreoriented, "inverted tets turned"},
-    {body->npart > 1 ? body->npart : 0, "parts that share no vertex"},
-    {im->npinched, "surface edges with more than two facets"},
-    {im->nlost, "triangles of groups that are no face of a tet"},
-  };
+  const size_t size = sizeof(body->note);
 
-  SbFormat(sizeof(body->note), body->note, "%s", im->note);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++)
-    if (notes[i].n)
-      SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
-               notes[i].text, notes[i].n);
+  SbFormat(size, body->note, "%s", im->note);
+  SbNoteCount(size, body->note, "unused vertices left out", im->nunused);
+  SbNoteCount(size, body->note, "inverted tets turned", im->nreoriented);
+  SbNoteCount(size, body->note, "parts that share no vertex", body->npart > 1 ? body->npart : 0);
+  SbNoteCount(size, body->note, "surface edges with more than two facets", im->npinched);
+  SbNoteCount(size, body->note, "triangles of groups that are no face of a tet", im->nlost);
 }
 
 void SbImportShape(const SbImport *im, PetscReal degrees, SbShape *s)
@@ -102,29 +94,36 @@ void SbImportShape(const SbImport *im, PetscReal degrees, SbShape *s)
   }
 }
 
-void SbShapeKeep(const SbShape *s, SbBody *body)
+PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *im, const SbFaces *faces, SbBody *body)
 {
-  body->nsliver = s->nsliver;
-  body->volume = s->volume;
-  body->min_dihedral = acos(PetscMin(s->most[0], 1)) * 180 / PETSC_PI;
-  body->max_radius_ratio = s->most[1];
-  for (int i = 0; i < 3; i++) {
-    body->bbox[i] = -s->most[2 + i];
-    body->bbox[3 + i] = s->most[5 + i];
-  }
+  SbShape s;
+  PetscInt n[3];
+
+  PetscFunctionBeginUser;
+  SbImportShape(im, SB_SLIVER, &s);
+  n[0] = im->item[3].n;
+  n[1] = faces->nboundary;
+  n[2] = s.nsliver;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 3, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &s.volume, 1, MPIU_REAL, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, s.most, 8, MPIU_REAL, MPI_MAX, comm));
+  body->ncell = n[0];
+  body->nfacet = n[1];
+  body->nsliver = n[2];
+  body->volume = s.volume;
+  body->min_dihedral = acos(PetscMin(s.most[0], 1)) * 180 / PETSC_PI;
+  body->max_radius_ratio = s.most[1];
+  for (int i = 0; i < 6; i++) body->bbox[i] = i < 3 ? -s.most[2 + i] : s.most[2 + i];
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
 {
-  SbShape shape;
   PetscInt *parent;
 
   PetscFunctionBeginUser;
-  SbImportShape(im, SB_SLIVER, &shape);
-  SbShapeKeep(&shape, body);
+  PetscCall(SbImportMeasure(PETSC_COMM_SELF, im, faces, body));
   body->nvert = im->nvert;
-  body->ncell = im->item[3].n;
-  body->nfacet = faces->nboundary;
   PetscCall(PetscMalloc1(im->nvert, &parent));
   SbImportJoin(im, parent, &body->npart);
   PetscCall(PetscFree(parent));

@@ -15,10 +15,10 @@ PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest, SbRoute *route)
 {
   PetscFunctionBeginUser;
-  *route = (SbRoute){.comm = comm, .nsend = n};
+  *route = (SbRoute){.comm = comm, .nsend = n, .which = which, .dest = dest};
   PetscCallMPI(MPI_Comm_size(comm, &route->size));
   PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
                          &route->rcount, route->size, &route->rfirst, n, &route->position));
@@ -47,6 +47,8 @@ PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[]
 PetscErrorCode SbRouteDestroy(SbRoute *route)
 {
   PetscFunctionBeginUser;
+  PetscCall(PetscFree(route->which));
+  PetscCall(PetscFree(route->dest));
   PetscCall(PetscFree5(route->scount, route->sfirst, route->rcount, route->rfirst, route->position));
   PetscCall(PetscMemzero(route, sizeof(*route)));
   PetscFunctionReturn(PETSC_SUCCESS);

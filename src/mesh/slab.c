@@ -60,13 +60,12 @@ static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const vo
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(n, &dest));
   for (PetscInt i = 0; i < n; i++) dest[i] = home(s, first_vertex(record, unit, i));
-  PetscCall(SbRouteCreate(s->comm, n, dest, route));
+  PetscCall(SbRouteCreate(s->comm, n, NULL, dest, route));
   PetscCall(SbRouteSend(route, unit, NULL, record, received));
-  PetscCall(PetscFree(dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Positions and original numbers of the vertices of this rank's tets; the ranks that use each of the block. */
+/* Positions and original numbers of the vertices of this rank's tets; ranks that use each of its block. */
 static PetscErrorCode ask_home_ranks(Slab *s)
 {
   SbImport *im = s->im;
@@ -83,13 +82,12 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
   before -= n;
   im->nunused = s->nkept - n;
-  PetscCall(PetscMalloc1(s->nkept, &s->number));
+  PetscCall(PetscCalloc2(s->nkept, &s->number, s->nkept, &s->mask));
   for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = nuser[v] > 0 ? before++ : -1;
   // vertex arrays of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = s->used[v] + 1;
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
-  PetscCall(PetscMalloc1(im->nvert, &s->nuser));
   PetscCall(SbForestBroadcast(s->vert, 3, MPIU_REAL, s->x, im->x));
   PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, s->number, s->part->orig));
   PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, nuser, s->nuser));
@@ -212,7 +210,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
   PetscFunctionBeginUser;
   /* parts of this rank, numbered across all ranks */
-  PetscCall(PetscMalloc1(im->nvert, &part));
+  PetscCall(PetscMalloc3(im->nvert, &part, s->start[s->nkept], &got, s->start[s->nkept], &pair));
   SbImportJoin(im, part, &n);
   total = n;
   PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -220,10 +218,8 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
   /* pairs of parts that share a vertex, each pair once */
-  PetscCall(PetscMalloc2(s->start[s->nkept], &got, s->start[s->nkept], &pair));
   PetscCall(PetscSFGatherBegin(s->vert, MPIU_INT, part, got));
   PetscCall(PetscSFGatherEnd(s->vert, MPIU_INT, part, got));
-  PetscCall(PetscFree(part));
   for (PetscInt v = 0; v < s->nkept; v++)
     for (PetscInt k = s->start[v] + 1; k < s->start[v + 1]; k++)
       pair[npair++] = (PetscInt64)SbKeyOfPair(got[k - 1], got[k]);
@@ -232,9 +228,8 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
     if (!kept || pair[i] != pair[kept - 1]) pair[kept++] = pair[i];
   // rank 0 joins the parts of all ranks by union-find
   PetscCall(PetscCalloc1(kept, &dest));
-  PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
+  PetscCall(SbRouteCreate(s->comm, kept, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(*pair), NULL, pair, &all));
-  PetscCall(PetscFree(dest));
   *npart = total;
   PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
   for (PetscInt p = 0; p < total && !s->rank; p++) parent[p] = p;
@@ -244,7 +239,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(PetscFree(all));
   PetscCall(SbRouteDestroy(&route));
   PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
-  PetscCall(PetscFree2(got, pair));
+  PetscCall(PetscFree3(part, got, pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -291,8 +286,8 @@ typedef struct {
   SbMiddle middle;
 } Item;
 
-/* Sends group triangles and curved edges to the home ranks of their lowest vertices, and from there to all ranks
-   that use these; the ranks whose tets have them keep them. */
+/* Sends group triangles and curved edges to the home ranks of their lowest vertices, and from there to all
+   ranks that use these; the ranks whose tets have them keep them. */
 static PetscErrorCode find_items(Slab *s)
 {
   SbImport *im = s->im;
@@ -326,10 +321,10 @@ static PetscErrorCode find_items(Slab *s)
 
     for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) PetscCall(SbRouteAdd(&list, i, s->user[k]));
   }
-  PetscCall(SbRouteCreate(s->comm, list.n, list.rank, &on));
-  PetscCall(SbRouteSend(&on, sizeof(*got), list.item, got, &in));
+  PetscCall(SbRouteCreate(s->comm, list.n, list.item, list.rank, &on));
+  PetscCall(SbRouteSend(&on, sizeof(*got), on.which, got, &in));
   // edges of this rank's tets; triangles take part without ends
-  PetscCall(PetscMalloc3(on.nrecv, &found, on.nsend, &answered, nmine, &anywhere));
+  PetscCall(PetscCalloc4(on.nrecv, &found, on.nsend, &answered, there.nrecv, &any, nmine, &anywhere));
   PetscCall(PetscFree(im->middle));
   PetscCall(PetscMalloc1(on.nrecv, &im->middle));
   im->nmiddle = (SbCount){total ? on.nrecv : 0, on.nrecv};
@@ -352,21 +347,17 @@ static PetscErrorCode find_items(Slab *s)
     if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
   }
   // whether some rank has found each; an edge in the file that no tet has is an error
-  PetscCall(PetscCalloc1(there.nrecv, &any));
   PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
-  for (PetscInt i = 0; i < on.nsend; i++) any[list.item[i]] |= answered[i];
+  for (PetscInt i = 0; i < on.nsend; i++) any[on.which[i]] |= answered[i];
   PetscCall(SbRouteReply(&there, sizeof(PetscBool), any, anywhere));
   for (PetscInt i = 0; i < nmine; i++) {
     im->nlost += i < ntri && !anywhere[i];
     if (i >= ntri && !anywhere[i] && !caught.code) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i].middle));
   }
-  PetscCall(PetscFree3(found, answered, anywhere));
-  PetscCall(PetscFree(any));
+  PetscCall(PetscFree4(found, answered, any, anywhere));
   PetscCall(PetscFree(mine));
   PetscCall(PetscFree(got));
   PetscCall(PetscFree(in));
-  PetscCall(PetscFree(list.item));
-  PetscCall(PetscFree(list.rank));
   PetscCall(SbRouteDestroy(&on));
   PetscCall(SbRouteDestroy(&there));
   PetscCall(SbCaughtRaise(s->comm, &caught));
@@ -381,7 +372,6 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbImport *im = s->im;
   SbCaughtError caught = {0, ""};
   PetscReal largest;
-  SbShape shape;
   SbItems *tets = &im->item[3];
   PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
   PetscInt64 *edge, *got;
@@ -404,7 +394,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
     n += !map[tets->vert[i] - low];
     map[tets->vert[i] - low] = 1;
   }
-  PetscCall(PetscMalloc1(n, &s->used));
+  PetscCall(PetscMalloc2(n, &s->used, n, &s->nuser));
   n = 0;
   for (PetscInt v = low; v <= high; v++) {
     if (!map[v - low]) continue;
@@ -427,32 +417,23 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(join_faces(s, before));
   PetscCall(sum(s, 1, &im->nunused));
   PetscCall(sum(s, 1, &im->nreoriented));
-  // size and shape quality of the body, reduced over all ranks
-  SbImportShape(im, SB_SLIVER, &shape);
-  PetscCall(sum(s, 1, &shape.nsliver));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));
-  SbShapeKeep(&shape, &body[b]);
-  body[b].ncell = tets->n;
-  body[b].nfacet = s->part->faces.nboundary;
-  PetscCall(sum(s, 1, &body[b].ncell));
-  PetscCall(sum(s, 1, &body[b].nfacet));
+  PetscCall(SbImportMeasure(s->comm, im, &s->part->faces, &body[b]));
   body[b].nvert = s->rows.N - im->nunused;
   PetscCall(count_parts(s, &body[b].npart));
   // surface edges with more than two facets; the home rank of the lower vertex has all facets of an edge
   n = 3 * s->part->faces.nboundary;
-  PetscCall(PetscMalloc2(n, &edge, n, &dest));
+  PetscCall(PetscMalloc1(n, &edge));
+  PetscCall(PetscMalloc1(n, &dest));
   SbBoundaryEdges(im, &s->part->faces, s->used, edge);
   for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
-  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
+  PetscCall(SbRouteCreate(s->comm, n, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(*edge), NULL, edge, &got));
-  PetscCall(PetscFree2(edge, dest));
+  PetscCall(PetscFree(edge));
   PetscCall(SbCountPinched(route.nrecv, got, &im->npinched));
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));
   // members of sets: groups of points, lines and triangles, then shapes and groups of tets
   PetscCall(PetscMalloc1(im->ntags, &bits));
-  PetscCall(PetscCalloc1(s->nkept, &s->mask));
   SbSetsBits(im, nbody, body, b, nset, set, bits);
   PetscCall(mark_items(s, bits));
   PetscCall(PetscFree(bits));
@@ -481,12 +462,10 @@ PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbB
   PetscCallMPI(MPI_Comm_size(comm, &s.size));
   ierr = prepare(&s, before, nbody, body, b, nset, set);
   PetscCall(PetscFree(s.x));
-  PetscCall(PetscFree(s.number));
-  PetscCall(PetscFree(s.mask));
+  PetscCall(PetscFree2(s.number, s.mask));
   PetscCall(PetscSFDestroy(&s.vert));
-  PetscCall(PetscFree(s.used));
+  PetscCall(PetscFree2(s.used, s.nuser));
   PetscCall(PetscFree(s.start));
   PetscCall(PetscFree(s.user));
-  PetscCall(PetscFree(s.nuser));
   PetscFunctionReturn(ierr);
 }

@@ -68,11 +68,10 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   for (PetscInt i = 0; i < c->list.n; i++)
     dest[i] = (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
   PetscCall(PetscFree(c->point));
-  PetscCall(SbRouteCreate(out->comm, c->list.n, dest, &route));
+  PetscCall(SbRouteCreate(out->comm, c->list.n, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), NULL, c->list.point, &c->point));
   c->share.n = route.nrecv;
   PetscCall(SbRouteDestroy(&route));
-  PetscCall(PetscFree(dest));
   if (c->share.n) qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
   c->share.start -= c->share.n;

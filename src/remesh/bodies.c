@@ -221,36 +221,6 @@ static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
   r->to[r->n++] = to;
 }
 
-/* Renumbers the nodes of the body's surface: vertices and old edges (P2), or faces and their supports. */
-static PetscErrorCode rename_surface(const Work *w, const SbGathered *next, SbRenamed *r)
-{
-  const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
-  const PetscInt vert1 = next->vert0[w->body], cell1 = next->cell0[w->body];
-  PetscInt nedge = 0;
-  SbKey *edge = NULL;
-
-  PetscFunctionBeginUser;
-  if (w->edge) PetscCall(list_edges(w->mesh.ncell, w->mesh.cell, &nedge, &edge));
-  for (PetscInt i = 0; i < nedge; i++) {
-    const PetscInt at = old_edge(w, edge[i].key);
-
-    if (at >= 0) rename_node(r, N + 8 * C + 6 * w->cell0 + at, N1 + 8 * C1 + 6 * cell1 + edge[i].slot);
-  }
-  PetscCall(PetscFree(edge));
-  if (w->element->nodes_per[0]) {
-    for (PetscInt v = 0; v < w->mesh.nkept; v++) rename_node(r, w->vert0 + w->mesh.kept[v], vert1 + v);
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscInt i = 0; i < 4 * w->mesh.ncell; i++) {
-    const PetscInt slot = old_slot(w, i);
-
-    if (slot < 0) continue;
-    rename_node(r, N + 4 * (w->cell0 + slot / 4) + slot % 4, N1 + 4 * (cell1 + i / 4) + i % 4);
-    rename_node(r, N + 4 * (C + w->cell0 + slot / 4) + slot % 4, N1 + 4 * (C1 + cell1 + i / 4) + i % 4);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mesh, values and renumbered nodes of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
@@ -258,16 +228,34 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   const SbMemoryMesh *before = w->model->body[w->body].in_memory;
   SbMemoryMesh *p;
   const size_t each = (size_t)next->width * (size_t)w->each;
-  PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
+  const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
+  const PetscInt cell1 = next->cell0[w->body];
+  PetscReal *value = next->value + each * (size_t)cell1;
   const SbGathered *g = w->g;
+  SbRenamed *r = &result->renamed;
   const SbNewMesh *m = &w->mesh;
   PetscInt nedge = 0, ncurved = 0;
   SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
-  // curved edges of the next mesh
-  if (m->edge_off) PetscCall(list_edges(m->ncell, m->cell, &nedge, &edge));
+  // renumbered nodes of the surface: old edges (P2) and vertices, or faces and their supports
+  if (w->edge) PetscCall(list_edges(m->ncell, m->cell, &nedge, &edge));
   for (PetscInt i = 0; i < nedge; i++) {
+    const PetscInt at = old_edge(w, edge[i].key);
+
+    if (at >= 0) rename_node(r, N + 8 * C + 6 * w->cell0 + at, N1 + 8 * C1 + 6 * cell1 + edge[i].slot);
+  }
+  for (PetscInt v = 0; v < m->nkept && w->element->nodes_per[0]; v++)
+    rename_node(r, w->vert0 + m->kept[v], next->vert0[w->body] + v);
+  for (PetscInt i = 0; i < 4 * m->ncell && !w->element->nodes_per[0]; i++) {
+    const PetscInt slot = old_slot(w, i);
+
+    if (slot < 0) continue;
+    rename_node(r, N + 4 * w->cell0 + slot, N1 + 4 * cell1 + i);
+    rename_node(r, N + 4 * (C + w->cell0) + slot, N1 + 4 * (C1 + cell1) + i);
+  }
+  // curved edges of the next mesh
+  for (PetscInt i = 0; i < nedge && m->edge_off; i++) {
     const PetscReal *off = m->edge_off + 3 * (size_t)edge[i].slot;
 
     if (off[0] != 0. || off[1] != 0. || off[2] != 0.) edge[ncurved++] = edge[i];
@@ -301,7 +289,6 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
       p->bound = before->bound;
     }
   }
-  PetscCall(rename_surface(w, next, &result->renamed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -331,6 +318,8 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(m->nbody, &work));
+  PetscCall(
+    PetscCalloc3(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0, g->nbody, &r->next.mass));
   for (PetscInt b = 0; b < m->nbody; b++) {
     Work *w = &work[b];
     SbOldMesh *old = &w->old;
@@ -379,14 +368,11 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     r->outcome[b] = (SbRemeshOutcome){
       {old->nvert, w->mesh.nvert}, {old->ncell, w->mesh.ncell}, w->mesh.nmoved, w->mesh.quality, ""};
     (void)snprintf(r->outcome[b].message, sizeof(r->outcome[b].message), "%.511s", caught.text);
+    r->next.vert0[b + 1] = r->next.vert0[b] + w->mesh.nvert;
+    r->next.cell0[b + 1] = r->next.cell0[b] + w->mesh.ncell;
     room += old->nvert + 2 * old->faces.nboundary + w->nedge;
   }
-  // counts of the next meshes, and arrays for their values
-  PetscCall(PetscCalloc2(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0));
-  for (PetscInt b = 0; b < g->nbody; b++) {
-    r->next.vert0[b + 1] = r->next.vert0[b] + r->outcome[b].nvert[1];
-    r->next.cell0[b + 1] = r->next.cell0[b] + r->outcome[b].ncell[1];
-  }
+  // arrays for the values on the next meshes
   r->next.nvert = r->next.vert0[g->nbody];
   r->next.ncell = r->next.cell0[g->nbody];
   PetscCall(

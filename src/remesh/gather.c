@@ -1,9 +1,12 @@
 /*
-  Gathers a scene and its state on rank 0, and scatters vectors back.
+  Gathers a scene and its state on rank 0, scatters vectors back, hands history variables over.
 
   A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their
   original numbers. Each cell is sent with its vertices, its sets, and the values of the vectors at its nodes:
   the same for every element; a node of several cells is sent with each of them.
+
+  History variables of effects (active contact, friction) go to the new model like a checkpoint with
+  renumbered nodes. Records of effects that do not say so (SbEffect.by_node) name no nodes.
 */
 #include "remesh_impl.h"
 
@@ -49,8 +52,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   g->ncell = mesh->Ncell;
   g->nfield = vectors_of(run, vec);
   g->width = s->edge_node ? SB_EDGES + 6 : supports ? 8 : 4;
-  PetscCall(PetscCalloc2(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0));
-  PetscCall(PetscCalloc1(m->nbody, &g->mass));
+  PetscCall(PetscCalloc3(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0, m->nbody, &g->mass));
   for (PetscInt b = 0; b < m->nbody; b++) {
     g->vert0[b + 1] = g->vert0[b] + m->body[b].nvert;
     g->cell0[b + 1] = g->cell0[b] + m->body[b].ncell;
@@ -116,8 +118,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
 PetscErrorCode SbGatheredDestroy(SbGathered *g)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree2(g->vert0, g->cell0));
-  PetscCall(PetscFree(g->mass));
+  PetscCall(PetscFree3(g->vert0, g->cell0, g->mass));
   PetscCall(PetscFree3(g->X, g->x, g->vert_set));
   PetscCall(PetscFree3(g->cell, g->cell_material, g->cell_set));
   PetscCall(PetscFree(g->edge_off));
@@ -154,5 +155,46 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
     PetscCall(SbSpaceRestoreLocalWrite(s, vec[f], &array));
   }
   PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
+{
+  const SbModel a = from->model, b = to->model;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(b->space, to->U, &u));
+  for (PetscInt k = 0; k < a->neffect; k++) {
+    SbEffect e = a->effect[k];
+    PetscReal *records, *own;
+    PetscInt n, nown, total;
+
+    if (!e->ops.save) continue;
+    // gather the records of all ranks on each rank
+    SbEffectCall(e, save, a->space, &nown, &own);
+    PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
+    n = e->nstate ? total / e->nstate : 0;
+    PetscCall(PetscFree(own));
+    // renumber the nodes that they begin with; drop those of removed nodes
+    if (e->by_node) {
+      total = n;
+      n = 0;
+      for (PetscInt i = 0; i < total; i++) {
+        PetscReal *record = records + e->nstate * i;
+        PetscInt place;
+
+        PetscCall(PetscFindInt((PetscInt)record[0], renamed->n, renamed->from, &place));
+        if (place < 0) continue;
+        record[0] = (PetscReal)renamed->to[place];
+        PetscCall(PetscArraymove(records + e->nstate * n, record, e->nstate));
+        n++;
+      }
+    }
+    SbEffectCall(b->effect[k], load, b->space, from->t_now, u, n, records);
+    PetscCall(PetscFree(records));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(b->space, to->U, &u));
+  PetscCall(SbModelContactResume(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

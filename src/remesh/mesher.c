@@ -12,44 +12,35 @@
 #define BITS 10   /* an edge is 2^10 to 2^11 rounding steps */
 #define AHEAD 0.3 /* shift over a rounding step; 1/2 would put round numbers where rounding is ambiguous */
 
-/* One attempt. step: coordinates are rounded to multiples of it, m; 0: no rounding. */
-static PetscErrorCode fill(const char *where, const SbSurface *hull, PetscReal size, PetscReal step,
-                           SbImport *im)
-{
-  SbTetOptions options;
-  SbSurface rounded = *hull;
-  PetscErrorCode ierr;
-  PetscInt none;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(im, sizeof(*im)));
-  (void)snprintf(im->where, sizeof(im->where), "%s", where);
-  PetscCall(SbImportTagSet(im, 0, NULL, &none));
-  SbTetDefaults(&options);
-  options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
-  options.surface = SB_TET_KEEP;
-  PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &rounded.x));
-  for (PetscInt i = 0; i < 3 * hull->nvert; i++)
-    rounded.x[i] = step > 0 ? step * PetscFloorReal(hull->x[i] / step + AHEAD) : hull->x[i];
-  ierr = SbTetrahedralize(where, &rounded, &options, im);
-  PetscCall(PetscFree(rounded.x));
-  if (ierr) PetscCall(SbImportDestroy(im));
-  PetscFunctionReturn(ierr);
-}
-
 PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
                                SbTets *tets)
 {
   const PetscReal step = PetscPowReal(2, PetscFloorReal(PetscLog2Real(SbSurfaceMeasure(hull, NULL))) - BITS);
+  SbTetOptions options;
+  SbSurface rounded = *hull;
   SbImport im;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr = PETSC_ERR_USER_INPUT;
+  PetscInt none;
 
   PetscFunctionBeginUser;
   (void)ctx;
-  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = fill(where, hull, size, step, &im);
-  PetscCall(PetscPopErrorHandler());
-  if (ierr) PetscCall(fill(where, hull, size, 0, &im));
+  SbTetDefaults(&options);
+  options.surface = SB_TET_KEEP;
+  PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &rounded.x));
+  for (int exact = 0; exact < 2 && ierr; exact++) {
+    PetscCall(PetscMemzero(&im, sizeof(im)));
+    (void)snprintf(im.where, sizeof(im.where), "%s", where);
+    PetscCall(SbImportTagSet(&im, 0, NULL, &none));
+    options.size = exact ? size : step * PetscMax(1, PetscFloorReal(size / step));
+    for (PetscInt i = 0; i < 3 * hull->nvert; i++)
+      rounded.x[i] = exact ? hull->x[i] : step * PetscFloorReal(hull->x[i] / step + AHEAD);
+    if (!exact) PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+    ierr = SbTetrahedralize(where, &rounded, &options, &im);
+    if (!exact) PetscCall(PetscPopErrorHandler());
+    if (ierr) PetscCall(SbImportDestroy(&im));
+  }
+  PetscCall(PetscFree(rounded.x));
+  PetscCall(ierr);
   // vertices and tets move to the caller; inverted tets are reoriented
   *tets = (SbTets){.nvert = im.nvert, .ncell = im.item[3].n, .x = im.x, .cell = im.item[3].vert};
   im.x = NULL;

@@ -5,7 +5,7 @@
   After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered
   on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the scene is set up
   again from its options with these meshes in memory, and the state is transferred: vectors, history variables
-  of effects (effects.c), totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid
+  of effects, totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid
   motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is
   remesh_loss in the energy balance.
 

@@ -100,5 +100,5 @@ PetscErrorCode SbBodyMomenta(SbModel model, Vec U, Vec V, PetscReal momenta[][6]
 PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool named[],
                                 const PetscReal momenta[][6], PetscReal *largest);
 
-/* effects.c: transfers the history variables of effects to the new model. Collective. */
+/* gather.c: transfers the history variables of effects to the new model. Collective. */
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);

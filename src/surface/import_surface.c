@@ -52,20 +52,6 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
 
 static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
 {
-  const struct {
-    PetscInt n;
-    const char *what;
-  } rows_of[] = {
-    {m->ncollapsed, "triangles with two corners at one place left out"},
-    {m->ndoubled, "triangles given twice left out"},
-    {m->nwall, "triangles back to back kept once as a wall"},
-    {m->nflat, "triangles without area taken into their neighbours"},
-    {m->nturned, "triangles turned to the side of their neighbours"},
-    {m->ncavity, "cavities"},
-    {m->nidle, "triangles without material on a side left out"},
-    {m->ninner, "triangles within the obstacle left out"},
-  };
-
   if (t->turned) SbAppend(size, text, "surface inverted: taken turned");
   if (m->nwelded)
     SbAppend(size, text, "%svertices joined within %.2g m: %" PetscInt_FMT " (by up to %.2g m)",
@@ -75,9 +61,14 @@ static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_
              "%spairs of triangles that cut each other smoothed apart: %" PetscInt_FMT " (%" PetscInt_FMT
              " vertices moved by up to %.2g m)",
              text[0] ? ", " : "", m->npairs, m->nuntangled, (double)m->untangled);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows_of); i++)
-    if (rows_of[i].n)
-      SbAppend(size, text, "%s%s: %" PetscInt_FMT, text[0] ? ", " : "", rows_of[i].what, rows_of[i].n);
+  SbNoteCount(size, text, "triangles with two corners at one place left out", m->ncollapsed);
+  SbNoteCount(size, text, "triangles given twice left out", m->ndoubled);
+  SbNoteCount(size, text, "triangles back to back kept once as a wall", m->nwall);
+  SbNoteCount(size, text, "triangles without area taken into their neighbours", m->nflat);
+  SbNoteCount(size, text, "triangles turned to the side of their neighbours", m->nturned);
+  SbNoteCount(size, text, "cavities", m->ncavity);
+  SbNoteCount(size, text, "triangles without material on a side left out", m->nidle);
+  SbNoteCount(size, text, "triangles within the obstacle left out", m->ninner);
 }
 
 /* Surface of a body, or of an obstacle translated to `at`, with its regions; the repairs become a note. */
@@ -129,7 +120,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
 static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s, PetscInt *nwall)
 {
   SbTriangles *t = f->t;
-  SbKey *edge;
+  SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
   // triangles with material on both sides are walls, which an obstacle does not need
@@ -152,24 +143,21 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   for (PetscInt i = 0; i < t->ntri; i++) t->volume += SbTetVolumeTo(t->x, t->tri + 3 * i, t->x);
   // neighbour across each edge; an edge of more than two triangles is an error
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
-  PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
+  PetscCall(SbImportScratch(f->im, 3 * (size_t)t->ntri * sizeof(*edge), &edge));
   SbTrianglesEdges(t, edge);
   for (PetscInt i = 0; i < 3 * t->ntri; i += 2) {
     const PetscInt n = SbKeysAlike(3 * t->ntri, edge, i), a = edge[i].slot;
     const PetscReal *p = t->x + 3 * t->tri[a], *q = t->x + 3 * t->tri[SbSlotNext(a)];
 
-    if (n != 2) {
-      PetscCall(PetscFree(edge));
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-              "%s: %lld triangles meet at the edge from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m, triangle "
-              "%lld among them; an edge of an obstacle has two, take parts that touch apart",
-              f->where, (long long)n, (double)p[0], (double)p[1], (double)p[2], (double)q[0], (double)q[1],
-              (double)q[2], (long long)f->number[a / 3]);
-    }
+    PetscCheck(
+      n == 2, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "%s: %lld triangles meet at the edge from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m, triangle "
+      "%lld among them; an edge of an obstacle has two, take parts that touch apart",
+      f->where, (long long)n, (double)p[0], (double)p[1], (double)p[2], (double)q[0], (double)q[1],
+      (double)q[2], (long long)f->number[a / 3]);
     t->across[a] = edge[i + 1].slot / 3;
     t->across[edge[i + 1].slot] = a / 3;
   }
-  PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

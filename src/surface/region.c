@@ -19,7 +19,6 @@
   inward normals is reversed. For non-manifold surfaces, and in formats without orientation (.poly, .smesh),
   every region is material except the holes given in the file.
 */
-#include <stdlib.h>
 #include "surface_impl.h"
 
 #define OUTSIDE (-1)
@@ -41,12 +40,6 @@ typedef struct {
   PetscInt outer;     /* its shell of negative volume */
 } Surface;
 
-/* A triangle around an edge. */
-typedef struct {
-  PetscReal angle; /* dihedral angle about the edge from the first triangle, rad */
-  PetscInt slot;   /* slot of the edge in the triangle */
-} Spoke;
-
 typedef struct {
   SbTriangleFile *f;
   SbTriangles *t;
@@ -55,8 +48,8 @@ typedef struct {
   PetscInt *shell;   /* [2 ntri] shell of each side */
   PetscInt *surface; /* [ntri] surface of each triangle */
   PetscInt *across;  /* [3 ntri] slot on the other side of an edge; -1: more than two triangles share it */
-  PetscInt *stack;   /* [ntri] */
-  Spoke *spoke;      /* [3 ntri] triangles around one edge */
+  PetscInt *list;    /* [3 ntri] triangles that a search has reached, slots of the triangles around an edge */
+  PetscReal *angle;  /* [3 ntri] dihedral angles of the latter about their edge from the first one, rad */
   int *sense; /* [ntri] 1: oriented as the first triangle that the search for its surface reached, else -1 */
   PetscInt nshell, nsurface;
   Shell *shells;
@@ -81,10 +74,10 @@ static PetscErrorCode orient_alike(Arrangement *s)
 
     if (s->sense[f]) continue;
     // breadth-first search from this triangle
-    s->stack[nfound++] = f;
+    s->list[nfound++] = f;
     s->sense[f] = 1;
     for (PetscInt done = 0; done < nfound; done++) {
-      const PetscInt old = s->stack[done];
+      const PetscInt old = s->list[done];
 
       for (PetscInt k = 3 * old; k < 3 * old + 3; k++) {
         const PetscInt other = s->across[k], g = other / 3;
@@ -95,7 +88,7 @@ static PetscErrorCode orient_alike(Arrangement *s)
         expected = t->tri[other] != t->tri[k] ? s->sense[old] : -s->sense[old];
         if (!s->sense[g]) {
           s->sense[g] = expected;
-          s->stack[nfound++] = g;
+          s->list[nfound++] = g;
         }
         PetscCheck(
           s->sense[g] == expected, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -105,13 +98,13 @@ static PetscErrorCode orient_alike(Arrangement *s)
       }
     }
     // reverse the smaller number of triangles
-    for (PetscInt i = 0; i < nfound; i++) nother += s->sense[s->stack[i]] < 0;
+    for (PetscInt i = 0; i < nfound; i++) nother += s->sense[s->list[i]] < 0;
     wrong = 2 * nother > nfound ? 1 : -1;
     for (PetscInt i = 0; i < nfound; i++) {
-      PetscInt *v = t->tri + 3 * s->stack[i];
+      PetscInt *v = t->tri + 3 * s->list[i];
       const PetscInt keep = v[1];
 
-      if (s->sense[s->stack[i]] != wrong) continue;
+      if (s->sense[s->list[i]] != wrong) continue;
       v[1] = v[2];
       v[2] = keep;
       s->m->nturned++;
@@ -121,15 +114,6 @@ static PetscErrorCode orient_alike(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Orders spokes by their angle. */
-static int compare_spokes(const void *a, const void *b)
-{
-  const Spoke *p = (const Spoke *)a, *q = (const Spoke *)b;
-
-  if (p->angle != q->angle) return p->angle < q->angle ? -1 : 1;
-  return (p->slot > q->slot) - (p->slot < q->slot);
-}
-
 /* Side of a triangle that faces increasing (ahead) or decreasing angles around the edge from vertex p. */
 static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBool ahead)
 {
@@ -137,13 +121,14 @@ static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBoo
 }
 
 /* Joins the sides that face each other around one edge. */
-static void join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[])
+static PetscErrorCode join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[])
 {
   const PetscInt p = (PetscInt)(edge[0].key >> 32), q = (PetscInt)(edge[0].key & 0xffffffff);
   const SbTriangles *t = s->t;
-  Spoke *spoke = s->spoke;
+  PetscInt *slot = s->list;
 
-  for (PetscInt i = 0; i < n; i++) spoke[i] = (Spoke){0, edge[i].slot};
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) slot[i] = edge[i].slot;
   // angles of triangles about the edge from p to q, relative to the first one
   if (n > 2) {
     PetscReal axis[3], u[3] = {0}, v[3] = {0}, w[3], length;
@@ -157,15 +142,16 @@ static void join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[])
         SbCross(v, axis, u);
         for (int k = 0; k < 3; k++) u[k] /= length;
       }
-      spoke[i].angle = i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0;
-      if (spoke[i].angle < 0) spoke[i].angle += 2 * PETSC_PI;
+      s->angle[i] = i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0;
+      if (s->angle[i] < 0) s->angle[i] += 2 * PETSC_PI;
     }
-    qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
+    PetscCall(PetscSortRealWithArrayInt(n, s->angle, slot));
   }
   // join facing sides of consecutive triangles
   for (PetscInt i = 0; i < n; i++)
-    (void)SbUnionJoin(s->shell, facing(t, spoke[i].slot, p, PETSC_TRUE),
-                      facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
+    (void)SbUnionJoin(s->shell, facing(t, slot[i], p, PETSC_TRUE),
+                      facing(t, slot[(i + 1) % n], p, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by edges. */
@@ -180,7 +166,7 @@ static PetscErrorCode find_shells(Arrangement *s)
   for (PetscInt f = 0; f < t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    join_at_edge(s, m, s->edge + i);
+    PetscCall(join_at_edge(s, m, s->edge + i));
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
@@ -192,8 +178,7 @@ static PetscErrorCode find_shells(Arrangement *s)
              " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
              s->f->where, s->nsurface, PARTS_MAX);
   // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from the origin
-  PetscCall(PetscCalloc1(s->nshell, &s->shells));
-  PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
+  PetscCall(PetscCalloc2(s->nshell, &s->shells, s->nsurface, &s->surfaces));
   for (PetscInt k = 0; k < s->nshell; k++) s->shells[k].first = -1;
   for (PetscInt k = 0; k < s->nsurface; k++) s->surfaces[k].first = s->surfaces[k].outer = -1;
   for (PetscInt i = 0; i < 2 * t->ntri; i++) {
@@ -414,11 +399,10 @@ PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSu
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc7(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, n, &s.stack, n,
-                         &s.sense, 3 * n, &s.spoke));
+  PetscCall(PetscMalloc7(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, 3 * n, &s.list, n,
+                         &s.sense, 3 * n, &s.angle));
   ierr = find_regions(&s, out);
-  PetscCall(PetscFree(s.shells));
-  PetscCall(PetscFree(s.surfaces));
-  PetscCall(PetscFree7(s.edge, s.shell, s.surface, s.across, s.stack, s.sense, s.spoke));
+  PetscCall(PetscFree2(s.shells, s.surfaces));
+  PetscCall(PetscFree7(s.edge, s.shell, s.surface, s.across, s.list, s.sense, s.angle));
   PetscFunctionReturn(ierr);
 }

@@ -17,9 +17,8 @@ typedef struct {
   int64_t number;    /* number in the file */
 } SbSeed;
 
-/* triangles.c, triangles_*.c: triangles read from a file, before they become a body or a rigid obstacle */
-
-/* Surface file being read; the readers add vertices and triangles. */
+/* triangles.c, triangles_*.c: surface file being read, before it becomes a body or a rigid obstacle; the
+   readers add vertices and triangles. */
 typedef struct {
   SbImport *im;      /* owner of the groups, and of arrays here as scratch memory, see SbImportScratch() */
   const char *where; /* im->where: beginning of error messages */
@@ -120,7 +119,6 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *file, PetscReal reach, SbSurfac
 PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *file, SbSurfaceRepairs *repairs, SbSurface *surface);
 
 /* tet_gmsh.c, tet_tetgen.c: the mesh generators, for tetrahedralize.c */
-
 #define SB_TET_MOST 5e7 /* largest expected number of tets for one surface */
 
 typedef struct {

@@ -52,8 +52,7 @@ static const struct {
 static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
 {
   const SbSurface *s = job->surface;
-  PetscReal *want, *got;
-  char why[256] = "";
+  PetscReal *want = NULL, *got = NULL;
 
   PetscFunctionBeginUser;
   PetscCall((*backends[backend].run)(job, tets));
@@ -67,17 +66,16 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
                  "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
   }
   // volume of each region, compared with that of its surface
-  PetscCall(PetscCalloc2(s->nregion, &want, s->nregion, &got));
+  PetscCall(SbImportScratch(tets, (size_t)s->nregion * sizeof(*want), &want));
+  PetscCall(SbImportScratch(tets, (size_t)s->nregion * sizeof(*got), &got));
+  PetscCall(PetscArrayzero(got, s->nregion));
   (void)SbSurfaceMeasure(s, want);
   for (PetscInt c = 0; c < tets->item[3].n; c++)
     got[tets->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(tets->x, tets->item[3].vert + 4 * c)) / 6;
-  for (PetscInt r = 0; r < s->nregion && !why[0]; r++) {
-    if (PetscAbsReal(got[r] - want[r]) > (job->remesh ? ROUGH : EXACT) * want[r])
-      (void)snprintf(why, sizeof(why), "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
-                     (double)(100 * got[r] / want[r]), r + 1);
-  }
-  PetscCall(PetscFree2(want, got));
-  PetscCheck(!why[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", why);
+  for (PetscInt r = 0; r < s->nregion; r++)
+    PetscCheck(PetscAbsReal(got[r] - want[r]) <= (job->remesh ? ROUGH : EXACT) * want[r], PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT, "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
+               (double)(100 * got[r] / want[r]), r + 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,27 +165,24 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char reasons[640] = "", size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
-  PetscReal *volume, edge, expected, all = 0, wrong = 0;
-  PetscInt region = -1;
+  PetscReal *volume, edge, expected, all = 0, last = 1;
+  PetscInt region = 0;
 
   PetscFunctionBeginUser;
   // target size, whether the surface is kept, expected number of tets
   PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: %" PetscInt_FMT " triangles around %" PetscInt_FMT " regions enclose nothing", where,
              s->ntri, s->nregion);
-  PetscCall(PetscCalloc1(s->nregion, &volume));
+  PetscCall(PetscMalloc1(s->nregion, &volume));
   edge = SbSurfaceMeasure(s, volume);
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    if (region < 0 && !(volume[r] > 0)) {
-      region = r;
-      wrong = volume[r];
-    }
-    all += volume[r];
+  for (; region < s->nregion && last > 0; region++) {
+    last = volume[region];
+    all += last;
   }
   PetscCall(PetscFree(volume));
-  PetscCheck(region < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  PetscCheck(last > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed", where,
-             region + 1, (double)wrong);
+             region, (double)last);
   job = (SbTetJob){.where = where, .body = body, .surface = s, .options = *o, .edge = edge};
   job.size = o->size > 0 ? o->size : edge;
   job.remesh =

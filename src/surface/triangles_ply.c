@@ -24,7 +24,6 @@ typedef struct {
 
 typedef struct {
   SbScan *s;
-  SbTriangleFile *f;
   PetscBool big_endian;
   int nelement;
   Element element[ELEMENTS_MAX];
@@ -123,7 +122,7 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
 
 PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
-  Ply ply = {.s = s, .f = f}, *p = &ply;
+  Ply ply = {.s = s}, *p = &ply;
 
   PetscFunctionBeginUser;
   PetscCall(read_header(p));

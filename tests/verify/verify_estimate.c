@@ -20,6 +20,7 @@
   which exceed the error if the pressure oscillates.
 */
 #include "locking.h"
+#include "sbtet.h"
 
 typedef struct {
   const char *problem, *element;
@@ -248,15 +249,15 @@ static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscRea
 static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
 {
   SbMesh mesh = m->mesh;
-  PetscInt *neighbour;
+  SbFaces faces;
   Stress s;
 
   PetscFunctionBeginUser;
   PetscCall(stress_get(m, U, &s));
-  PetscCall(SbMeshNeighbours(mesh, &neighbour));
+  PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
   *eta2 = 0.;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    const PetscInt c = i / 4, other = neighbour[i], *v = mesh->cell + 4 * c;
+    const PetscInt c = i / 4, other = faces.neighbour[i], *v = mesh->cell + 4 * c;
     const SbMaterial law = m->material[s.material[c]];
     const PetscReal *x[3];
     PetscReal p[3], q[3], N[3], jump = 0.;
@@ -272,7 +273,7 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
       jump += PetscSqr(SbDot3(s.P[c][0] + 3 * k, N) - SbDot3(s.P[other][0] + 3 * k, N));
     *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / law->mu;
   }
-  PetscCall(PetscFree(neighbour));
+  PetscCall(SbFacesDestroy(&faces));
   PetscCall(stress_free(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
