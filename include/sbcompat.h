@@ -34,33 +34,24 @@
 /*
   Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx,
   of the same C type. SB_DESTROY_CTX(type, arg): the struct in both; SB_CTX_TO_DESTROY(ctx): what it passes.
+  Of a PetscContainer, whose callback gets its pointer likewise: SbContainerSetDestroy().
 */
 #if PETSC_VERSION_LT(3, 24, 0)
   #define SB_DESTROY_CTX(type, arg) ((type *)(arg))
   #define SB_CTX_TO_DESTROY(ctx) (ctx)
+  #define SbContainerSetDestroy(container, f) PetscContainerSetUserDestroy(container, f)
 #else
   #define SB_DESTROY_CTX(type, arg) (*(type **)(arg))
   #define SB_CTX_TO_DESTROY(ctx) (&(ctx))
-#endif
-
-/* Destroy callback of a PetscContainer, which gets its pointer as SB_DESTROY_CTX() takes it. */
-#if PETSC_VERSION_LT(3, 24, 0)
-  #define SbContainerSetDestroy(container, f) PetscContainerSetUserDestroy(container, f)
-#else
   #define SbContainerSetDestroy(container, f) PetscContainerSetCtxDestroy(container, f)
 #endif
 
-/* "No limit" of an iteration count. */
+/* "No limit" of an iteration count, and of a tolerance: -1 means PETSc's own default since 3.22. */
 #if PETSC_VERSION_LT(3, 22, 0)
   #define SB_UNLIMITED PETSC_MAX_INT
-#else
-  #define SB_UNLIMITED PETSC_UNLIMITED
-#endif
-
-/* "No limit" of a tolerance: -1 means PETSc's own default since 3.22. */
-#if PETSC_VERSION_LT(3, 22, 0)
   #define SB_UNLIMITED_REAL (-1.)
 #else
+  #define SB_UNLIMITED PETSC_UNLIMITED
   #define SB_UNLIMITED_REAL ((PetscReal)PETSC_UNLIMITED)
 #endif
 
@@ -71,24 +62,12 @@ typedef char *SbErrorText;
 typedef const char *SbErrorText;
 #endif
 
-/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). */
+/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is not a number. */
 #if PETSC_VERSION_LT(3, 25, 0)
   #define SB_OPERATION(f) ((void (*)(void))(f))
-#else
-  #define SB_OPERATION(f) ((PetscErrorCodeFn *)(f))
-#endif
-
-/* Newton without a line search. */
-#if PETSC_VERSION_LT(3, 26, 0)
-  #define SB_LINESEARCH_NONE SNESLINESEARCHBASIC
-#else
-  #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
-#endif
-
-/* Newton's method met what is not a number. */
-#if PETSC_VERSION_LT(3, 25, 0)
   #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FNORM_NAN
 #else
+  #define SB_OPERATION(f) ((PetscErrorCodeFn *)(f))
   #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FUNCTION_NANORINF
 #endif
 
@@ -101,19 +80,17 @@ typedef const char *SbErrorText;
     SNESConverged(snes, iteration, xnorm, ynorm, fnorm)
 #endif
 
-/* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names always work. */
+/* Newton without a line search. Gram-Schmidt of GMRES is repeated where it loses digits. Whether PETSc calls
+   -ts_dt deprecated, in favour of -ts_time_step; here both names always work. */
 #if PETSC_VERSION_LT(3, 26, 0)
+  #define SB_LINESEARCH_NONE SNESLINESEARCHBASIC
+  #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
   #define SB_TS_DT_RENAMED 0
 #else
-  #define SB_TS_DT_RENAMED 1
-#endif
-
-/* Gram-Schmidt of GMRES is repeated where it loses digits; renamed in 3.26. */
-#if PETSC_VERSION_GE(3, 26, 0)
+  #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
   #define SbKSPRefineOrthogonalization(ksp) \
     KSPOrthogonalizationSetCGSRefinementType(ksp, KSP_ORTHOGONALIZATION_CGS_REFINE_IFNEEDED)
-#else
-  #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
+  #define SB_TS_DT_RENAMED 1
 #endif
 
 /* PetscHasExternalPackage(), also where CHOLMOD and UMFPACK are only known as SuiteSparse as a whole. */

@@ -57,10 +57,9 @@ PetscErrorCode SbElementRegisterAll(void);
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *e);
 PetscErrorCode SbElementDestroy(SbElement *e);
 
-/* F = I + sum_a u_a (x) grad phi_a. g[3*(a-1)+j] = d phi_a / dX_j, a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */
-void SbCellGradient(const SbPack g[9], const SbPack u[12], SbPack F[9]);
-/* Velocity-like gradient without the identity: H = sum_a v_a (x) grad phi_a. */
-void SbCellGradientRate(const SbPack g[9], const SbPack v[12], SbPack H[9]);
+/* F = one I + sum_a u_a (x) grad phi_a; one: 1, or 0 for the gradient of a velocity. g[3*(a-1)+j] = d phi_a /
+   dX_j, a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */
+void SbCellGradient(const SbPack g[9], const SbPack u[12], PetscReal one, SbPack F[9]);
 /* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. The four forces sum to zero. */
 void SbCellForce(const SbPack g[9], const SbPack V, const SbPack P[9], SbPack f[12]);
 /*

@@ -14,34 +14,17 @@
 */
 #include <sbelement.h>
 
-/* H = (u_1 - u_0) g_1^T + (u_2 - u_0) g_2^T + (u_3 - u_0) g_3^T of lane l */
-SB_INLINE void gradient(const SbPack g[9], const SbPack u[12], int l, PetscReal H[9])
-{
-  for (int i = 0; i < 3; i++) {
-    const PetscReal d1 = u[3 + i][l] - u[i][l], d2 = u[6 + i][l] - u[i][l], d3 = u[9 + i][l] - u[i][l];
-
-    for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * g[j][l] + d2 * g[3 + j][l] + d3 * g[6 + j][l];
-  }
-}
-
-SB_KERNEL void SbCellGradient(const SbPack g[restrict 9], const SbPack u[restrict 12], SbPack F[restrict 9])
+/* F = one I + (u_1 - u_0) g_1^T + (u_2 - u_0) g_2^T + (u_3 - u_0) g_3^T */
+SB_KERNEL void SbCellGradient(const SbPack g[restrict 9], const SbPack u[restrict 12], PetscReal one,
+                              SbPack F[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal H[9];
+    for (int i = 0; i < 3; i++) {
+      const PetscReal d1 = u[3 + i][l] - u[i][l], d2 = u[6 + i][l] - u[i][l], d3 = u[9 + i][l] - u[i][l];
 
-    gradient(g, u, l, H);
-    for (int k = 0; k < 9; k++) F[k][l] = H[k] + (k % 4 == 0);
-  }
-}
-
-SB_KERNEL void SbCellGradientRate(const SbPack g[restrict 9], const SbPack v[restrict 12],
-                                  SbPack H[restrict 9])
-{
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal h[9];
-
-    gradient(g, v, l, h);
-    SbPackPut(9, h, l, H);
+      for (int j = 0; j < 3; j++)
+        F[3 * i + j][l] = d1 * g[j][l] + d2 * g[3 + j][l] + d3 * g[6 + j][l] + (i == j ? one : 0.);
+    }
   }
 }
 

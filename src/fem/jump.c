@@ -194,7 +194,7 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
     if (!keep) modulus[l] = m->mu;
   }
   sb_gather_strain(s, b, x, u);
-  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
+  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
 
   /* skip most batches: sums of two principal stresses are at most sqrt(2) |P| */

@@ -25,67 +25,50 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
   }
 }
 
-/* Rotation r of the cell in lane l, for P2 the mean over its points; returns the number of its nodes. */
-static PetscInt cell_rotation(SbSpace s, const SbPack *R, PetscInt b, PetscInt l, PetscReal r[9])
-{
-  const PetscBool quadratic = (PetscBool)(s->edge_node && s->edge_node[6 * s->batch_cell[b]] >= 0);
-
-  R += 9 * sb_rotation_points(s) * b;
-  for (int k = 0; k < 9; k++)
-    r[k] = quadratic ? 0.25 * (R[k][l] + R[9 + k][l] + R[18 + k][l] + R[27 + k][l]) : R[k][l];
-  return quadratic ? SB_CELL_NODES : 4;
-}
-
 PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal node_R[], PetscReal spread[])
 {
-  PetscReal *sum, r[9];
+  const PetscInt stride = 9 * sb_rotation_points(s);
+  PetscReal *sum;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(9 * s->nnode, &sum));
-  /* sum[nnode][9] += V R of every cell at its nodes. */
-  for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = sb_batch_nodes(s, b);
-
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      const PetscInt n = cell_rotation(s, R, b, l, r);
-
-      for (int k = 0; k < 9; k++) r[k] *= s->batch_V[b][l];
-      for (PetscInt a = 0; a < n; a++) {
-        PetscReal *to = sum + 9 * node[a * SB_BATCH + l];
-
-        for (int k = 0; k < 9; k++) to[k] += r[k];
-      }
-    }
-  }
-  for (PetscInt first = 0; first < s->nnode_owned; first += SB_BATCH) {
-    const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
-    SbPack M[9], Q[9];
-
-    /* divide by the volume around the node: SbPolar() expects numbers near one */
-    for (PetscInt l = 0; l < SB_BATCH; l++) {
-      const PetscReal *from = sum + 9 * (first + (l < n ? l : 0));
-      const PetscReal size = PetscSqrtReal(SbDot9(from, from) / 3.);
-
-      for (int k = 0; k < 9; k++) M[k][l] = size > 0. ? from[k] / size : 0.;
-    }
-    SbPolar((const SbPack *)M, Q);
-    for (PetscInt l = 0; l < n; l++) SbPackGet(9, (const SbPack *)Q, (int)l, node_R + 9 * (first + l));
-  }
-  if (spread) {
-    for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
+  for (PetscInt i = 0; spread && i < s->nnode_owned; i++) spread[i] = 0.;
+  for (int pass = 0; pass < (spread ? 2 : 1); pass++) {
+    /* first sum[nnode][9] += V R of every cell at its nodes; then the spread */
     for (PetscInt b = 0; b < s->nbatch; b++) {
-      const PetscInt *node = sb_batch_nodes(s, b);
+      const SbRegion *region = s->batch_region[b];
+      const SbPack *own = R + stride * b;
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscInt n = cell_rotation(s, R, b, l, r);
+        PetscReal r[9];
 
-        for (PetscInt a = 0; a < n; a++) {
-          const PetscInt i = node[a * SB_BATCH + l];
+        /* of P2 the mean over its points */
+        for (int k = 0; k < 9; k++)
+          r[k] = region->quadratic ? 0.25 * (own[k][l] + own[9 + k][l] + own[18 + k][l] + own[27 + k][l])
+                                   : own[k][l];
+        for (PetscInt a = 0; a < region->nnode; a++) {
+          const PetscInt i = sb_batch_nodes(s, b)[a * SB_BATCH + l];
 
+          for (int k = 0; k < 9 && !pass; k++) sum[9 * i + k] += r[k] * s->batch_V[b][l];
           /* |R - Q|^2 = 6 - 2 R : Q for rotations, and its mean over the points of P2 */
-          if (i < s->nnode_owned) spread[i] = PetscMax(spread[i], 6. - 2. * SbDot9(r, node_R + 9 * i));
+          if (pass && i < s->nnode_owned)
+            spread[i] = PetscMax(spread[i], 6. - 2. * SbDot9(r, node_R + 9 * i));
         }
       }
+    }
+    for (PetscInt first = 0; !pass && first < s->nnode_owned; first += SB_BATCH) {
+      const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
+      SbPack M[9], Q[9];
+
+      /* divide by the volume around the node: SbPolar() expects numbers near one */
+      for (PetscInt l = 0; l < SB_BATCH; l++) {
+        const PetscReal *from = sum + 9 * (first + (l < n ? l : 0));
+        const PetscReal size = PetscSqrtReal(SbDot9(from, from) / 3.);
+
+        for (int k = 0; k < 9; k++) M[k][l] = size > 0. ? from[k] / size : 0.;
+      }
+      SbPolar((const SbPack *)M, Q);
+      for (PetscInt l = 0; l < n; l++) SbPackGet(9, (const SbPack *)Q, (int)l, node_R + 9 * (first + l));
     }
   }
   PetscCall(PetscFree(sum));

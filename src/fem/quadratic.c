@@ -48,10 +48,7 @@ void SbBatchGradients(SbSpace s, PetscInt b, const PetscReal x[], PetscBool rate
     SbPack here[12], *u = at.rule ? here : U;
 
     if (at.rule) SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
-    if (rate)
-      SbCellGradientRate(g, (const SbPack *)u, F[q]);
-    else
-      SbCellGradient(g, (const SbPack *)u, F[q]);
+    SbCellGradient(g, (const SbPack *)u, rate ? 0. : 1., F[q]);
   }
 }
 
@@ -84,7 +81,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
 
     if (cubic) {
       SbQuadraticAt(rule->L[q], U, u);
-      SbCellGradient(g, (const SbPack *)u, own);
+      SbCellGradient(g, (const SbPack *)u, 1., own);
       here = (const SbPack *)own;
     }
     if (m->linear || m->ops.frame || m->ops.spin) {

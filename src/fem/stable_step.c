@@ -21,12 +21,11 @@
 
 #define POWER_STEPS 100
 
-/* Lower bound of the highest angular frequency of K x = w^2 M x, M lumped; 0 if nothing can move. */
-static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
+PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
 {
   const PetscInt n = 3 * s->nnode_owned;
   Vec X;
-  PetscReal *x, *f, square, centre[4] = {0., 0., 0., 0.};
+  PetscReal *x, *f, square, centre[4] = {0., 0., 0., 0.}, damping[2] = {0., 0.}, w = 0., least = 1., zeta;
   SbStage stage = {0};
 
   PetscFunctionBeginUser;
@@ -41,7 +40,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
     f[i] = PetscSinReal(12.9898 * (PetscReal)(s->node_orig[i / 3] % 10007) + 1.) *
            (s->node_x[i] - centre[i % 3] / centre[3]);
 
-  *w = 0.;
+  /* w: lower bound of the highest angular frequency of K x = w^2 M x, M lumped; 0 if nothing can move */
   for (int step = 0; step <= POWER_STEPS; step++) {
     /* y . M y, with zeros at prescribed unknowns */
     square = 0.;
@@ -52,7 +51,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPIU_REAL, MPI_SUM, s->comm));
     if (square <= 0.) break;
     /* x had unit length: the growth of |y| is w^2 */
-    if (step) *w = PetscMax(*w, PetscPowReal(square, 0.25));
+    if (step) w = PetscMax(w, PetscPowReal(square, 0.25));
     PetscCall(VecGetArray(X, &x));
     for (PetscInt i = 0; i < n; i++) x[i] = f[i] / PetscSqrtReal(square);
     PetscCall(VecRestoreArray(X, &x));
@@ -67,15 +66,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   }
   PetscCall(PetscFree(f));
   PetscCall(VecDestroy(&X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
-{
-  PetscReal damping[2] = {0., 0.}, w = 0., least = 1., zeta;
-
-  PetscFunctionBeginUser;
-  PetscCall(highest_frequency(s, &w));
   for (PetscInt b = 0; b < s->mesh->nbody; b++) {
     const SbElementOps *e = &s->element[b]->ops;
 

@@ -118,29 +118,6 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
-/* Blocks of a law with a full tangent dP/dF, without its volumetric part; damping is added. */
-static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                           const SbPack F[9], Split *split, SbPack K[10][9])
-{
-  SbPack C[81], R[9], D[10][9], W;
-
-  m->ops.tangent(m, F, C);
-  if (split) {
-    m->ops.volumetric(m, F, split->D);
-    split->factor = x->stiffness;
-    remove_volumetric(x->lambda, (const SbPack *)split->D, C);
-  }
-  if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
-  scaled_volumes(V, x->stiffness, W);
-  SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
-  if (x->damping == 0.) return;
-  SbPolar(F, R);
-  scaled_volumes(V, x->damping, W);
-  SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
-  for (int k = 0; k < 90; k++)
-    for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
-}
-
 /* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
 static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                        const SbPack F[9], Split *split, SbPack K[10][9])
@@ -170,7 +147,24 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
     }
     SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
   } else {
-    general_blocks(m, g, V, x, F, split, K);
+    SbPack C[81], D[10][9];
+
+    /* a full tangent dP/dF, without its volumetric part; damping is added */
+    m->ops.tangent(m, F, C);
+    if (split) {
+      m->ops.volumetric(m, F, split->D);
+      split->factor = x->stiffness;
+      remove_volumetric(x->lambda, (const SbPack *)split->D, C);
+    }
+    if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
+    scaled_volumes(V, x->stiffness, W);
+    SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
+    if (x->damping == 0.) return;
+    SbPolar(F, R);
+    scaled_volumes(V, x->damping, W);
+    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
+    for (int k = 0; k < 90; k++)
+      for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     return;
   }
   if (!split) return;
@@ -245,7 +239,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
       SbPack u[12], here[9];
 
       SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
-      SbCellGradient(g, (const SbPack *)u, here);
+      SbCellGradient(g, (const SbPack *)u, 1., here);
       for (int l = 0; l < SB_BATCH; l++)
         factor[l] = x->stiffness * (points.step ? points.weight[q][l] : rule->weight[q]) * (*V)[l] * p[l];
       SbQuadraticAddJacobian(rule->L[q], g, (const SbPack *)here, factor, K);

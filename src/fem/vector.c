@@ -45,13 +45,11 @@ PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
 
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace s, PetscReal x[])
 {
-  const PetscReal *all;
-
   PetscFunctionBeginUser;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecPlaceArray(s->template_vec, x));
-  PetscCall(SbSpaceGetLocalRead(s, s->template_vec, &all));
-  PetscCall(SbSpaceRestoreLocalRead(s, s->template_vec, &all));
+  PetscCall(VecGhostUpdateBegin(s->template_vec, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostUpdateEnd(s->template_vec, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecResetArray(s->template_vec));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,7 +49,7 @@ static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9]
     for (int l = 0; l < SB_BATCH; l++)
       for (int i = 0; i < 3; i++) u[3 * a + i][l] = w->u[3 * node[a * SB_BATCH + l] + i];
   }
-  SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, F);
+  SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.frame(m, (const SbPack *)F, R);
   SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->lambda, m->mu, (const SbPack *)R, K);
 }

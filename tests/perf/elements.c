@@ -57,7 +57,7 @@ static void bare_kernel(Case *c, const PetscReal u[])
       SbPack at[12], F[9], R[9];
 
       SbQuadraticAt(SbRuleQuadratic.L[q], (const SbPack *)U, at);
-      SbCellGradient(g, (const SbPack *)at, F);
+      SbCellGradient(g, (const SbPack *)at, 1., F);
       m->ops.frame(m, (const SbPack *)F, R);
       SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbPack *)R, B[q]);
     }

@@ -42,7 +42,7 @@ static void force_of(SbMaterial m, const Cells *c, const SbPack u[12], SbPack f[
 {
   SbPack F[9], P[9];
 
-  SbCellGradient(c->g, u, F);
+  SbCellGradient(c->g, u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
   SbCellForce(c->g, c->V, (const SbPack *)P, f);
 }
@@ -77,17 +77,17 @@ static void test_gradient(SbElement e)
 
     make_cells(e, pow(10, t % 7 - 3), &c);
     random_state(&c, 0.5, A, u);
-    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)F) < 1e-13,
              "F of an affine map is off by %g", lane_difference(9, (const SbPack *)A, (const SbPack *)F));
-    SbCellGradientRate((const SbPack *)c.g, (const SbPack *)u, H);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 0., H);
     for (int k = 0; k < 9; k += 4)
       for (int l = 0; l < SB_BATCH; l++) H[k][l] += 1;
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)H) < 1e-13,
              "the rate of an affine map is wrong");
     for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++) u[k][l] = 1e3 * (1 + k % 3);
-    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     for (int k = 0; k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++) SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
   }
@@ -107,10 +107,10 @@ static void test_force(SbElement e, SbMaterial m)
     force_of(m, &c, (const SbPack *)u, f);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) u[k][l] += h;
-      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
       m->ops.energy(m, (const SbPack *)F, plus);
       for (int l = 0; l < SB_BATCH; l++) u[k][l] -= 2 * h;
-      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
       m->ops.energy(m, (const SbPack *)F, minus);
       for (int l = 0; l < SB_BATCH; l++) {
         u[k][l] += h;
@@ -175,7 +175,7 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
 
     make_cells(e, size, &c);
     random_state(&c, 0.25, A, u);
-    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     m->ops.tangent(m, (const SbPack *)F, C);
     SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, K);
     check_block_sums((const SbPack(*)[9])K, (m->E + m->lambda) * size);
@@ -237,7 +237,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
     random_state(&c, 0.6, A, u);
     for (int k = 0; k < 12; k++)
       for (int l = 0; l < SB_BATCH; l++) v[k][l] = uniform();
-    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     m->ops.frame(m, (const SbPack *)F, R);
     SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, K);
     for (int k = 0; k < 9; k++)
@@ -250,7 +250,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
                "block %d with W = -mu I is not Hooke's", p);
     }
     check_block_sums((const SbPack(*)[9])K, (m->E + m->lambda) * size);
-    SbCellGradientRate((const SbPack *)c.g, (const SbPack *)v, H);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)v, 0., H);
     SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
     SbCellForce((const SbPack *)c.g, c.V, (const SbPack *)dP, f);
     for (int l = 0; l < SB_BATCH; l++) {
@@ -363,7 +363,7 @@ static void test_lanes(SbElement e)
     for (int k = 0; k < 9; k++) c.g[k][l] = l % 2 ? c.g[k][l] : c.g[k][0];
     c.V[l] = l % 2 ? c.V[l] : c.V[0];
   }
-  SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+  SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
   SbCellForce((const SbPack *)c.g, c.V, (const SbPack *)F, f);
   SbCellBlocksIsotropic((const SbPack *)c.g, c.V, 3, 2, (const SbPack *)R, K);
   SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, J);
