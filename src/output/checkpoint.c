@@ -10,8 +10,8 @@
 
   Effects have active contact constraints and friction states. Each gives records of numbers, whose entities
   have numbers that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`,
-  in any order. Every rank reads all; the effect takes its entities'. Without such a dataset (no contact, or an
-  older file) the effects begin as at the start of a run.
+  in any order. Every rank reads all; the effect takes its entities'. Without such a dataset (no contact, or
+  an older file) the effects begin as at the start of a run.
 */
 #include <errno.h>
 #include <sys/stat.h>

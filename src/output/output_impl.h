@@ -256,7 +256,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
-/* contacts.c: points of contact after a step, on the ranks that write them; bytes: of all in the file. Collective. */
+/* contacts.c: points of contact after a step, on the ranks that write them; bytes in the file. Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
@@ -334,7 +334,7 @@ PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *no
 PetscErrorCode SbIndexDestroy(SbIndex *index);
 /* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
 PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
-/* Adds a frame: its group in fields.h5 and its arrays there. Contact points have positions `x` and a number. */
+/* Adds a frame: its group in fields.h5, and its arrays. Contact points have positions `x` and a number. */
 PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
                           const SbArray array[]);
 /* Replaces the files, unless there is a message or no index; `message` becomes the error, if any. The last

@@ -16,8 +16,8 @@
 #endif
 
 /*
-  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real number, null
-  where it is none.
+  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real number,
+  null where it is none.
 */
 static void put(FILE *f, const char *format, ...)
 {
