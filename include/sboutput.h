@@ -119,7 +119,7 @@ PetscErrorCode SbReportHeader(SbRun run);
 PetscErrorCode SbReportSummary(SbRun run);
 
 /* Path of a file in the run's folder, and whether nothing is to be printed. Not collective. */
-PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet);
+void SbOutputFile(SbRun run, const char *name, char path[PETSC_MAX_PATH_LEN], PetscBool *quiet);
 
 /* Writes "status": "failed" and the reason into run.json. Any one rank, for the handler of a fatal error. */
 PetscErrorCode SbReportFailure(SbRun run, const char *reason);

@@ -50,7 +50,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbReportHeader(s->run));
   PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
   PetscCall(SbReportSummary(s->run));
-  PetscCall(SbOutputFile(s->run, "ledger.csv", sizeof(file), file, &quiet));
+  SbOutputFile(s->run, "ledger.csv", file, &quiet);
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
   if (s->run->stop_reason[0]) SbErrorPost(s->run->stopped, s->run->stop_reason);

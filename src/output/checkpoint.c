@@ -3,10 +3,15 @@
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double
   precision, the step, its time, the next step's length, work and dissipation so far, and the history
-  variables of effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the
-  newest ones are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell by
-  its original number), and the same text of the options that determine the mechanics. A checksum over the
-  three vectors detects a file that was damaged later (both sums: mesh.c).
+  variables of effects. A file is written beside its target, flushed and renamed; the newest ones are kept. It
+  is accepted by a run with the same hash of the mesh (every coordinate and cell by its original number), and
+  the same text of the options that determine the mechanics. A checksum over the three vectors detects a file
+  that was damaged later (both sums: mesh.c).
+
+  Effects have active contact constraints and friction states. Each gives records of numbers, whose entities
+  have numbers that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`,
+  in any order. Every rank reads all; the effect takes its entities'. Without such a dataset (no contact, or
+  an older file) the effects begin as at the start of a run.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -14,6 +19,7 @@
 #include "output_impl.h"
 
 #define FORMAT 1
+#define SALT 0x5bd1e995u /* in the checksums of effects */
 
 /* An array of the state. Those with a checksum of their own may be missing in a file. */
 typedef struct {
@@ -124,6 +130,83 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Checksum: depends on the order within a record, not on the order of records. */
+static uint64_t sum_of_records(PetscInt n, PetscInt width, const PetscReal record[])
+{
+  uint64_t sum = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    uint64_t one = SALT;
+
+    for (PetscInt k = 0; k < width; k++) one = SbMixReal(one, record[width * i + k]);
+    sum += one;
+  }
+  return sum;
+}
+
+/* Writes the state of all effects; sum is raised by their checksum. Collective. */
+static PetscErrorCode write_effects(SbRun run, SbH5 *h, uint64_t *sum)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->neffect; k++) {
+    SbEffect e = m->effect[k];
+    SbOrder order = {0};
+    char name[2 * SB_NAME_MAX];
+    PetscReal *record;
+    uint64_t mine, all;
+
+    if (!e->ops.save) continue;
+    SbEffectCall(e, save, m->space, &order.n, &record);
+    PetscCallMPI(MPI_Allreduce(&order.n, &order.N, 1, MPIU_INT, MPI_SUM, m->comm));
+    PetscCallMPI(MPI_Scan(&order.n, &order.start, 1, MPIU_INT, MPI_SUM, m->comm));
+    order.start -= order.n;
+    mine = sum_of_records(order.n, e->nstate, record);
+    PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPI_UINT64_T, MPI_SUM, m->comm));
+    SbFormat(sizeof(name), name, "state_%s", e->name);
+    if (order.N) {
+      PetscCall(SbH5PutInt(h, h->file, name, order.N));
+      PetscCall(SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, record));
+      *sum += all;
+    }
+    PetscCall(PetscFree(record));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable. Collective. */
+static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok)
+{
+  const SbModel m = run->model;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
+  for (PetscInt k = 0; k < m->neffect && *ok; k++) {
+    SbEffect e = m->effect[k];
+    SbOrder order = {0};
+    char name[2 * SB_NAME_MAX];
+    PetscBool there = PETSC_TRUE;
+    PetscReal *record;
+    int64_t n = 0;
+
+    if (!e->ops.load) continue;
+    SbFormat(sizeof(name), name, "state_%s", e->name);
+    SbH5GetInt(h->file, name, &n, &there);
+    if (!there || n <= 0) continue;
+    order.n = order.N = (PetscInt)n;
+    PetscCall(PetscMalloc1(e->nstate * order.n, &record));
+    PetscCall(SbH5ReadSlice(h, name, &order, e->nstate, record, ok));
+    if (*ok && sum) *sum += sum_of_records(order.n, e->nstate, record);
+    if (*ok && !sum) SbEffectCall(e, load, m->space, t, u, order.n, record);
+    PetscCall(PetscFree(record));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
+  if (!sum) PetscCall(SbModelContactResume(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
@@ -149,14 +232,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
   /* a temporary file beside its target; a full disk is an error before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
-  PetscCall(SbOutputPath(out, name, sizeof(path), path));
-  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
+  SbOutputPath(out, name, path);
+  SbOutputPath(out, "checkpoint.tmp", tmp);
   PetscCall(SbH5Create(out->comm, tmp, &h));
   PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536));
 
   /* the state */
   PetscCall(write_parts(run, out, &h, &checksum));
-  PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
+  PetscCall(write_effects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
   /* time, work and dissipation so far */
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
@@ -188,7 +271,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     if (rename(tmp, path))
       SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
     else
-      PetscCall(SbCheckpointPrune(out, PETSC_MAX_INT, out->checkpoint_keep));
+      SbCheckpointPrune(out, PETSC_MAX_INT, out->checkpoint_keep);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(PetscLogEventEnd(out->event.checkpoint, 0, 0, 0, 0));
@@ -302,7 +385,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   /* the identity, the state and its checksum */
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   if (*ok) PetscCall(read_parts(run, out, &h, &sum, ok));
-  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, 0., &sum, ok));
+  if (*ok) PetscCall(read_effects(run, &h, 0., &sum, ok));
   if (*ok) SbCheckpointSumMeshes(run, &h, &sum, ok);
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
@@ -332,7 +415,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   }
 
   /* history variables of effects; the run is at the file's step */
-  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, times.t, NULL, ok));
+  if (*ok) PetscCall(read_effects(run, &h, times.t, NULL, ok));
   PetscCall(SbH5Close(&h));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   run->after.dt = times.paused;
@@ -368,9 +451,8 @@ PetscErrorCode SbCheckpointLoad(SbRun run)
     PetscCall(SbWarning(out->comm, SB_SKIPPED, path));
     out->ndamaged++;
   }
-  out->restarted = PETSC_TRUE;
   if (!out->quiet)
     PetscCall(PetscPrintf(out->comm, "restart from %s: step %" PetscInt_FMT ", t = %g s\n", path, run->step0,
-                          (double)run->t0));
+                          run->t0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

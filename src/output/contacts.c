@@ -126,7 +126,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 
 PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path)
 {
-  const hid_t group = out->contact_index ? SbH5OpenGroup(frame, "contacts") : -1;
+  const hid_t group = SbH5OpenGroup(frame, "contacts");
   SbArray array[NTABLE];
   PetscInt bytes = out->precise ? 8 : 4;
   int64_t n = 0;
@@ -138,6 +138,7 @@ PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const c
   SbH5GetInt(group, "count", &n, &ok);
   if (n) (void)SbH5Rows(group, "gap", &bytes);
   (void)H5Gclose(group);
+  if (!out->contact_index) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
     array[k] = (SbArray){.name = table[k].name,
                          .ncomp = table[k].ncomp,
@@ -145,19 +146,5 @@ PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const c
                          .whole = table[k].whole};
   (void)snprintf(name, sizeof(name), "%s/contacts", path);
   PetscCall(SbIndexAdd(out->contact_index, time, name, (PetscInt)n, NTABLE - 1, array + 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
-{
-  const SbMesh mesh = run->model->mesh;
-  PetscReal nowhere[3] = {0., 0., 0.}; /* position of the dummy point of a frame without contact */
-
-  PetscFunctionBeginUser;
-  // After a restart frames that are kept may have contact points, which stay in the index.
-  if (!out->contact_points && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
-  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
-  PetscCall(SbIndexCreate(out, "contacts", nowhere, &out->contact_index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -140,42 +140,39 @@ static PetscErrorCode number(const SbField *f, SbRun run, const SbStep *step, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define VERTEX PETSC_FALSE
-#define CELL PETSC_TRUE
-#define VARIES PETSC_FALSE
-#define CONSTANT PETSC_TRUE
-#define ALWAYS PETSC_FALSE
-#define DYNAMIC PETSC_TRUE
+#define CELL .cell = PETSC_TRUE
 #define STEP(member) .from = offsetof(SbStep, member)
 #define STATE(member) .from = offsetof(struct _p_SbOutput, member)
 
 static const SbField table[] = {
-  {"displacement", "m", 3, VERTEX, VARIES, ALWAYS, "displacement from the rest state", vector, STEP(U)},
-  {"position", "m", 3, VERTEX, VARIES, ALWAYS, "where the vertices are; fields.vtkhdf shows the bodies there",
-   position, STEP(U)},
-  {"velocity", "m/s", 3, VERTEX, VARIES, DYNAMIC, "velocity", vector, STEP(V)},
-  {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator", vector,
-   STEP(A)},
-  {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", .compute = reaction},
-  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", .compute = contact},
-  {"contact_gap", "m", 3, VERTEX, VARIES, ALWAYS,
-   "from the nearest point of what it may touch, along the normal there; 0: nothing near",
-   .compute = contact},
-  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", of_state, STATE(sigma), stress},
-  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", of_state, STATE(sigma), von_mises},
-  {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",
-   of_state, STATE(pressure)},
-  {"mean_pressure", "Pa", 1, CELL, VARIES, ALWAYS, "minus a third of the trace of the Cauchy stress",
-   of_state, STATE(sigma), mean_pressure},
-  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", of_state, STATE(J)},
-  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", of_state, STATE(psi)},
-  {"space_error", "J/m^3", 1, CELL, VARIES, ALWAYS,
-   "energy of the estimated error of the mesh per rest volume; needs -ledger", .compute = space_error},
-  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", .compute = number},
-  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", .compute = number},
-  {"sets", "1", 1, CELL, CONSTANT, ALWAYS,
-   "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside",
-   .compute = NULL},
+  {"displacement", "m", 3, .compute = vector, STEP(U), .help = "displacement from the rest state"},
+  {"position", "m", 3, .compute = position, STEP(U),
+   .help = "where the vertices are; fields.vtkhdf shows the bodies there"},
+  {"velocity", "m/s", 3, .compute = vector, STEP(V), .dynamic = PETSC_TRUE, .help = "velocity"},
+  {"acceleration", "m/s^2", 3, .compute = vector, STEP(A), .dynamic = PETSC_TRUE,
+   .help = "acceleration, state of the integrator"},
+  {"reaction", "N", 3, .compute = reaction, .help = "force of a support on the body"},
+  {"contact_force", "N", 3, .compute = contact, .help = "force of contact on the body"},
+  {"contact_gap", "m", 3, .compute = contact,
+   .help = "from the nearest point of what it may touch, along the normal there; 0: nothing near"},
+  {"stress", "Pa", 6, CELL, .compute = of_state, STATE(sigma), .of_stress = stress, .help = "Cauchy stress"},
+  {"von_mises", "Pa", 1, CELL, .compute = of_state, STATE(sigma), .of_stress = von_mises,
+   .help = "von Mises stress"},
+  {"pressure", "Pa", 1, CELL, .compute = of_state, STATE(pressure),
+   .help = "pressure of the law, -lambda times its change of volume"},
+  {"mean_pressure", "Pa", 1, CELL, .compute = of_state, STATE(sigma), .of_stress = mean_pressure,
+   .help = "minus a third of the trace of the Cauchy stress"},
+  {"J", "1", 1, CELL, .compute = of_state, STATE(J), .help = "volume ratio det F"},
+  {"energy_density", "J/m^3", 1, CELL, .compute = of_state, STATE(psi),
+   .help = "strain energy per rest volume"},
+  {"space_error", "J/m^3", 1, CELL, .compute = space_error,
+   .help = "energy of the estimated error of the mesh per rest volume; needs -ledger"},
+  {"body", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
+   .help = "number of the body, always written"},
+  {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE, .help = "MPI rank that owns the cell"},
+  {"sets", "1", 1, CELL, .compute = NULL, .constant = PETSC_TRUE,
+   .help =
+     "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside"},
 };
 
 const SbField *SbFieldGetAll(PetscInt *n)

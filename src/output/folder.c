@@ -49,12 +49,9 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
   (void)unlink(tmp);
 }
 
-PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
+void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN])
 {
-  PetscFunctionBeginUser;
-  PetscCheck((size_t)snprintf(path, size, "%s/%s", out->dir, name) < size, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-output_dir %s is too long", out->dir);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  SbFormat(PETSC_MAX_PATH_LEN, path, "%s/%s", out->dir, name);
 }
 
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
@@ -65,16 +62,15 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
   return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
 }
 
-PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
+void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
   int fd, error = 0;
 
-  PetscFunctionBeginUser;
-  PetscCall(SbOutputPath(out, ".supple_tries_to_write", sizeof(probe), probe));
+  SbOutputPath(out, ".supple_tries_to_write", probe);
   for (size_t i = 1; i <= strlen(out->dir) && !error; i++) {
     if (out->dir[i] != '/' && out->dir[i]) continue;
-    PetscCall(PetscStrncpy(part, out->dir, i + 1));
+    SbFormat(i + 1, part, "%s", out->dir);
     if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK)) error = errno;
   }
   if (!error) {
@@ -83,11 +79,9 @@ PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
     if (fd >= 0) (void)close(fd);
     (void)unlink(probe);
   }
-  if (error) {
+  if (error)
     SbFormat(SB_MESSAGE_MAX, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
              strerror(error));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 #define LOCK ".supple_running"
@@ -102,17 +96,16 @@ static void remove_lock(void)
 }
 
 /* Opens and locks the lock file, or says why not; rank 0. Again if its owner removed the file meanwhile. */
-static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
+static void lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
   char path[PETSC_MAX_PATH_LEN], text[512] = "", host[256] = "";
   struct stat mine, there;
 
-  PetscFunctionBeginUser;
-  PetscCall(SbOutputPath(out, LOCK, sizeof(path), path));
+  SbOutputPath(out, LOCK, path);
   for (PetscBool again = PETSC_TRUE; again;) {
     out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (out->lock < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    if (out->lock < 0) return;
     if (fcntl(out->lock, F_SETLK, &all)) {
       const ssize_t n = errno == EACCES || errno == EAGAIN ? read(out->lock, text, sizeof(text) - 1) : -1;
 
@@ -122,7 +115,7 @@ static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
         SbFormat(SB_MESSAGE_MAX, message,
                  "-output_dir %s is in use by another run%s%s: wait for its end, or give another folder",
                  out->dir, n ? ", " : "", text);
-      PetscFunctionReturn(PETSC_SUCCESS);
+      return;
     }
     again = (PetscBool)(fstat(out->lock, &mine) || stat(path, &there) || mine.st_ino != there.st_ino);
     if (again) (void)close(out->lock);
@@ -132,8 +125,7 @@ static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
   if (!ftruncate(out->lock, 0)) (void)!write(out->lock, text, strlen(text));
 
   SbErrorSetCleanup(remove_lock); /* an error leaves the output as it is */
-  PetscCall(PetscStrncpy(locked, path, sizeof(locked)));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  SbFormat(sizeof(locked), locked, "%s", path);
 }
 
 PetscErrorCode SbOutputLock(SbRun run)
@@ -142,7 +134,7 @@ PetscErrorCode SbOutputLock(SbRun run)
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
-  if (!out->rank) PetscCall(lock_folder(out, message));
+  if (!out->rank) lock_folder(out, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,20 +171,18 @@ static void free_names(int n, struct dirent **names)
   free(names);
 }
 
-PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
+void SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
 {
   struct dirent **names;
   const int n = list_checkpoints(out->dir, &names);
   char path[PETSC_MAX_PATH_LEN];
 
-  PetscFunctionBeginUser;
   for (int i = 0; i < n; i++) {
     if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
-    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    SbOutputPath(out, names[i]->d_name, path);
     (void)unlink(path);
   }
   free_names(n, names);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN])
@@ -205,7 +195,7 @@ PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN])
     struct dirent **names;
     const int n = list_checkpoints(out->dir, &names), k = n - 1 - out->ndamaged;
 
-    if (k >= 0) PetscCall(SbOutputPath(out, names[k]->d_name, PETSC_MAX_PATH_LEN, path));
+    if (k >= 0) SbOutputPath(out, names[k]->d_name, path);
     free_names(n, names);
   }
   PetscCallMPI(MPI_Bcast(path, PETSC_MAX_PATH_LEN, MPI_CHAR, 0, out->comm));
@@ -226,13 +216,13 @@ static PetscErrorCode keep_earlier(SbOutput out)
   PetscCall(SbOutputFiles(out, &n, &file));
   if (!n) PetscCall(PetscFree(file));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
+  SbOutputPath(out, "run.json", path);
   if (stat(path, &info)) info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
   for (int k = 1; k < 1000 && made; k++) {
     SbFormat(sizeof(name), name, "before_%s", date);
     if (k > 1) SbAppend(sizeof(name), name, "_%d", k);
-    PetscCall(SbOutputPath(out, name, sizeof(path), path));
+    SbOutputPath(out, name, path);
     made = mkdir(path, 0777);
     if (made && errno != EEXIST) break;
   }
@@ -243,7 +233,7 @@ static PetscErrorCode keep_earlier(SbOutput out)
   for (PetscInt i = 0; i < n; i++) {
     char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN + SB_FILE_MAX];
 
-    PetscCall(SbOutputPath(out, file[i].name, sizeof(from), from));
+    SbOutputPath(out, file[i].name, from);
     SbFormat(sizeof(to), to, "%s/%s", path, file[i].name);
     PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s", from, to,
                strerror(errno));
@@ -259,15 +249,15 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   char path[PETSC_MAX_PATH_LEN + 8];
 
   PetscFunctionBeginUser;
-  if (!out->restarted && !out->overwrite) PetscCall(keep_earlier(out));
+  if (!out->restart[0] && !out->overwrite) PetscCall(keep_earlier(out));
 
   // Later checkpoints would be taken for the latest ones.
-  PetscCall(SbCheckpointPrune(out, out->restarted ? step0 : -1, PETSC_MAX_INT));
-  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(path), path));
+  SbCheckpointPrune(out, out->restart[0] ? step0 : -1, PETSC_MAX_INT);
+  SbOutputPath(out, "checkpoint.tmp", path);
   (void)unlink(path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    PetscCall(SbOutputPath(out, ours[i], PETSC_MAX_PATH_LEN, path));
-    if (!out->restarted) (void)unlink(path);
+    SbOutputPath(out, ours[i], path);
+    if (!out->restart[0]) (void)unlink(path);
     // temporary files of an aborted run
     PetscCall(PetscStrlcat(path, ".tmp", sizeof(path)));
     (void)unlink(path);
@@ -290,7 +280,7 @@ PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files
     struct stat info;
 
     SbFormat(sizeof(file->name), file->name, "%s", i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name);
-    PetscCall(SbOutputPath(out, file->name, sizeof(path), path));
+    SbOutputPath(out, file->name, path);
     if (stat(path, &info)) continue;
     file->bytes = (PetscInt64)info.st_size;
     (*n)++;

@@ -14,19 +14,13 @@
 #include "output_impl.h"
 #include "sbgeometry.h"
 
-typedef struct {
-  PetscInt step; /* sorted by it */
-  PetscInt mesh; /* step after which its mesh was made, 0: the first one */
-  char group[48];
-} SbFrame;
-
 struct _p_SbFrames {
   SbH5 h5;
   hid_t top;                /* /step */
   hid_t node;               /* group of the current hundred frames; negative before the first frame */
   PetscInt nnode, nlink;    /* groups of a hundred frames so far; links in the current one */
   PetscInt last_step;       /* of the last frame in the file, or -1 */
-  PetscInt mesh;            /* of frames that are written, as in SbFrame */
+  PetscInt mesh;            /* of frames that are written: the step after which it was made, 0: the first */
   SbIndex index;            /* rank 0 only */
   PetscReal *owned, *slice; /* work: three numbers per point, or those of a field per cell or tet */
 };
@@ -232,7 +226,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a frame of the file, with the fields that it has, to the indices. Rank 0. */
+/* Adds a frame of the file, with the fields that it has, to the indices. All ranks read, as HDF5 wants its
+   metadata used alike on all. */
 static PetscErrorCode list_frame(SbOutput out, hid_t group, const char *path)
 {
   SbArray array[SB_FIELD_MAX];
@@ -248,16 +243,9 @@ static PetscErrorCode list_frame(SbOutput out, hid_t group, const char *path)
     if (bytes)
       array[n++] = (SbArray){.name = f->name, .ncomp = (int)f->ncomp, .bytes = (int)bytes, .cell = f->cell};
   }
-  PetscCall(SbIndexAdd(out->frames->index, time, path, 0, n, array));
+  if (out->frames->index) PetscCall(SbIndexAdd(out->frames->index, time, path, 0, n, array));
   PetscCall(SbContactsList(out, group, time, path));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Writes the index files for viewers, with all frames so far. Rank 0. */
-static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
-{
-  SbIndexWrite(out->frames->index, last, message);
-  if (!message[0] && out->contact_index) SbIndexWrite(out->contact_index, last, message);
 }
 
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
@@ -329,47 +317,16 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   fr->nlink++;
   (void)snprintf(path, sizeof(path), "/step/%s/%s", hundred, name);
   fr->last_step = step->step;
-  if (fr->index) {
-    PetscCall(list_frame(out, group, path));
-    write_indices(out, step->last, message);
-  }
+  PetscCall(list_frame(out, group, path));
   (void)H5Gclose(group);
+  SbIndexWrite(fr->index, step->last, message);
+  SbIndexWrite(out->contact_index, step->last, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(PetscLogEventEnd(out->event.fields, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   if (step->last) PetscCall(SbFramesClose(out));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* After a restart. */
-typedef struct {
-  PetscInt n, size, nhundred;
-  SbFrame *frame; /* [n] */
-  PetscErrorCode ierr;
-} List;
-
-/* Adds a frame: a group in that of a hundred. */
-static herr_t add_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
-{
-  List *l = (List *)ctx;
-  const char *slash = strchr(name, '/');
-  const hid_t group = slash && !strchr(slash + 1, '/') ? H5Gopen2(top, name, H5P_DEFAULT) : -1;
-  int64_t step = 0, mesh = 0;
-  PetscBool ok = PETSC_TRUE, other;
-
-  (void)info;
-  l->nhundred += !slash;
-  if (group < 0) return 0;
-  l->ierr = SbReserve(l->n + 1, sizeof(*l->frame), &l->size, &l->frame);
-  if (l->ierr) return -1;
-  SbH5GetInt(group, "step", &step, &ok);
-  SbH5GetInt(group, "mesh", &mesh, &other);
-  l->frame[l->n] = (SbFrame){.step = (PetscInt)step, .mesh = (PetscInt)mesh};
-  SbFormat(sizeof(l->frame->group), l->frame[l->n].group, "/step/%s", name);
-  (void)H5Gclose(group);
-  l->n += ok;
-  return 0;
 }
 
 /* Whether an open file of frames has this run's mesh as that of a step. */
@@ -395,12 +352,40 @@ static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
   return step;
 }
 
+/* The frames of a file. */
+typedef struct {
+  struct {
+    PetscInt step; /* sorted by it */
+    char group[48];
+  } * frame; /* [n] */
+  PetscInt n, size, nhundred;
+  PetscErrorCode ierr;
+} List;
+
+/* Adds a frame: a group in that of a hundred, named by its step. */
+static herr_t add_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
+{
+  List *l = (List *)ctx;
+  const char *slash = strchr(name, '/');
+
+  (void)top, (void)info;
+  l->nhundred += !slash;
+  if (!slash || strchr(slash + 1, '/')) return 0;
+  l->ierr = SbReserve(l->n + 1, sizeof(*l->frame), &l->size, &l->frame);
+  if (l->ierr) return -1;
+  l->frame[l->n].step = (PetscInt)strtol(slash + 1, NULL, 10);
+  SbFormat(sizeof(l->frame->group), l->frame[l->n++].group, "/step/%s", name);
+  return 0;
+}
+
 /* Opens the file of the run that is continued; ok is false when there is none, or one of another mesh. */
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
-  List list = {0};
-  PetscInt n = 0;
+  List l = {0};
+  PetscInt k = 0;
+  int64_t mesh = 0, shown = -1; /* meshes of a frame and of the one before, as in fr->mesh */
+  PetscBool other;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
@@ -416,29 +401,28 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   }
 
   /* its frames; the index has those up to the restart, so that it never lists a frame that is removed */
-  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, add_frame, &list);
-  PetscCall(list.ierr);
-  PetscCall(SbSortByKeys(list.n, sizeof(SbFrame), 1, list.frame));
-  fr->nnode = list.nhundred;
-  for (; n < list.n && list.frame[n].step <= run->step0; n++) {
-    const SbFrame *f = &list.frame[n];
-    const hid_t group = fr->index ? H5Gopen2(fr->h5.file, f->group, H5P_DEFAULT) : -1;
+  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, add_frame, &l);
+  PetscCall(l.ierr);
+  PetscCall(SbSortByKeys(l.n, sizeof(*l.frame), 1, l.frame));
+  fr->nnode = l.nhundred;
+  for (; k < l.n && l.frame[k].step <= run->step0; k++, shown = mesh) {
+    const hid_t group = H5Gopen2(fr->h5.file, l.frame[k].group, H5P_DEFAULT);
 
-    fr->last_step = f->step;
-    if (group < 0) continue;
-    if (!n || f->mesh != f[-1].mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, f->mesh));
-    PetscCall(list_frame(out, group, f->group));
+    fr->last_step = l.frame[k].step;
+    mesh = 0;
+    SbH5GetInt(group, "mesh", &mesh, &other);
+    if (fr->index && mesh != shown) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, (PetscInt)mesh));
+    PetscCall(list_frame(out, group, l.frame[k].group));
     (void)H5Gclose(group);
   }
-  if (fr->index) {
-    if (!n || list.frame[n - 1].mesh != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
-    write_indices(out, PETSC_TRUE, message);
-  }
+  if (fr->index && shown != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
+  SbIndexWrite(fr->index, PETSC_TRUE, message);
+  SbIndexWrite(out->contact_index, PETSC_TRUE, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
   /* then later frames are removed */
-  for (; n < list.n; n++) (void)H5Ldelete(fr->h5.file, list.frame[n].group, H5P_DEFAULT);
-  PetscCall(PetscFree(list.frame));
+  for (; k < l.n; k++) (void)H5Ldelete(fr->h5.file, l.frame[k].group, H5P_DEFAULT);
+  PetscCall(PetscFree(l.frame));
   PetscCall(SbH5Flush(&fr->h5));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -451,7 +435,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
+  SbOutputPath(out, "fields.h5", path);
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, &ok));
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
   (void)find_mesh(run, out, h.file, &ok);
@@ -475,29 +459,30 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {
+  static const PetscReal origin[3] = {0., 0., 0.};
+  const SbMesh mesh = run->model->mesh;
   char path[PETSC_MAX_PATH_LEN];
   SbFrames fr = out->frames;
-  PetscBool has;           /* the file has the mesh */
-  PetscInt most = 1, wide; /* components of a cell field; points of a cell */
+  PetscBool has = PETSC_FALSE; /* the file has the mesh */
+  PetscInt most = 1, wide;     /* components of a cell field; points of a cell */
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOutputOrder(run, out));
-  has = (PetscBool)(fr && has_mesh(out, fr->h5.file, fr->mesh));
-  if (fr && !has) fr->mesh = run->step0; /* beside the earlier ones */
-
   /* the index, on rank 0; a file that is continued, or a new one without an index until it has a frame */
-  if (!fr) {
+  if (fr) {
+    fr->mesh = run->step0; /* beside the earlier ones */
+  } else {
     PetscCall(PetscNew(&fr));
     *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};
     out->frames = fr;
     if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &fr->index));
-    PetscCall(SbContactsCreate(run, out));
-    PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
-    if (out->restarted) PetscCall(resume(run, out, path, &has));
+    // after a restart frames that are kept may have contact points, which stay in the index
+    if (!out->rank && (out->contact_points || out->restart[0]))
+      PetscCall(SbIndexCreate(out, "contacts", mesh->nvert ? mesh->x : origin, &out->contact_index));
+    SbOutputPath(out, "fields.h5", path);
+    if (out->restart[0]) PetscCall(resume(run, out, path, &has));
     if (!has) {
-      if (fr->index) SbIndexRemove(fr->index);
-      if (out->contact_index) SbIndexRemove(out->contact_index);
       PetscCall(SbH5Create(out->comm, path, &fr->h5));
       PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
     }

@@ -225,13 +225,11 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       if (columns[k].kind == COUNT)
         (void)fprintf(h->text, "%" PetscInt_FMT, *(const PetscInt *)value);
       else
-        (void)fprintf(h->text, "%.17g", (double)*(const PetscReal *)value);
+        (void)fprintf(h->text, "%.17g", *(const PetscReal *)value);
     }
-    for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", (double)h->sum[k]);
-    for (PetscInt k = 0; k < SbLiveCount(); k++)
-      (void)fprintf(h->text, ",%.17g", (double)SbLiveGet(k, step->t));
-    for (PetscInt k = 0; k < run->ncolumn; k++)
-      (void)fprintf(h->text, ",%.17g", (double)*run->column[k].value);
+    for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", h->sum[k]);
+    for (PetscInt k = 0; k < SbLiveCount(); k++) (void)fprintf(h->text, ",%.17g", SbLiveGet(k, step->t));
+    for (PetscInt k = 0; k < run->ncolumn; k++) (void)fprintf(h->text, ",%.17g", *run->column[k].value);
     (void)fputc('\n', h->text);
     (void)fflush(h->text);
     write_row(h, h->message);
@@ -252,7 +250,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   h->text = open_memstream(&h->row, &h->size);
   PetscCheck(h->text, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   PetscCall(put_header(run, out, h));
-  if (out->restarted) {
+  if (out->restart[0]) {
     FILE *file = fopen(h->path, "r");
     char *text = NULL, *line, *end;
     size_t room = 0;
@@ -308,7 +306,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
       for (PetscInt i = 0; i < out->probe[p].nfield; i++) h->nextra += out->probe[p].field[i]->ncomp;
     if (out->history_bodies) h->nextra += SB_BODY_SUMS * model->nbody;
     PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
-    PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
+    SbOutputPath(out, "history.csv", h->path);
     if (!out->rank) PetscCall(open_file(run, out, message));
     PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
     PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));

@@ -15,15 +15,14 @@
 
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index)
 {
-  char file[SB_FILE_MAX];
   SbIndex x;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&x));
-  SbFormat(sizeof(file), file, "%s.xmf", name);
-  PetscCall(SbOutputPath(out, file, sizeof(x->xmf), x->xmf));
-  SbFormat(sizeof(file), file, "%s.vtkhdf", name);
-  PetscCall(SbOutputPath(out, file, sizeof(x->vtkhdf), x->vtkhdf));
+  SbFormat(sizeof(x->xmf), x->xmf, "%s/%s.xmf", out->dir, name);
+  SbFormat(sizeof(x->vtkhdf), x->vtkhdf, "%s/%s.vtkhdf", out->dir, name);
+  (void)unlink(x->xmf);
+  (void)unlink(x->vtkhdf);
   x->points = (PetscBool)(nowhere != NULL);
   x->corners = 1;
   if (nowhere) PetscCall(PetscArraycpy(x->nowhere, nowhere, 3));
@@ -53,12 +52,6 @@ PetscErrorCode SbIndexDestroy(SbIndex *index)
   free(x->text);
   PetscCall(PetscFree(*index));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbIndexRemove(SbIndex x)
-{
-  (void)unlink(x->xmf);
-  (void)unlink(x->vtkhdf);
 }
 
 /* Adds group/dataset of fields.h5 as a piece of the array of this name, which is created if it is new. */
@@ -147,7 +140,7 @@ static void put_item(SbIndex x, const SbArray *a, const SbPiece *piece, PetscInt
   }
   (void)fprintf(x->file, "<DataItem Dimensions=\"1%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">",
                 a->ncomp > 1 ? " 3" : "", type, piece->bytes);
-  for (int k = 0; k < a->ncomp; k++) (void)fprintf(x->file, "%s%.17g", k ? " " : "", (double)single[k]);
+  for (int k = 0; k < a->ncomp; k++) (void)fprintf(x->file, "%s%.17g", k ? " " : "", single[k]);
   (void)fputs("</DataItem>", x->file);
 }
 
@@ -168,7 +161,7 @@ static void put_grid(SbIndex x)
   for (PetscInt i = 0; i < x->narray && x->points; i++)
     if (!strcmp(x->array[i].name, "Points")) places.bytes = x->array[i].piece[f].bytes;
   (void)fprintf(x->file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n",
-                x->points ? "contacts" : "bodies", (double)x->frame[f].time);
+                x->points ? "contacts" : "bodies", x->frame[f].time);
   (void)fprintf(x->file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\"%s>",
                 x->points        ? "Polyvertex"
                 : x->corners > 4 ? "Tetrahedron_10"
@@ -229,7 +222,7 @@ void SbIndexWrite(SbIndex x, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   static const char tail[] = "</Grid>\n</Domain>\n</Xdmf>\n";
 
-  if (x->points && !x->nframe) return;
+  if (!x || message[0] || (x->points && !x->nframe)) return;
   (void)fputs(tail, x->file);
   (void)fflush(x->file);
   SbFileReplace(x->xmf, x->text, x->size, message);

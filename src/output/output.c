@@ -48,14 +48,12 @@ const SbOption SbOutputRows[] = {
   {0},
 };
 
-PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet)
+void SbOutputFile(SbRun run, const char *name, char path[PETSC_MAX_PATH_LEN], PetscBool *quiet)
 {
   const SbOutput out = (SbOutput)run->output;
 
-  PetscFunctionBeginUser;
   *quiet = out->quiet;
-  PetscCall(SbOutputPath(out, name, size, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  SbOutputPath(out, name, path);
 }
 
 static PetscErrorCode read_options(SbOutput out, SbModel model)
@@ -88,6 +86,8 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
     SbFormat(sizeof(out->dir), out->dir, "out/%.*s",
              dot && dot > base ? (int)(dot - base) : (int)sizeof(out->dir), base[0] ? base : "run");
   }
+  PetscCheck(strlen(out->dir) + SB_FILE_MAX < PETSC_MAX_PATH_LEN, out->comm, PETSC_ERR_USER,
+             "-output_dir %s is too long", out->dir);
   PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
 
   /* the fields of -output_fields, without those that a static run lacks; and body */
@@ -136,7 +136,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
     PetscCall(SbOptionReal(&SbRunScope, "live_speed", &speed));
     PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &angular_speed));
     PetscCall(SbOptionReal(&SbRunScope, "live_pace", &pace));
-    PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
+    SbOutputPath(out, "live.txt", path);
     SbLiveSetUp(path, speed, angular_speed, pace);
   }
 
@@ -209,7 +209,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCall(read_options(out, run->model));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.
   (void)signal(SIGXFSZ, SIG_IGN);
-  if (!out->rank) PetscCall(SbFolderMake(out, message));
+  if (!out->rank) SbFolderMake(out, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   if (!strcmp(out->restart, "auto")) {
     char path[PETSC_MAX_PATH_LEN];
@@ -267,7 +267,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
   /* scenario.opts and run.json */
-  PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
+  SbOutputPath(out, "scenario.opts", path);
   if (!out->rank) SbFileReplace(path, scenario, size, message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));

@@ -148,7 +148,7 @@ struct _p_SbOutput {
   /* options */
   char dir[PETSC_MAX_PATH_LEN];
   char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
-  char restart[PETSC_MAX_PATH_LEN];
+  char restart[PETSC_MAX_PATH_LEN];  /* empty: none */
   int ndamaged; /* newest checkpoints that cannot be read: -restart latest takes the one before them */
   PetscInt nfield;
   PetscLogEvent field_event[SB_FIELD_MAX]; /* SbField_<name> */
@@ -184,7 +184,6 @@ struct _p_SbOutput {
   PetscInt *body_nodes;  /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
   char *identity; /* options that determine the mechanics, one per line */
-  PetscBool restarted;
   /* cell quantities of the instant being written, computed once for all fields that need them */
   PetscBool state_valid;
   PetscReal *sigma, *J, *psi; /* [ncell_owned][6] Pa, [ncell_owned], the same in J/m^3; or NULL */
@@ -203,13 +202,13 @@ struct _p_SbOutput {
 };
 
 /* folder.c: creates the folder with its parents and tests writing; message: the error, if any. Rank 0. */
-PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
+void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
 /* Releases the lock of SbOutputLock(), if there is one. */
 void SbFolderUnlock(SbOutput out);
 /* Moves or removes an earlier run's results; after a restart only checkpoints of later steps. Rank 0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
-PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
+void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN]);
 /* Whether a multiple of `every` lies in (t - dt, t]. */
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
 /* The step after which a body was re-meshed last, 0: none was. Not collective. */
@@ -257,13 +256,11 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
-/* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
-PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
-/* Points of contact after a step, on the ranks that write them; bytes: of all in the file. Collective. */
+/* contacts.c: points of contact after a step, on the ranks that write them; bytes in the file. Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
-/* Adds a frame of the file to the index, if there is one; path: of its group. Rank 0. */
+/* Adds a frame of the file to the index, if there is one; path: of its group. All ranks. */
 PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
@@ -275,10 +272,6 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const SbStage *stage,
                            PetscReal values[]);
-/* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
-PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
-/* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable. Collective. */
-PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
@@ -291,9 +284,9 @@ PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN]);
 #define SB_SKIPPED "%s is truncated or damaged: trying the checkpoint before it"
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 /* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
-PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
+void SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
-PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
+void SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
 /* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf, on rank 0. */
@@ -334,16 +327,17 @@ struct _p_SbIndex {
   PetscInt nwritten; /* vtkhdf.c: frames that the file on disk has */
   double next;       /* when it is made again, in s of MPI_Wtime() */
 };
-/* nowhere[3]: of contact points, with the dummy point of frames without any, m; NULL: of tets. */
+/* Removes older files. nowhere[3]: of contact points, with the dummy point of frames without any, m; NULL: of
+   tets. */
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
-void SbIndexRemove(SbIndex index); /* the files, if there are any */
 /* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
 PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
-/* Adds a frame: its group in fields.h5 and its arrays there. Contact points have positions `x` and a number. */
+/* Adds a frame: its group in fields.h5, and its arrays. Contact points have positions `x` and a number. */
 PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
                           const SbArray array[]);
-/* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
+/* Replaces the files, unless there is a message or no index; `message` becomes the error, if any. The last
+   ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 /* vtkhdf.c: replaces that file when enough frames have come since, or these are the last ones. */
 void SbVtkhdfWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);

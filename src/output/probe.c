@@ -259,7 +259,7 @@ static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
     PetscCall(SbWarning(out->comm,
                         "probe '%s': no tet of the re-meshed body holds its position any more; it follows "
                         "the nearest one, from %.2g of its size outside",
-                        probe->name, (double)best));
+                        probe->name, best));
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   SbQuadraticBasis(L, Q);
   PetscCall(add_cell(s, probe, cell, 1., L, Q));

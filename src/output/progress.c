@@ -61,12 +61,12 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       SbFormat(sizeof(left), left, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
     else
       SbFormat(sizeof(left), left, "%ld:%02ld", s / 60, s % 60);
-    if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
+    if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", speed);
   }
-  (void)snprintf(line, sizeof(line), "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,
+  (void)snprintf(line, sizeof(line), "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, step->t,
                  p->steps ? (double)p->newton / (double)p->steps : 0.,
-                 p->steps ? (double)p->linear / (double)p->steps : 0., (double)step->energies.kinetic,
-                 (double)step->energies.strain, times, left);
+                 p->steps ? (double)p->linear / (double)p->steps : 0., step->energies.kinetic,
+                 step->energies.strain, times, left);
   PetscCall(PetscPrintf(PETSC_COMM_SELF, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
   (void)fflush(PETSC_STDOUT);
   p->open = p->terminal;
@@ -93,12 +93,12 @@ static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, Pe
   if (run->model->nbegin_step)
     (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
   if (linear >= 0) (void)snprintf(solve, sizeof(solve), ", linear iteration %" PetscInt_FMT, linear);
-  PetscCall(SbProgressEnd(out));
+  SbProgressEnd(out);
   PetscCall(PetscPrintf(PETSC_COMM_SELF,
                         "  step %" PetscInt_FMT " has taken %.0f s: Newton iteration %" PetscInt_FMT
                         "%s, residual %.2e N%s, length %.3g%s\n",
-                        run->step_now + 1, (double)(now - begun), newton, solve, (double)residual, contact,
-                        (double)dt, run->model->dynamic ? " s" : ""));
+                        run->step_now + 1, (now - begun), newton, solve, residual, contact, dt,
+                        run->model->dynamic ? " s" : ""));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -141,10 +141,8 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProgressEnd(SbOutput out)
+void SbProgressEnd(SbOutput out)
 {
-  PetscFunctionBeginUser;
-  if (out->line.open) PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
+  if (out->line.open) (void)PetscPrintf(PETSC_COMM_SELF, "\n");
   out->line.open = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

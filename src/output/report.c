@@ -11,29 +11,27 @@
 #define INDENT 11
 
 /* "title      words ..." with the words wrapped at WIDTH and indented. */
-static PetscErrorCode entry(const char *title, const char *format, ...)
+static void entry(const char *title, const char *format, ...)
 {
   char text[2048], *word;
   int column = INDENT;
   va_list args;
 
-  PetscFunctionBeginUser;
   va_start(args, format);
   (void)vsnprintf(text, sizeof(text), format, args);
   va_end(args);
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-*s", INDENT - 1, title));
+  (void)PetscPrintf(PETSC_COMM_SELF, "%-*s", INDENT - 1, title);
   for (word = strtok(text, " "); word; word = strtok(NULL, " ")) {
     const int n = (int)strlen(word);
 
     if (column + 1 + n > WIDTH && column > INDENT) {
-      PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%*s", INDENT - 1, ""));
+      (void)PetscPrintf(PETSC_COMM_SELF, "\n%*s", INDENT - 1, "");
       column = INDENT;
     }
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %s", word));
+    (void)PetscPrintf(PETSC_COMM_SELF, " %s", word);
     column += n + 1;
   }
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n");
 }
 
 /*
@@ -64,15 +62,14 @@ static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, 
   return PETSC_TRUE;
 }
 
-static PetscErrorCode print_bodies(SbModel m, SbOutput out)
+static void print_bodies(SbModel m, SbOutput out)
 {
   char name[2 * SB_NAME_MAX], kg[32];
   PetscInt tets = 0, nodes = 0;
   PetscReal mass[2];
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element", "tets",
-                        "nodes", "unknowns", "min angle deg", "radius ratio"));
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element", "tets",
+                    "nodes", "unknowns", "min angle deg", "radius ratio");
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
     const PetscInt n = out->body_nodes[b];
@@ -80,31 +77,29 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
     tets += body->ncell;
     nodes += n;
     if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
-    PetscCall(PetscPrintf(
-      PETSC_COMM_SELF,
-      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", name,
-      body->element, body->ncell, n, 3 * n, (double)body->min_dihedral, (double)body->max_radius_ratio));
+    (void)PetscPrintf(PETSC_COMM_SELF,
+                      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT
+                      " %13.1f %12.2f\n",
+                      name, body->element, body->ncell, n, 3 * n, body->min_dihedral, body->max_radius_ratio);
   }
   if (m->nbody > 1)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF,
-                          "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together",
-                          "", tets, nodes, 3 * nodes));
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material", "E (Pa)",
-                        "nu", "rho (kg/m^3)", "mass (kg)"));
+    (void)PetscPrintf(PETSC_COMM_SELF,
+                      "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together", "",
+                      tets, nodes, 3 * nodes);
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material", "E (Pa)", "nu",
+                    "rho (kg/m^3)", "mass (kg)");
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial material = m->material[b];
 
     if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
     if (mass[1] - mass[0] > 1e-5 * mass[1])
-      SbFormat(sizeof(kg), kg, "%.2g-%.2g", (double)mass[0], (double)mass[1]);
+      SbFormat(sizeof(kg), kg, "%.2g-%.2g", mass[0], mass[1]);
     else
-      SbFormat(sizeof(kg), kg, "%.5g", (double)mass[0]);
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name,
-                          material->law, (double)material->E, (double)material->nu, (double)material->density,
-                          kg));
+      SbFormat(sizeof(kg), kg, "%.5g", mass[0]);
+    (void)PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name, material->law,
+                      material->E, material->nu, material->density, kg);
   }
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n");
 }
 
 PetscErrorCode SbReportHeader(SbRun run)
@@ -120,8 +115,8 @@ PetscErrorCode SbReportHeader(SbRun run)
   if (most > 1) (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "supple %s with PETSc %s on %d rank%s, %s each\n", SB_VERSION,
                         SB_PETSC_VERSION, (int)out->size, out->size == 1 ? "" : "s", threads));
-  PetscCall(print_bodies(run->model, out));
-  if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
+  print_bodies(run->model, out);
+  if (out->scenario[0]) entry("scenario", "%s", out->scenario);
   // effects, with the notes of their set-up
   for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
@@ -129,52 +124,51 @@ PetscErrorCode SbReportHeader(SbRun run)
     SbAppend(sizeof(text), text, "%s%s", e ? ", " : "", effect->name);
     if (strcmp(effect->name, effect->type)) SbAppend(sizeof(text), text, " (%s)", effect->type);
   }
-  PetscCall(entry("effects", "%s", text[0] ? text : "none"));
+  entry("effects", "%s", text[0] ? text : "none");
   for (PetscInt e = 0; e < run->model->neffect; e++)
     if (run->model->effect[e]->note[0])
-      PetscCall(entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note));
+      entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note);
   // integrator and steps
   SbRunIntegrator(run, sizeof(name), name);
   if (run->arc.on)
-    PetscCall(entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
-                    1. / (double)run->static_steps));
+    entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
+          1. / (double)run->static_steps);
   else if (!run->model->dynamic)
-    PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
-                    run->static_steps == 1 ? "" : "s"));
+    entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
+          run->static_steps == 1 ? "" : "s");
   else
-    PetscCall(entry("time", "%s, t = %g to %g s%s %g s", name, (double)run->t0, (double)run->t_end,
-                    run->fixed_step ? " in steps of" : ", adaptive steps, the first one", (double)run->dt));
+    entry("time", "%s, t = %g to %g s%s %g s", name, run->t0, run->t_end,
+          run->fixed_step ? " in steps of" : ", adaptive steps, the first one", run->dt);
   if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
-    PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
+    entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason);
   else
-    PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
+    entry("solver", "%s: %s", run->solver, run->solver_reason);
   text[0] = 0;
   for (PetscInt k = 0; k < out->nfield; k++)
     SbAppend(sizeof(text), text, "%s%s", k ? ", " : ": ", out->field[k]->name);
   if (out->nfield && out->every > 0.)
-    SbAppend(sizeof(text), text, " every %g s", (double)out->every);
+    SbAppend(sizeof(text), text, " every %g s", out->every);
   else if (out->nfield && out->every_steps > 1)
     SbAppend(sizeof(text), text, " every %" PetscInt_FMT " steps", out->every_steps);
   else if (out->nfield)
     SbAppend(sizeof(text), text, " every step");
   if (out->history) SbAppend(sizeof(text), text, "%s history", out->nfield ? ";" : ":");
-  PetscCall(entry("output", "%s%s", out->dir, text));
+  entry("output", "%s%s", out->dir, text);
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
 
     if (probe->kind != SB_PROBE_POINT) {
-      PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
-                      probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set));
+      entry("probe", "%s: mean over the %s of '%s'", probe->name,
+            probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set);
       continue;
     }
     if (probe->original >= run->model->mesh->Nvert)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
-                    (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-                    (double)PetscSqrtReal(SbDistance2(probe->x, probe->at))));
+    entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where, probe->x[0],
+          probe->x[1], probe->x[2], PetscSqrtReal(SbDistance2(probe->x, probe->at)));
   }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -190,15 +184,14 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
   PetscCall(SbReserve(out->nremeshed + 1, sizeof(*event), &out->remeshed_size, &out->remeshed));
   out->remeshed[out->nremeshed++] = *event;
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProgressEnd(out));
+  SbProgressEnd(out);
   PetscCall(PetscPrintf(out->comm,
                         "body '%s' is re-meshed after step %" PetscInt_FMT
                         ", t = %g%s: worst quality %.3g -> %.3g, %" PetscInt_FMT " -> %" PetscInt_FMT
                         " tets, energy %+.3g J (%+.2g %%)\n",
-                        event->body, event->step, (double)event->t, run->model->dynamic ? " s" : "",
-                        (double)event->quality[0], (double)event->quality[1], event->tets[0], event->tets[1],
-                        (double)change,
-                        (double)(event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
+                        event->body, event->step, event->t, run->model->dynamic ? " s" : "",
+                        event->quality[0], event->quality[1], event->tets[0], event->tets[1], change,
+                        (event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,7 +201,7 @@ static void size_text(PetscReal bytes, size_t size, char text[])
   int k = 0;
 
   for (; bytes >= 1e3 && k < 3; k++) bytes /= 1e3;
-  SbFormat(size, text, k ? "%.3g %s" : "%.0f %s", (double)bytes, unit[k]);
+  SbFormat(size, text, k ? "%.3g %s" : "%.0f %s", bytes, unit[k]);
 }
 
 PetscErrorCode SbReportSummary(SbRun run)
@@ -221,7 +214,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscInt nfile;
 
   PetscFunctionBeginUser;
-  PetscCall(SbProgressEnd(out));
+  SbProgressEnd(out);
   PetscCall(SbFramesClose(out));
   PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->stop_reason));
   PetscCall(SbPhasesGet(out, &phases));
@@ -231,7 +224,7 @@ PetscErrorCode SbReportSummary(SbRun run)
                         " tetrahedra are inverted or flat at the end (det F down to %g): what they show is "
                         "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
                         "they come back, see docs/reference/guarantees.md",
-                        run->energies.ninverted, (double)run->energies.min_J));
+                        run->energies.ninverted, run->energies.min_J));
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   // seconds of the phases
   if (!out->rank) {
@@ -243,14 +236,14 @@ PetscErrorCode SbReportSummary(SbRun run)
       const PetscReal seconds = phases.seconds[i];
 
       if ((i == SB_PHASE_CONTACT || i == SB_PHASE_SEARCH) && !(seconds > 0)) continue; /* none in the scene */
-      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", SbPhaseNames[i], (double)seconds,
-                            (double)(phases.total > 0. ? 100. * seconds / phases.total : 0.)));
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", SbPhaseNames[i], seconds,
+                            (phases.total > 0. ? 100. * seconds / phases.total : 0.)));
       if (steps > 0. && i > SB_PHASE_SETUP)
-        PetscCall(PetscPrintf(PETSC_COMM_SELF, " %14.3f %18.4f", (double)(1e3 * seconds / steps),
-                              (double)(1e6 * seconds / steps / tets)));
+        PetscCall(PetscPrintf(PETSC_COMM_SELF, " %14.3f %18.4f", (1e3 * seconds / steps),
+                              (1e6 * seconds / steps / tets)));
       PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
     }
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f\n\n", "total", (double)phases.total));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f\n\n", "total", phases.total));
   }
 
   /* summaries of effects */
@@ -260,32 +253,30 @@ PetscErrorCode SbReportSummary(SbRun run)
     if (!effect->ops.summary) continue;
     text[0] = 0;
     PetscCall(effect->ops.summary(effect, run->model->space, sizeof(text), text));
-    if (!out->rank && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
+    if (!out->rank && text[0]) entry("effect", "%s: %s", effect->name, text);
   }
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(entry("steps",
-                  "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
-                  " Newton and %" PetscInt_FMT " linear iterations",
-                  run->steps_total, run->rejected_total, run->newton_total, run->linear_total));
+  entry("steps",
+        "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT " Newton and %" PetscInt_FMT
+        " linear iterations",
+        run->steps_total, run->rejected_total, run->newton_total, run->linear_total);
   if (run->solver_parts[0]) {
     PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(solver), solver));
     if (strcmp(solver, run->solver_parts))
-      PetscCall(entry("solver", "%s at the end, %s at first", solver, run->solver_parts));
+      entry("solver", "%s at the end, %s at first", solver, run->solver_parts);
   }
   size_text(phases.memory_max, sizeof(memory), memory);
   size_text(phases.memory_sum, sizeof(sum), sum);
-  if (out->size > 1)
-    PetscCall(entry("memory", "%s at the peak of the largest rank, %s together", memory, sum));
-  else
-    PetscCall(entry("memory", "%s at the peak", memory));
+  entry("memory", out->size > 1 ? "%s at the peak of the largest rank, %s together" : "%s at the peak",
+        memory, sum);
   PetscCall(SbOutputFiles(out, &nfile, &file));
   for (PetscInt i = 0; i < nfile; i++) {
     size_text((PetscReal)file[i].bytes, sizeof(memory), memory);
     SbAppend(sizeof(files), files, "%s%s %s", i ? ", " : "", file[i].name, memory);
   }
   PetscCall(PetscFree(file));
-  PetscCall(entry("files", "in %s: %s", out->dir, files));
-  if (stopped) PetscCall(entry("stopped", "%s", run->stop_reason));
+  entry("files", "in %s: %s", out->dir, files);
+  if (stopped) entry("stopped", "%s", run->stop_reason);
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,8 +16,8 @@
 #endif
 
 /*
-  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real number, null
-  where it is none.
+  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real number,
+  null where it is none.
 */
 static void put(FILE *f, const char *format, ...)
 {
@@ -140,7 +140,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
     put(f, "  'go_on': $s,\n", run->seen.step > run->step0 ? "-restart latest" : "-restart auto");
   put(f, "  'status': $s\n}\n", status);
   (void)fclose(f);
-  PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
+  SbOutputPath(out, "run.json", path);
   SbFileReplace(path, text, size, message);
   free(text);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -190,7 +190,7 @@ PetscErrorCode SbReportFailure(SbRun run, const char *reason)
 
   PetscFunctionBeginUser;
   if (!out || !out->attached) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProgressEnd(out));
+  SbProgressEnd(out);
   PetscCall(write_json(run, out, "failed", reason, NULL, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -222,26 +222,26 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
     PetscCall(SbWarning(run->model->comm,
                         "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
                         "nearest place: is it the same body, at the same place?",
-                        option, (double)far, o->path));
+                        option, far, o->path));
   PetscCall(tell_velocity(run->model, option, b, o->path, (PetscBool)(o->v != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements.
+  The row of each owned node in a checkpoint with n nodes of the same meshes and elements, as an order.
   Supports of dg may differ: each of this run's takes the row of its face's node. ok: n agrees. Collective.
 */
-static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
+static PetscErrorCode order_of_file(SbRun run, PetscInt n, SbOrder *order, PetscBool *ok)
 {
   const SbOutput out = (SbOutput)run->output;
   const SbSpace s = run->model->space;
   const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell, edge = support + 4 * s->mesh->Ncell;
-  PetscInt nsupport = 0, *number;
+  PetscInt nsupport = 0, *number, *row;
   PetscBool weak = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < run->model->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
-  PetscCall(PetscMalloc1(out->node.n, &number));
+  PetscCall(PetscMalloc2(out->node.n, &number, s->nnode_owned, &row));
   for (PetscInt i = 0; i < out->node.n; i++) number[i] = out->node.start + i;
   PetscCall(SbForestBroadcast(out->node.sf, 1, MPIU_INT, number, row));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -253,7 +253,8 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
     if (s->dirichlet_node[i] >= 0 && s->dirichlet_node[i] < s->nnode_owned)
       row[s->dirichlet_node[i]] = row[s->cell_node[i]];
   *ok = (PetscBool)(*ok && (n == out->node.N || (weak && n >= out->node.N - nsupport)));
-  PetscCall(PetscFree(number));
+  if (*ok) PetscCall(SbOrderCreate(out->comm, n, s->nnode_owned, row, order));
+  PetscCall(PetscFree2(number, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,7 +270,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   SbH5 h;
   int64_t hash = 0, step = 0;
   PetscBool ok = PETSC_TRUE, same;
-  PetscInt *row;
+  SbOrder order;
   char *options = NULL;
 
   PetscFunctionBeginUser;
@@ -307,15 +308,12 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     *is = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
   /* displacement and velocity of its nodes; supports, behind the faces' nodes there, may be other ones */
-  PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u", NULL), row, &ok));
+  PetscCall(order_of_file(run, (PetscInt)SbH5Rows(h.file, "u", NULL), &order, &ok));
   if (ok) {
-    SbOrder order;
     PetscReal *slice, *owned;
 
-    PetscCall(SbOrderCreate(out->comm, (PetscInt)SbH5Rows(h.file, "u", NULL), s->nnode_owned, row, &order));
     PetscCall(PetscMalloc2(3 * order.n, &slice, 3 * s->nnode_owned, &owned));
     for (int k = 0; k < 2 && ok; k++) {
       const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);
@@ -334,7 +332,6 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     PetscCall(PetscFree2(slice, owned));
     PetscCall(SbOrderDestroy(&order));
   }
-  PetscCall(PetscFree(row));
   PetscCall(SbH5Close(&h));
   PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
              "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well",
