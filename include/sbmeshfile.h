@@ -1,5 +1,5 @@
 /*
-  sbmeshfile.h - layer 2: a mesh that SbImportRead() has read, on one rank: measured, repaired, refined, written (supple-mesh).
+  sbmeshfile.h - layer 2: a mesh read by SbImportRead(), on one rank: measured, repaired, refined, written.
 
   Not collective. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, a line that names the file and what to do.
 */

@@ -160,8 +160,8 @@ struct _p_SbImport {
   PetscInt npinched;    /* surface edges with more than two facets */
 };
 
-/* Reads a mesh of any kind that -body_<name>_mesh takes, and places it; nothing in it is checked. Of the body:
-   name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet. Not collective. */
+/* Reads a mesh of any kind that -body_<name>_mesh takes, and places it; nothing in it is checked. Of the
+   body: name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or -1. */

@@ -108,10 +108,8 @@ PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  if (!d->stack) {
-    PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->stack), &d->stack));
-    PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->seen), &d->seen));
-  }
+  PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->stack), &d->stack));
+  PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->seen), &d->seen));
   PetscCall(PetscArrayzero(d->seen, d->nset.n));
   d->nfound.n = 0;
   d->seen[s] = PETSC_TRUE;

@@ -267,7 +267,6 @@ static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement 
   PetscInt group, tags, vert[3];
 
   PetscFunctionBeginUser;
-  a->scan->token = side->at;
   PetscCall(SbImportGroup(im, 2, tag, a->surface[side->surface], &group));
   if (side->side < 0) {
     if (SbGmshTypes[e->type].dim == 2 && e->item >= 0) PetscCall(SbImportAddMember(im, 2, e->item, group));
@@ -335,19 +334,16 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   // convert element sides to triangles
   for (PetscInt k = 0; k < a.nside.n; k++) {
     const Side *side = &a.side[k];
+    const PetscInt e = SbNumbersFind(&im->elements, side->element);
+    const PetscBool one = (PetscBool)(side->set < 0);
 
-    if (side->set >= 0) {
-      PetscCall(SbDeckFind(d, side->set));
-      for (PetscInt i = 0; i < d->nfound.n; i++) PetscCall(use_side(&a, side, &d->element[d->found[i]]));
-    } else {
-      const PetscInt e = SbNumbersFind(&im->elements, side->element);
-
-      a.scan->token = side->at;
-      if (e < 0)
-        SB_SCAN_ERROR(a.scan, "surface '%s' has a side of element %lld, which is not there",
-                      a.surface[side->surface], (long long)side->element);
-      PetscCall(use_side(&a, side, &d->element[e]));
-    }
+    if (!one) PetscCall(SbDeckFind(d, side->set));
+    s->token = side->at;
+    if (one && e < 0)
+      SB_SCAN_ERROR(s, "surface '%s' has a side of element %lld, which is not there",
+                    a.surface[side->surface], (long long)side->element);
+    for (PetscInt i = 0; i < (one ? 1 : d->nfound.n); i++)
+      PetscCall(use_side(&a, side, &d->element[one ? e : d->found[i]]));
   }
   PetscCall(SbImportJoinGroups(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -2,11 +2,11 @@
   import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File
   formats"; "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
 
-  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Point data
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c. Point data
   is skipped. Binary data is big-endian. Errors: other data sets, volume cells other than 4- and 10-node tets.
 */
 #include <strings.h>
-#include "vtk_grid.h"
+#include "meshio_impl.h"
 
 typedef struct {
   SbScan *scan;

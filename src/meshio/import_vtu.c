@@ -5,13 +5,13 @@
   base64. A binary array begins with its length or, if compressed by zlib, with the number and sizes of its
   blocks. Base64 may continue after a final =: some writers encode lengths and data separately.
 
-  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Errors:
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c. Errors:
   several pieces, other compressors, volume cells other than 4- and 10-node tets.
 */
 #include <ctype.h>
 #include <stdlib.h>
 #include <zlib.h>
-#include "vtk_grid.h"
+#include "meshio_impl.h"
 
 enum { ZLIB_RATIO = 1032 }; /* largest compression ratio of zlib */
 

@@ -120,6 +120,34 @@ PetscErrorCode SbDeckBuild(SbDeck *deck);
 /* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
+/* vtk_grid.c: cells and cell arrays of a VTK file */
+#define SB_VTK_ARRAYS 16    /* largest number of cell arrays that are examined */
+#define SB_VTK_REGIONS 1000 /* an array with more distinct values is not a region number */
+
+/* Cells of a grid. All numbers as double, exact for node indices. Arrays: SbImportScratch(). */
+typedef struct {
+  PetscInt ncell;
+  int64_t nconnect;
+  double *connect; /* [nconnect] points of the cells, from 0 */
+  double *end;     /* [ncell] end of each cell in `connect` */
+  double *type;    /* [ncell] VTK's cell type */
+  int narray;
+  struct {
+    char name[SB_NAME_MAX];
+    double *value; /* [ncell] */
+  } array[SB_VTK_ARRAYS];
+} SbVtkGrid;
+
+/*
+  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers become groups.
+
+  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, ...; or the only array) gives the
+  groups volume_N, surface_N, ...; another one NAME_volume_N, ... Errors of a cell name import->scan.token.
+*/
+PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
+/* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid one. */
+PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im);
+
 /* write_gmsh.c, write_h5.c: one file */
 extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, SbMeshFormat format, FILE *file);

@@ -4,7 +4,7 @@
   Cell types are those of vtkCellType.h, counted by gmsh's types, for common error messages.
 */
 #include <strings.h>
-#include "vtk_grid.h"
+#include "meshio_impl.h"
 
 /* VTK's cell types, and gmsh's types. nnode 0: any number of nodes. */
 static const struct {

@@ -12,35 +12,18 @@
 
 extern char **environ;
 
-/* Runs the script; its output goes to standard error. */
-static PetscErrorCode draw(const char *render, const char *file, const char *picture, const char *caption)
-{
-  const char *const words[] = {render, file, "-o", picture, "--caption", caption, NULL};
-  pid_t child;
-  int status = 0, error;
-  posix_spawn_file_actions_t actions;
-
-  PetscFunctionBeginUser;
-  (void)posix_spawn_file_actions_init(&actions);
-  (void)posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-  error = posix_spawn(&child, render, &actions, NULL, (char *const *)words, environ);
-  (void)posix_spawn_file_actions_destroy(&actions);
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot start %s: %s", render, strerror(error));
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  PetscCheck(WIFEXITED(status) && !WEXITSTATUS(status), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
-             "%s was not drawn: %s failed, its message is above", picture, render);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh)
 {
-  const char *tmp = getenv("TMPDIR"), *name = tool->out ? tool->out : tool->in;
+  const char *tmp = getenv("TMPDIR"), *dot = strrchr(tool->view, '.');
   static const char *const places[] = {"../scripts/render", "../share/supple/scripts/render"};
   char program[PETSC_MAX_PATH_LEN], render[2 * PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN],
     file[PETSC_MAX_PATH_LEN + 16], index[PETSC_MAX_PATH_LEN + 16];
+  const char *const words[] = {render, file, "-o", tool->view, "--caption", tool->out ? tool->out : tool->in,
+                               NULL};
+  posix_spawn_file_actions_t actions;
   PetscErrorCode ierr;
-  const char *dot = strrchr(tool->view, '.');
+  pid_t child;
+  int status = 0, error = 0;
   const ssize_t n = readlink("/proc/self/exe", program, sizeof(program) - 1);
   char *slash;
 
@@ -64,9 +47,19 @@ PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh)
   (void)snprintf(file, sizeof(file), "%s/mesh.h5", folder);
   (void)snprintf(index, sizeof(index), "%s/mesh.xmf", folder);
   ierr = SbMeshFileWrite(mesh, file, SB_MESH_H5);
-  if (!ierr) ierr = draw(render, file, tool->view, name);
+  // its output goes to standard error
+  (void)posix_spawn_file_actions_init(&actions);
+  (void)posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+  if (!ierr) error = posix_spawn(&child, render, &actions, NULL, (char *const *)words, environ);
+  (void)posix_spawn_file_actions_destroy(&actions);
+  while (!ierr && !error && waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
   (void)unlink(file);
   (void)unlink(index);
   (void)rmdir(folder);
-  PetscFunctionReturn(ierr);
+  PetscCall(ierr);
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot start %s: %s", render, strerror(error));
+  PetscCheck(WIFEXITED(status) && !WEXITSTATUS(status), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
+             "%s was not drawn: %s failed, its message is above", tool->view, render);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
