@@ -254,8 +254,7 @@ static PetscErrorCode test_nothing(void)
   out = (SbOutput)scene.run->output;
   SB_CHECK(!out->points.V && !out->points.valence,
            "something is kept for vertex fields that nobody asked for");
-  SB_CHECK(out->node.sf == out->point.sf,
-           "P1 has an order of nodes of its own");
+  SB_CHECK(out->node.sf == out->point.sf, "P1 has an order of nodes of its own");
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
