@@ -239,12 +239,12 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
         d2[l] += !(above <= 0) ? above * above : !(below <= 0) ? below * below : 0;
       }
     }
-    // push the children within the limit, the nearest last, to be visited first
+    // push the children within the limit; visited first: the nearest, of equal ones the first
     for (int l = 0; l < 4; l++) {
       int at = n;
 
       if (!(d2[l] <= nearest->limit2)) continue;
-      for (; at > 0 && child[at - 1].d2 < d2[l]; at--) child[at] = child[at - 1];
+      for (; at > 0 && child[at - 1].d2 <= d2[l]; at--) child[at] = child[at - 1];
       child[at] = (SbBoxNearestEntry){.level = top.level - 1, .index = 4 * top.index + l, .d2 = d2[l]};
       n++;
     }

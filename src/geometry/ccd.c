@@ -58,7 +58,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
   fast *= SB_CCD_ROUNDING * PETSC_MACHINE_EPSILON;
   for (int step = 0; step < STEPS; step++) {
     SbDistance s;
-    PetscReal first[2][2], second[3][2], gap, length = PETSC_MAX_REAL;
+    PetscReal along[4][2], gap, length = PETSC_MAX_REAL;
 
     for (int i = 0; i < 3 * n; i++) x[i] = y[i] + at * q[i];
     SbDistanceFind(kind, x, &s);
@@ -79,15 +79,13 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
 
     // time until a vertex of one side may reach one of the other along n; at least that by the largest speed
     for (int a = 0; a < n; a++) {
-      PetscReal *p = a < nfirst ? first[a] : second[a - nfirst];
-
-      p[0] = SbDot3(s.n, x + 3 * a);
-      p[1] = SbDot3(s.n, q + 3 * a);
+      along[a][0] = SbDot3(s.n, x + 3 * a);
+      along[a][1] = SbDot3(s.n, q + 3 * a);
     }
     for (int i = 0; i < nfirst; i++) {
-      for (int j = 0; j < n - nfirst; j++) {
-        const PetscReal above = first[i][0] - second[j][0] - limits->radius - aim - at * fast;
-        const PetscReal approach = second[j][1] - first[i][1] + fast;
+      for (int j = nfirst; j < n; j++) {
+        const PetscReal above = along[i][0] - along[j][0] - limits->radius - aim - at * fast;
+        const PetscReal approach = along[j][1] - along[i][1] + fast;
 
         if (above < 0)
           length = 0; // rounding of n

@@ -104,7 +104,7 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   PetscCall(PetscCalloc3(4 * c->nagg, &c->centre, 36 * c->nagg, &c->null, c->nagg, &c->row_of));
   PetscCall(PetscCalloc2(c->nagg, &count, 3 * s->nnode, &number));
 
-  /* block rows of nodes that move by themselves, then of aggregates, whose centres are without nodes in contact */
+  /* block rows of nodes that move by themselves, then of aggregates, which lack nodes in contact; centres */
   c->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     c->way[i] = (uint8_t)way_of(c, i, contact);

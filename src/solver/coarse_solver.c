@@ -108,7 +108,7 @@ PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
     c->changed = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* the blocks into E; not ok: a diagonal not positive, unless parts of it are on other ranks; not a number */
+  /* the blocks into E; not ok: a diagonal not positive, unless parts are on other ranks; not a number */
   for (PetscInt u = 0; u < c->n; u++) {
     for (PetscInt k = c->ia[u]; k < c->ia[u + 1]; k++) {
       const PetscInt i = 3 * (c->first + u), j = 3 * c->ja[k];

@@ -22,9 +22,8 @@
 
       P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),
 
-  symmetric, and positive definite if the eigenvalues of C E are below 2.
-
-  docs/reports/many_ranks.md lists the iterations, messages and memory.
+  symmetric, and positive definite if the eigenvalues of C E are below 2. Iterations, messages and memory:
+  docs/reports/many_ranks.md.
 
   Smoother without contact: ICC(0) of the diagonal block of each rank, from the SBAIJ matrix of the fast
   product (product.h): for BAIJ PETSc would first convert. Where ICC(0) is not positive definite (at Poisson's

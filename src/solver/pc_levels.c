@@ -55,19 +55,19 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 /* A level with P1 everywhere, or with CR instead of DG. */
 static PetscErrorCode add_level(SbLevels v, PetscBool p1)
 {
-  const SbMesh mesh = v->space->mesh;
+  const SbMesh mesh = v->at[0]->mesh;
   const PetscInt k = v->n++;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(mesh->nbody, &v->element[k]));
   for (PetscInt b = 0; b < mesh->nbody; b++) {
-    const SbElement upper = v->space->element[b];
+    const SbElement upper = v->at[0]->element[b];
 
     PetscCall(SbElementCreate(p1 || upper->nodes_per[0] ? "p1" : "cr", NULL, &v->element[k][b]));
     v->element[k][b]->gamma1 = upper->gamma1;
   }
-  PetscCall(SbSpaceCreate(mesh, v->space->material, v->element[k], &v->at[k]));
-  PetscCall(fix_like(v->space, v->at[k]));
+  PetscCall(SbSpaceCreate(mesh, v->at[0]->material, v->element[k], &v->at[k]));
+  PetscCall(fix_like(v->at[0], v->at[k]));
   PetscCall(SbSpaceCreateMatrix(v->at[k], p1 ? SB_MATRIX_AIJ : SB_MATRIX_BAIJ, &v->A[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -75,7 +75,7 @@ static PetscErrorCode add_level(SbLevels v, PetscBool p1)
 /* DG: the CR node of each DG node, its node on the other side of the face, and the weights of both. */
 static PetscErrorCode find_means(SbLevels v)
 {
-  SbSpace s = v->space, m = v->at[1];
+  SbSpace s = v->at[0], m = v->at[1];
 
   PetscFunctionBeginUser;
   PetscCall(
@@ -121,7 +121,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   const PetscReal *x, *mean;
   const PetscScalar *diagonal;
   PetscScalar *out;
-  SbSpace s = v->space;
+  SbSpace s = v->at[0];
 
   PetscFunctionBeginUser;
   if (v->multigrid) PetscCall(PCApply(v->multigrid, r, z));
@@ -168,13 +168,13 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
-  const SbSpace top = v->space;
+  const SbSpace top = v->at[0];
   PetscBool any = (PetscBool)(v->spring != NULL);
   SbSpace s, p;
 
   PetscFunctionBeginUser;
   if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* created with the first matrix */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->at[0]->comm));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   s = v->at[v->n - 2];
   p = v->at[v->n - 1];
@@ -225,7 +225,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (v->n == 3) {
-    SbSpace s = v->space;
+    SbSpace s = v->at[0];
     const SbPlan p = s->plan;
     const PetscReal *own;
     PetscScalar *d;
@@ -258,7 +258,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   }
   PetscCall(SbGaussSeidelSetUp(v->A[v->n - 2], v->inverse, NULL, positive));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->at[0]->comm));
   if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));
   PetscCall(KSPSetUp(v->coarse));
@@ -274,7 +274,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&v));
-  v->space = v->at[0] = s;
+  v->at[0] = s;
   v->n = 1;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &v->A[0]));
   *levels = v;
@@ -310,7 +310,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
     PetscCall(SbSpaceCreateVec(v->at[k], &v->t[k]));
   }
   PetscCall(PetscMalloc1(9 * (size_t)v->at[v->n - 2]->nnode_owned, &v->inverse));
-  PetscCall(KSPCreate(v->space->comm, &v->coarse));
+  PetscCall(KSPCreate(s->comm, &v->coarse));
   PetscCall(KSPSetOptionsPrefix(v->coarse, "pressure_coarse_"));
   PetscCall(KSPSetType(v->coarse, KSPPREONLY));
   PetscCall(KSPGetPC(v->coarse, &pc));
@@ -331,7 +331,7 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(MatDestroy(&v->A[k]));
     if (k) PetscCall(SbSpaceDestroy(&v->at[k]));
-    for (PetscInt b = 0; k && b < v->space->mesh->nbody; b++) PetscCall(SbElementDestroy(&v->element[k][b]));
+    for (PetscInt b = 0; k && b < v->at[0]->mesh->nbody; b++) PetscCall(SbElementDestroy(&v->element[k][b]));
     PetscCall(PetscFree(v->element[k]));
     PetscCall(VecDestroy(&v->r[k]));
     PetscCall(VecDestroy(&v->z[k]));

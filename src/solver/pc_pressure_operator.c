@@ -192,8 +192,8 @@ static PetscErrorCode assemble(Mat K, const SbStage *stage)
   PetscCall(MatShellGetContext(K, &op));
   v = op->levels;
   v->stage = *stage;
-  if (v->spring) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
-  PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, &op->volume));
+  if (v->spring) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->at[0]->nnode_owned));
+  PetscCall(SbSpaceAssembleSplit(v->at[0], stage, v->n, v->at, v->A, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -206,8 +206,8 @@ static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const P
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
   v = op->levels;
-  if (v->multigrid || node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
+  if (v->multigrid || node >= v->at[0]->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->at[0]->nnode_owned, &v->spring));
   for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

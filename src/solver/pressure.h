@@ -10,9 +10,8 @@
    with pc_coarse.c. */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
-  SbSpace space; /* borrowed */
   PetscInt n;    /* number of levels: 2, or 3 with a DG body, 1 with a P2 body */
-  SbSpace at[3]; /* at[0] = space; the others are owned */
+  SbSpace at[3]; /* at[0]: the space, borrowed; the others are owned */
   Mat A[3];      /* matrices of the levels: BAIJ; the last one AIJ */
   SbElement *element[3];
   SbStage stage;     /* of the last assembly: its shifts */

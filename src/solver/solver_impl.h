@@ -7,13 +7,12 @@
 /*
   SbKSPFinish - the norm and the convergence test of ksp, after KSPSetFromOptions().
 
-  Not collective. A solve with a true residual far above the tolerance fails (KSP_DIVERGED_BREAKDOWN); no check
-  is added to an iteration that tests the true residual or no norm, nor to one that tests another norm inside
-  Newton's method. Input: direct, the preconditioner is a factorisation; alone, no Newton step tests the
-  residual afterwards; forces, the absolute tolerance is one of the true residual, N, for any norm in the
-  convergence test: another norm has to decrease by the factor by which the true residual has to. The last is
-  without effect with -ksp_convergence_test of the user. Errors: PETSC_ERR_USER if the method does not have the
-  norm and side.
+  Not collective. A solve with a true residual far above the tolerance fails (KSP_DIVERGED_BREAKDOWN); no
+  check is added to an iteration that tests the true residual or no norm, nor to one that tests another norm
+  inside Newton's method. Input: direct, the preconditioner is a factorisation; alone, no Newton step tests
+  the residual afterwards; forces, the absolute tolerance is one of the true residual, N, for any norm in the
+  convergence test: another norm has to decrease by the factor by which the true residual has to; without
+  effect with -ksp_convergence_test of the user. Errors: PETSC_ERR_USER if the method lacks the norm or side.
 */
 PetscErrorCode SbKSPFinish(KSP ksp, PetscBool direct, PetscBool alone, PetscBool forces);
 
