@@ -64,27 +64,6 @@ static PetscErrorCode put_at(Path *p, PetscReal factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create(SbRun run, Path *p)
-{
-  const SbModel m = run->model;
-  PetscReal moved;
-
-  PetscFunctionBeginUser;
-  *p = (Path){.run = run, .negative = -1};
-  for (int k = 0; k < 9; k++) PetscCall(VecDuplicate(run->U, &p->all[k]));
-  PetscCall(VecAXPBY(p->weight, 1. / m->mass, 0., run->mass));
-  /* whether R is linear in lambda */
-  PetscCall(VecZeroEntries(p->X));
-  PetscCall(put_at(p, 1.));
-  PetscCall(VecNorm(p->X, NORM_INFINITY, &moved));
-  p->delta = moved > 0. ? FINE : 1.;
-  for (PetscInt e = 0; e < m->nforce; e++) p->delta = m->force[e]->steady ? p->delta : FINE;
-  for (PetscInt e = 0; e < m->nprescribe; e++) p->delta = m->prescribe[e]->steady ? p->delta : FINE;
-  PetscCall(VecCopy(run->U, p->X));
-  PetscCall(put_at(p, run->t0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* r = R(X, lambda) */
 static PetscErrorCode residual(Path *p, PetscReal *norm)
 {
@@ -250,27 +229,6 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the reason why no step succeeded. */
-static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
-{
-  char why[sizeof(run->stop_reason)], motion[256];
-  PetscInt body;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-  if (run->rejected_inverted) PetscFunctionReturn(PETSC_SUCCESS);
-  if (body >= 0 && !run->steps_total)
-    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
-                        (double)factor, run->model->body[body].name, motion));
-  else
-    PetscCall(SbRunFail(run,
-                        "the path reached the load factor %.7g, and no step of %.1e of the first one's "
-                        "length was found to go on: %s",
-                        (double)factor, (double)(2. * l / run->arc.first), why));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
@@ -298,12 +256,23 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   PetscReal factor = run->t0, sign = 1., l, length;
   PetscInt step = run->step0, cuts = 0, its;
   PetscBool last = (PetscBool)(factor == 1.), known = PETSC_FALSE, ok;
-  Path p;
+  const SbModel m = run->model;
+  Path p = {.run = run, .negative = -1};
 
   PetscFunctionBeginUser;
-  PetscCheck(!run->after.fn, run->model->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!run->after.fn, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
-  PetscCall(create(run, &p));
+  for (int k = 0; k < 9; k++) PetscCall(VecDuplicate(run->U, &p.all[k]));
+  PetscCall(VecAXPBY(p.weight, 1. / m->mass, 0., run->mass));
+  /* whether R is linear in lambda */
+  PetscCall(VecZeroEntries(p.X));
+  PetscCall(put_at(&p, 1.));
+  PetscCall(VecNorm(p.X, NORM_INFINITY, &length));
+  p.delta = length > 0. ? FINE : 1.;
+  for (PetscInt e = 0; e < m->nforce; e++) p.delta = m->force[e]->steady ? p.delta : FINE;
+  for (PetscInt e = 0; e < m->nprescribe; e++) p.delta = m->prescribe[e]->steady ? p.delta : FINE;
+  PetscCall(VecCopy(run->U, p.X));
+  PetscCall(put_at(&p, factor));
   PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
   PetscCall(product(&p, run->path, run->path, &l));
   l = PetscSqrtReal(l);
@@ -322,7 +291,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       PetscReal rate, uu;
 
       PetscCall(product(&p, p.begin, p.begin, &rate));
-      PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
+      PetscCheck(rate > 0., m->comm, PETSC_ERR_USER_INPUT,
                  "-static_control arc_length: no effect loads or moves the bodies more with the load factor");
       rate = PetscSqrtReal(rate);
       if (factor > 0.) {
@@ -363,16 +332,16 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       PetscReal most = 0.;
 
       PetscCall(VecGetArrayRead(run->U, &u));
-      for (PetscInt i = 0; i < run->model->space->nnode_owned; i++)
+      for (PetscInt i = 0; i < m->space->nnode_owned; i++)
         most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
       PetscCall(VecRestoreArrayRead(run->U, &u));
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, run->model->comm));
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, m->comm));
       last = (PetscBool)(PetscSqrtReal(most) >= run->arc.displacement);
     }
     last = (PetscBool)(last || p.factor == 1.);
     if (!last && step + 1 - run->step0 == run->arc.steps) {
       last = PETSC_TRUE;
-      PetscCall(SbWarning(run->model->comm,
+      PetscCall(SbWarning(m->comm,
                           "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
                           run->arc.steps, (double)p.factor));
     }
@@ -381,7 +350,22 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;
   }
-  if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));
+  if (run->stop_reason[0] && !run->stopped && !run->rejected_inverted) {
+    char why[sizeof(run->stop_reason)], motion[256];
+    PetscInt body;
+
+    /* the reason why no step succeeded */
+    PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+    if (body >= 0 && !run->steps_total)
+      PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
+                          (double)factor, m->body[body].name, motion));
+    else
+      PetscCall(SbRunFail(run,
+                          "the path reached the load factor %.7g, and no step of %.1e of the first one's "
+                          "length was found to go on: %s",
+                          (double)factor, (double)(2. * l / run->arc.first), why));
+  }
   for (int k = 0; k < 9; k++) PetscCall(VecDestroy(&p.all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -51,10 +51,11 @@ static PetscErrorCode solve(SbRun run, Vec U, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedReason *reason)
+PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
   const SNES snes = run->snes;
+  const SbSolvedStep *step = &attempt->step;
   const Vec U = step->U;
   const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsSeparate(m->space));
   PetscBool again = PETSC_TRUE, rough, constrained;
@@ -81,7 +82,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedRea
   if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (constrained) {
     /* scale of rounding: contact and support forces, as a body at rest has a residual of rounding only */
-    PetscCall((*step->residual)(step->ctx, U, run->R));
+    PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
@@ -98,7 +99,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedRea
     PetscCall(solve(run, U, reason));
     if (*reason <= 0) break;
     run->contact_round = round;
-    PetscCall((*step->residual)(step->ctx, U, run->R));
+    PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
     m->space->rough = rough;
     PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {

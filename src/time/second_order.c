@@ -208,7 +208,7 @@ static SbSolvedStep solved_step(TS ts)
 }
 
 /* Computes velocity and acceleration at the end. */
-static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -241,7 +241,6 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
     PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->own1));
     PetscCall(VecAXPY(so->A1, 1. / h, so->work));
   }
-  *step = solved_step(ts);
   if (!*ok && !ts->usessnes)
     PetscCall(SbRunFail(run,
                         "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
@@ -290,8 +289,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   run->stage_start = so->X0;
   run->stage_part = so->set.alpha_f;
   for (;;) {
-    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1,
-                               predict,   contact_residual, complete, ts};
+    const SbAttempt attempt = {solved_step(ts), predict, contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE, fixed;
     PetscReal next, h;
 
@@ -346,15 +344,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     if (explicit || run->stopped || ++cuts > run->max_halvings || next < SHORTEST * run->dt ||
         SbRunTooShort(run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
-      if (!explicit && !run->stopped && run->stop_reason[0]) {
-        char why[sizeof(run->stop_reason)];
-
-        PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-        PetscCall(SbRunFail(run,
-                            "%s; try a shorter -ts_dt, or loads and motions that begin gently "
-                            "(docs/guides/when_it_fails.md, R1)",
-                            why));
-      }
+      if (!explicit && !run->stopped && run->stop_reason[0])
+        SbAppend(sizeof(run->stop_reason), run->stop_reason,
+                 "; try a shorter -ts_dt, or loads and motions that begin gently "
+                 "(docs/guides/when_it_fails.md, R1)");
       break;
     }
     ts->time_step = next;

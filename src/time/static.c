@@ -71,15 +71,9 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Calls of find_free_body(). */
-typedef enum {
-  BEFORE, /* before a step is solved */
-  FAILED,
-  SOLVED
-} When;
-
-/* Searches for an unsupported body; *found: run->stop_reason describes it. */
-static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *found)
+/* Searches for an unsupported body, before a step is solved or after it was tried; *found: run->stop_reason
+   describes it. */
+static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved, PetscBool *found)
 {
   const SbRun run = l->run;
   PetscInt body = -1;
@@ -87,11 +81,11 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   const char *loads = "";
 
   PetscFunctionBeginUser;
-  if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (tried) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && !l->contact);
   /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as a
      hanging weight, makes shorter steps succeed; a load that drives the motion has no equilibrium nearby */
-  if (body < 0 && when != SOLVED && !run->model->linear) {
+  if (body < 0 && !solved && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
 
@@ -121,13 +115,12 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
   PetscBool far, other = PETSC_FALSE, found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  *step = (SbSolvedStep){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
   PetscCall(SbRunTooFar(l->run, l->X, &far));
   if (reason > 0 && !far) PetscCall(jumped(l, &other));
   *ok = (PetscBool)(reason > 0 && !far && !other);
@@ -142,7 +135,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!*ok && !other && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
-    PetscCall(find_free_body(l, FAILED, &found));
+    PetscCall(find_free_body(l, PETSC_TRUE, PETSC_FALSE, &found));
     if (!found) {
       char near[256];
 
@@ -155,7 +148,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
 
   /* with balanced loads a singular system has solutions, up to any rigid motion */
   if (*ok && !l->run->steps_total && !l->contact && l->run->newton_step) {
-    PetscCall(find_free_body(l, SOLVED, &found));
+    PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -176,12 +169,13 @@ PetscErrorCode SbStaticSolve(SbRun run)
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
     LoadStep load = {run, next, next - factor, X, contact};
-    const SbAttempt attempt = {factor, next - factor, run->U, X, predict, contact_residual, complete, &load};
+    const SbSolvedStep end = {factor, next - factor, run->U, .U = X, .solved = PETSC_TRUE};
+    const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE, found;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
     if (run->nonsymmetric.U && !run->steps_total && !contact)
-      PetscCall(find_free_body(&load, BEFORE, &found));
+      PetscCall(find_free_body(&load, PETSC_FALSE, PETSC_FALSE, &found));
     if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
 
     /* halve a failed step, if that may help */

@@ -31,20 +31,20 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
+  const SbSolvedStep *step = &a->step;
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  if (!run->model->dynamic) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, SB_STEPS_OF_LOAD, NULL));
+  if (!run->model->dynamic)
+    PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
-    SbSolvedStep step;
-
     /* begin the step in barrier contact */
     if (run->model->npotential) {
-      PetscCall(SbModelPotentialBegin(run->model, a->t, a->dt, a->U0, run->V));
-      run->barrier_start = a->U0;
-      run->barrier_dt = a->dt;
+      PetscCall(SbModelPotentialBegin(run->model, step->t, step->dt, step->U0, run->V));
+      run->barrier_start = step->U0;
+      run->barrier_dt = step->dt;
     }
 
     /* the predictor, and the solution from there; with contact by active-set iterations */
@@ -52,11 +52,11 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     if (!SbRunIsExplicit(run)) PetscCall(SbRunSolveStep(run, a, &reason));
 
     /* the state at the end, or the reason of failure */
-    PetscCall((*a->complete)(a->ctx, reason, &step, ok));
+    PetscCall((*a->complete)(a->ctx, reason, ok));
 
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of its end */
     if (*ok && !run->model->dynamic && !run->goes_on) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, SB_STEPS_OF_LOAD, &run->goes_on));
+      PetscCall(SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &run->goes_on));
       if (run->goes_on) continue;
     }
     run->goes_on = PETSC_FALSE;
@@ -64,23 +64,23 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
     if (*ok && run->post_solve.fn && solves < SB_LOOKS)
-      PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
+      PetscCall((*run->post_solve.fn)(run, step, run->post_solve.ctx, &again));
   }
 
   /* -time_inverted reject */
-  PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
+  PetscCall(SbRunRejectInverted(run, step->t, step->dt, (Vec[2]){step->U0, step->U}, ok));
 
   /* restore prescribed motions to the start of the step, in case the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
   /* warn of much shorter steps, once until they have the requested length again */
-  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened && a->dt <= SHORT * run->dt) {
+  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened && step->dt <= SHORT * run->dt) {
     run->shortened = PETSC_TRUE;
     PetscCall(
       SbWarning(run->model->comm,
                 "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
                 "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
-                (double)(a->dt / run->dt), run->stop_reason,
+                (double)(step->dt / run->dt), run->stop_reason,
                 run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -30,14 +30,13 @@ PetscErrorCode SbSecondOrderCreate(TS ts);
 /* run: source of prescribed displacements, initial acceleration and lumped mass; borrowed. */
 void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
-/* step.c: data and functions of a step from t to t + dt, all borrowed. Static runs: t is the load factor. */
+/* step.c: data and functions of a step, all borrowed. */
 typedef struct {
-  PetscReal t, dt;                      /* start and length, s */
-  Vec U0, U;                            /* displacements at the start; at the end, once solved, m */
+  SbSolvedStep step;                    /* its vectors: as far as known */
   PetscErrorCode (*predict)(void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* residual without constraints, N; for contact */
-  /* computes the end state from U, in `step`; if not ok run->stop_reason is the reason */
-  PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
+  /* computes the end state from U; if not ok run->stop_reason is the reason */
+  PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, PetscBool *ok);
   void *ctx;
 } SbAttempt;
 /* Updates the penalty on jumps of CR and DG (src/fem/jump.c), then accelerations and reactions. Explicit
