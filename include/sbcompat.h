@@ -62,7 +62,8 @@ typedef char *SbErrorText;
 typedef const char *SbErrorText;
 #endif
 
-/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is not a number. */
+/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is not a
+   number. */
 #if PETSC_VERSION_LT(3, 25, 0)
   #define SB_OPERATION(f) ((void (*)(void))(f))
   #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FNORM_NAN

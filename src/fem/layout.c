@@ -299,9 +299,9 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of the batches, for DG with those opposite across the faces, and the weights of both sides. The mean of
-   the two sides of a face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting
-   does not depend on the volumes and moduli on the two sides (docs/reference/theory.md). */
+/* Nodes of the batches, for DG with those opposite across the faces, and the weights of both sides. The mean
+   of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the
+   lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md). */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
   PetscReal *stiffness;

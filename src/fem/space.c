@@ -25,8 +25,8 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Finds the regions and batches: owned and ghost cells are sorted by body, inclusion and curved edges, so that
-   a region is a range of cells. */
+/* Finds the regions and batches: owned and ghost cells are sorted by body, inclusion and curved edges, so
+   that a region is a range of cells. */
 static PetscErrorCode find_regions(SbSpace s)
 {
   SbMesh mesh = s->mesh;
