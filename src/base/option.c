@@ -170,8 +170,7 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc lists only options that have not been read. Those read are found in a string of all, by their names.
-   */
+/* PETSc lists only options that have not been read. Those read are found in a string of all, by name. */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
   PetscInt nleft;
