@@ -69,10 +69,10 @@ static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
       vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
       "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
       e->name, e->name, e->name);
-    PetscCall(SbOptionReals(scope, "total", load->uniform));
   }
   PetscCall(SbEffectFormulas(e, scope, load->ncorner == 4 ? "density" : "vector", 3,
                              (PetscBool)(load->ncorner > 1), load->density));
+  if (load->ncorner == 3) PetscCall(SbOptionReals(scope, "total", load->uniform));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -232,12 +232,13 @@ static PetscErrorCode list_frame(SbOutput out, hid_t group, const char *path)
 {
   SbArray array[SB_FIELD_MAX];
   PetscReal time = 0.;
-  PetscBool ok;
+  PetscBool ok = PETSC_TRUE;
   PetscInt bytes, n = 0, nfield;
   const SbField *fields = SbFieldGetAll(&nfield);
 
   PetscFunctionBeginUser;
   SbH5GetReal(group, "time", &time, &ok);
+  if (!ok) PetscFunctionReturn(PETSC_SUCCESS); /* the frame is damaged */
   for (const SbField *f = fields; f < fields + nfield; f++) {
     (void)SbH5Rows(group, f->name, &bytes);
     if (bytes)
@@ -409,6 +410,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     const hid_t group = H5Gopen2(fr->h5.file, l.frame[k].group, H5P_DEFAULT);
 
     fr->last_step = l.frame[k].step;
+    if (group < 0) continue;
     mesh = 0;
     SbH5GetInt(group, "mesh", &mesh, &other);
     if (fr->index && mesh != shown) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, (PetscInt)mesh));
@@ -471,7 +473,8 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   PetscCall(SbOutputOrder(run, out));
   /* the index, on rank 0; a file that is continued, or a new one without an index until it has a frame */
   if (fr) {
-    fr->mesh = run->step0; /* beside the earlier ones */
+    has = has_mesh(out, fr->h5.file, fr->mesh);
+    if (!has) fr->mesh = run->step0; /* beside the earlier ones */
   } else {
     PetscCall(PetscNew(&fr));
     *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};

@@ -134,6 +134,21 @@ def check_shortened():
     print(f"steps of {dt[longer[0]]:g} s are followed by {dt[longer[0] + 1]:g} s after a restart, too")
 
 
+def check_frames():
+    """A support that ends leaves the mesh in the file as it is; a frame that is damaged is in no index after a restart."""
+    folder, options = "support", ["-effects", "gravity,hold,end", "-effect_end_type", "fixed", "-effect_end_on", "xmax", "-effect_end_until", "0.03"]
+    shutil.rmtree(OUT / folder, ignore_errors=True)
+    run(2, folder, *WHOLE, *options, "-ts_max_time", "0.1")
+    with h5py.File(OUT / folder / "fields.h5", "r+") as f:
+        if [name for name in f if name.startswith("mesh")] != ["mesh"]:
+            sys.exit(f"{folder}: fields.h5 has {list(f)}")
+        del f[frames(folder)[5][1]].attrs["time"]
+    run(2, folder, *WHOLE, *options, "-restart", "latest", "-ts_max_time", "0.12")
+    times = [round(time, 9) for time, _ in frames(folder)]
+    if times != [round(0.01 * k, 9) for k in range(13) if k != 5]:
+        sys.exit(f"{folder}: frames at {times}")
+
+
 def check_long_path():
     """A folder whose path has more letters than Open MPI's lock files may have."""
     folder = "/".join(["long", *["x" * 100] * 3])
@@ -153,6 +168,7 @@ def main():
     check_shortened()
     check_damage()
     check_fit()
+    check_frames()
     check_long_path()
 
 
