@@ -30,8 +30,11 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
   return f;
 }
 
-/* Slots of a cell: node a and its support (2 a, 2 a + 1), a = 0..3, then the nodes at the edges. */
-#define SLOTS 14
+/* Slots of a cell: node a and its support (2 a, 2 a + 1), a = 0..3, then the nodes at the edges, if any. */
+static PetscInt slots_per_cell(SbSpace s)
+{
+  return s->edge_node ? 14 : 8;
+}
 
 /* The slot in the tables of the space; NULL: it has no such nodes. */
 static PetscInt *table_entry(SbSpace s, PetscInt cell, PetscInt slot)
@@ -46,13 +49,13 @@ static PetscInt *table_entry(SbSpace s, PetscInt cell, PetscInt slot)
 static PetscErrorCode find_items(SbSpace s, uint64_t prescribed, PetscInt item[], PetscInt *nitem)
 {
   const SbMesh mesh = s->mesh;
-  const PetscInt nface = 4 * mesh->ncell;
+  const PetscInt nface = 4 * mesh->ncell, slots = slots_per_cell(s);
   PetscInt nedge = 0, *edge = NULL;
 
   PetscFunctionBeginUser;
   if (s->edge_node) PetscCall(SbMeshEdges(mesh, &nedge, &edge));
-  for (PetscInt i = 0; i < SLOTS * mesh->ncell; i++) {
-    const PetscInt c = i / SLOTS, slot = i % SLOTS, face = 4 * c + slot / 2;
+  for (PetscInt i = 0; i < slots * mesh->ncell; i++) {
+    const PetscInt c = i / slots, slot = i % slots, face = 4 * c + slot / 2;
     const SbElement e = SbSpaceCellElement(s, c);
 
     item[i] = UNKNOWN;
@@ -78,7 +81,8 @@ static PetscErrorCode find_items(SbSpace s, uint64_t prescribed, PetscInt item[]
 static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
 {
   const SbMesh mesh = s->mesh;
-  const PetscInt nslot = SLOTS * mesh->ncell, nslot_owned = SLOTS * mesh->ncell_owned;
+  const PetscInt slots = slots_per_cell(s), nslot = slots * mesh->ncell,
+                 nslot_owned = slots * mesh->ncell_owned;
   PetscInt *item, *number, *first, *last, *at, *ghost, nitem = 0, nghost = 0;
 
   PetscFunctionBeginUser;
@@ -94,11 +98,11 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
      highest: all ranks agree */
   for (PetscInt i = 0; i < nslot; i++) {
     if (item[i] < mesh->nvert) continue;
-    first[item[i]] = PetscMin(first[item[i]], mesh->cell_orig[i / SLOTS]);
-    last[item[i]] = PetscMax(last[item[i]], mesh->cell_orig[i / SLOTS]);
+    first[item[i]] = PetscMin(first[item[i]], mesh->cell_orig[i / slots]);
+    last[item[i]] = PetscMax(last[item[i]], mesh->cell_orig[i / slots]);
   }
   for (PetscInt i = 0; i < nslot_owned; i++) {
-    const PetscInt e = item[i], orig = mesh->cell_orig[i / SLOTS];
+    const PetscInt e = item[i], orig = mesh->cell_orig[i / slots];
 
     if (e >= mesh->nvert && orig == ((first[e] + last[e]) % 2 ? first[e] : last[e])) at[e] = OWN;
   }
@@ -116,9 +120,9 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
     for (PetscInt i = 0; i < nslot_owned; i++) {
       number[i] = item[i] == UNKNOWN ? UNKNOWN : at[item[i]];
       PetscCheck(!round || item[i] == UNKNOWN || number[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-                 "No rank has numbered node %d of cell %d", (int)(i % SLOTS), (int)(i / SLOTS));
+                 "No rank has numbered node %d of cell %d", (int)(i % slots), (int)(i / slots));
     }
-    PetscCall(SbForestBroadcast(mesh->cell_sf, SLOTS, MPIU_INT, number, number));
+    PetscCall(SbForestBroadcast(mesh->cell_sf, slots, MPIU_INT, number, number));
     for (PetscInt i = 0; i < nslot; i++)
       if (number[i] != UNKNOWN) at[item[i]] = number[i];
   }
@@ -136,11 +140,16 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
   for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
   for (PetscInt i = 0; i < nslot; i++) {
-    PetscInt *node = table_entry(s, i / SLOTS, i % SLOTS), k;
+    PetscInt *node = table_entry(s, i / slots, i % slots), own = number[i] - s->gnode_start;
 
     if (!node) continue;
-    PetscCall(PetscFindInt(number[i], nghost, ghost, &k));
-    *node = number[i] == UNKNOWN ? UNKNOWN : k < 0 ? number[i] - s->gnode_start : s->nnode_owned + k;
+    if (number[i] == UNKNOWN) {
+      own = UNKNOWN;
+    } else if (own < 0 || own >= s->nnode_owned) {
+      PetscCall(PetscFindInt(number[i], nghost, ghost, &own));
+      own += s->nnode_owned;
+    }
+    *node = own;
   }
   PetscCall(PetscFree2(item, number));
   PetscCall(PetscFree3(first, last, at));
@@ -304,7 +313,7 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
    lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md). */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
-  PetscReal *stiffness;
+  PetscReal *stiffness = NULL;
   PetscBool broken = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -313,28 +322,32 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
   s->width = s->edge_node ? SB_CELL_NODES : broken ? 8 : 4;
   PetscCall(PetscMalloc1(s->nbatch * s->width * SB_BATCH, &s->batch_clique));
   if (broken) PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
-  PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
-  for (PetscInt b = 0; b < s->nbatch; b++)
+  if (broken) PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
+  for (PetscInt b = 0; broken && b < s->nbatch; b++)
     for (PetscInt l = 0; l < s->batch_n[b]; l++)
       stiffness[s->batch_cell[b] + l] =
         SbMaterialWaveModulus(s->batch_region[b]->material) / s->batch_V[b][l];
-  for (PetscInt k = 0; k < s->width * SB_BATCH * s->nbatch; k++) {
-    const PetscInt b = k / (s->width * SB_BATCH), a = k / SB_BATCH % s->width, l = k % SB_BATCH,
-                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0), face = 4 * cell + a % 4;
-    PetscInt *node = &s->batch_clique[k];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbRegion *region = s->batch_region[b];
 
-    *node = s->batch_region[b]->quadratic && a >= 4 ? s->edge_node[6 * cell + a - 4] : s->cell_node[face];
-    if (broken && a < 4) s->batch_weight[4 * b + a][l] = 1.;
-    if (!s->batch_region[b]->broken || a / 4 != 1) continue;
-    /* the node opposite across the face, and the weight of the cell's own node in the mean */
-    if (s->neighbour[face] >= 0) {
-      const PetscInt other = s->neighbour[face];
+    for (PetscInt k = 0; k < s->width * SB_BATCH; k++) {
+      const PetscInt a = k / SB_BATCH, l = k % SB_BATCH,
+                     cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0), face = 4 * cell + a % 4;
+      PetscInt *node = &s->batch_clique[s->width * SB_BATCH * b + k];
 
-      *node = s->cell_node[4 * other + face_towards(s, other, cell)];
-      s->batch_weight[4 * b + a - 4][l] = stiffness[cell] / (stiffness[cell] + stiffness[other]);
-    } else if (s->dirichlet_node && s->dirichlet_node[face] != UNKNOWN) {
-      *node = s->dirichlet_node[face];
-      s->batch_weight[4 * b + a - 4][l] = 0.;
+      *node = region->quadratic && a >= 4 ? s->edge_node[6 * cell + a - 4] : s->cell_node[face];
+      if (broken && a < 4) s->batch_weight[4 * b + a][l] = 1.;
+      if (!region->broken || a / 4 != 1) continue;
+      /* the node opposite across the face, and the weight of the cell's own node in the mean */
+      if (s->neighbour[face] >= 0) {
+        const PetscInt other = s->neighbour[face];
+
+        *node = s->cell_node[4 * other + face_towards(s, other, cell)];
+        s->batch_weight[4 * b + a - 4][l] = stiffness[cell] / (stiffness[cell] + stiffness[other]);
+      } else if (s->dirichlet_node && s->dirichlet_node[face] != UNKNOWN) {
+        *node = s->dirichlet_node[face];
+        s->batch_weight[4 * b + a - 4][l] = 0.;
+      }
     }
   }
   PetscCall(PetscFree(stiffness));

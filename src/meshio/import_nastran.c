@@ -94,12 +94,15 @@ static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end
 /* Copies the field at p, up to a comma or `width` columns, without blanks around it; returns the next one. */
 static const char *take_field(const char *p, size_t width, char word[WORD])
 {
-  const size_t n = PetscMin(strcspn(p, ","), width), blank = PetscMin(strspn(p, " "), n);
-  size_t end = n;
+  const char *next = p, *end;
 
-  while (end > blank && p[end - 1] == ' ') end--;
-  (void)snprintf(word, WORD, "%.*s", (int)(end - blank), p + blank);
-  return p + n + (p[n] == ',');
+  while ((size_t)(next - p) < width && *next && *next != ',') next++;
+  for (end = next; p < end && *p == ' '; p++) continue;
+  while (end > p && end[-1] == ' ') end--;
+  width = PetscMin((size_t)(end - p), WORD - 1);
+  memcpy(word, p, width);
+  word[width] = 0;
+  return next + (*next == ',');
 }
 
 /* Reads the fields of the next entry, which has none at the end of the file. */
@@ -132,6 +135,10 @@ static PetscErrorCode next_entry(Nastran *b)
     width = strchr(text, ',') ? LINE : 8;
     p = take_field(text, width, word);
     if (b->nfield.n && word[0] && word[0] != '+' && word[0] != '*') break;
+    for (const char *c = after, *line; b->nfield.n && c < s->token; c = line + 1) { /* comments within it */
+      line = (const char *)memchr(c, '\n', (size_t)(s->token - c));
+      if (*c == '$') PetscCall(read_comment(b, c, line));
+    }
     if (width == LINE && from < end && *from != '$')
       SB_SCAN_ERROR(s, "the line is longer than %d characters; go on with the entry on a next line",
                     LINE - 1);
@@ -147,6 +154,7 @@ static PetscErrorCode next_entry(Nastran *b)
     if (width == LINE && word[0])
       SB_SCAN_ERROR(s, "the line has more than %d fields; go on with the entry on a next line", per_line + 2);
     after = s->at;
+    if (!strncasecmp(b->field[0].word, "ENDDATA", 7)) break;
   }
   if (!b->nfield.n) PetscFunctionReturn(PETSC_SUCCESS);
   s->at = after;

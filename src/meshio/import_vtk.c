@@ -223,7 +223,7 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
   while (SbScanWord(s, sizeof(name), name)) PetscCall(read_section(&v, name));
   if (!im->x || !v.cells_at || !v.grid.type)
     SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
-                  !im->x        ? "POINTS"
+                  !im->x        ? "POINTS, with at least one,"
                   : !v.cells_at ? "CELLS"
                                 : "CELL_TYPES");
   s->token = v.cells_at;

@@ -330,7 +330,8 @@ static void write_nastran(const char *path, const SbImport *im)
   fprintf(file, "SOL 101\nCEND\nSET 4 = 1,2\nGRID 1 2 3\nBEGIN BULK\n");
   fprintf(file, "$ANSA_NAME_COMMENT;1;PSOLID;the left one;NO;NO;\n$ANSA_NAME_COMMENT;1;MAT1;steel;NO;\n");
   fprintf(file, "$HMNAME PROP                   2\"right\" 4\n$ Femap with NX Nastran Property 3 : wall\n");
-  fprintf(file, "$ Elements and Element Properties for region : inner\nPSHELL,5,1,1.\nPSOLID,1,7\n+,0\n");
+  fprintf(file, "MAT1,7,1.,,.3\n$ Elements and Element Properties for region : inner\n,,\nPSHELL,5,1,1.\n");
+  fprintf(file, "PSOLID,1,7\n+,0\n");
   for (PetscInt i = 0; i < im->item[3].n; i++) {
     fprintf(file, "CTETRA  %8d%8d", (int)i + 1, mark_of(im, 3, i));
     for (int k = 0; k < 4; k++) fprintf(file, "%8d", (int)im->item[3].vert[4 * i + k] + 1);
@@ -347,8 +348,8 @@ static void write_nastran(const char *path, const SbImport *im)
   for (PetscInt v = 0; v < im->nvert; v++) write_grid(file, (int)v % 4, (int)v + 1, im->x + 3 * v);
   fprintf(file, "SPC1,3,123,%d,%d,,%d,THRU,\n+,%d,900,THRU,999\n", (int)im->item[0].vert[0] + 1,
           (int)im->item[0].vert[0] + 1, (int)im->item[0].vert[0] + 1, (int)im->item[0].vert[0] + 1);
-  fprintf(file, "SPC,4,%d,123,0.\nSET1,5,%d\nENDDATA\nGRID,1\n", (int)im->item[0].vert[0] + 1,
-          (int)im->item[0].vert[0] + 1);
+  fprintf(file, "SPC,4,%d,123,0.\nSET1,5,%d\nENDDATA\n ,1,2,3,4,5,6,7,8,9,10,11\nGRID,1\n",
+          (int)im->item[0].vert[0] + 1, (int)im->item[0].vert[0] + 1);
   fclose(file);
 }
 
