@@ -63,7 +63,8 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
 
   PetscFunctionBeginUser;
   PetscCall(PetscArraycpy(op->p, p, s->mesh->ncell_owned));
-  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 1, MPIU_REAL, op->p, op->p));
+  PetscCall(PetscSFBcastBegin(s->mesh->cell_sf, MPIU_REAL, op->p, op->p, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(s->mesh->cell_sf, MPIU_REAL, op->p, op->p, MPI_REPLACE));
   PetscCall(SbSpaceGetLocalWrite(s, op->u, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
   /* f = B^T p, complete on owned nodes */
