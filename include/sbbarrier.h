@@ -1,10 +1,10 @@
 /*
-  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of an
-  obstacle, contact pairs, continuous collision detection, the barrier potential.
+  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of
+  an obstacle, contact pairs, continuous collision detection, the barrier potential.
 
-  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every element. A
-  rank evaluates every pair that has one of its own nodes: forces on them are complete without communication,
-  and summed in an order that no partition changes.
+  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every
+  element. A rank evaluates every pair that has one of its own nodes: forces on them are complete
+  without communication, and summed in an order that no partition changes.
 */
 #pragma once
 #include "sbcontact.h"
@@ -17,22 +17,24 @@ struct _p_SbContactMesh {
   PetscBool self;                 /* self-contact, too; set by the caller, false at first */
   PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
   PetscInt ntriangle, nbody_triangle, nedge;
-  PetscInt *start, *gnode; /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those below,
+  PetscInt *start,
+    *gnode;       /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those below,
                               global numbers ascending */
-  PetscInt *node;          /* the same as local nodes, -1: not known here */
+  PetscInt *node; /* the same as local nodes, -1: not known here */
   PetscReal *weight;
-  uint8_t *fixed;     /* bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
-  PetscInt *part;     /* [nvertex] body, nbody: the obstacle */
-  PetscInt *id;       /* [nbody_vertex] number in the mesh that no partition changes */
-  uint8_t *mine;      /* [nvertex] some node is owned here */
-  uint8_t *own;       /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
+  uint8_t *fixed; /* bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
+  PetscInt *part; /* [nvertex] body, nbody: the obstacle */
+  PetscInt *id;   /* [nbody_vertex] number in the mesh that no partition changes */
+  uint8_t *mine;  /* [nvertex] some node is owned here */
+  uint8_t *own;   /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
   uint8_t *driven;    /* [nvertex] its motion is prescribed in all directions */
   PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
   PetscInt *edge;     /* [nedge][2] */
   PetscReal *X;       /* [nvertex][3] at rest, m; obstacle: its rest frame */
-  PetscReal *area, *edge_area;   /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
-  PetscReal radius;              /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side;           /* half-space or bowl, whose vertices are described there */
+  PetscReal *area,
+    *edge_area;        /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscReal radius;    /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side; /* half-space or bowl, whose vertices are described there */
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
   /* of SbContactMeshGetPositions() */
@@ -42,23 +44,27 @@ struct _p_SbContactMesh {
   PetscReal *buffer;          /* [2][nbody_vertex][3] */
 };
 
-/* The surface of the facets of SbEffectFacets() and of an obstacle that is set up (NULL: none). MarkDriven,
-   once all effects are set up: marks prescribed unknowns. Collective. */
-PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
-                                   SbContactMesh *mesh);
+/* The surface of the facets of SbEffectFacets() and of an obstacle that is set up (NULL: none).
+   MarkDriven, once all effects are set up: marks prescribed unknowns. Collective. */
+PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[],
+                                   SbObstacle obstacle, SbContactMesh *mesh);
 PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh);
 PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
-/* x[nvertex][3] of the bodies' vertices from local displacements u (ghosts up to date), m. Collective. */
+/* x[nvertex][3] of the bodies' vertices from local displacements u (ghosts up to date), m.
+   Collective. */
 PetscErrorCode SbContactMeshGetPositions(SbContactMesh mesh, const PetscReal u[], PetscReal x[]);
-/* Outward normals of all vertices at x, of twice the area of the triangles around, m^2. Not collective. */
+/* Outward normals of all vertices at x, of twice the area of the triangles around, m^2. Not
+   collective. */
 void SbContactMeshNormals(SbContactMesh mesh, const PetscReal x[], PetscReal normal[]);
 
-/* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the obstacle. */
+/* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the
+   obstacle. */
 typedef struct {
   PetscBool side;
-  SbPairKind kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE; with a side SB_PAIR_VERTEX_VERTEX */
-  PetscInt v[4];   /* vertices of the mesh */
-  PetscReal area;  /* m^2 */
+  SbPairKind
+    kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE; with a side SB_PAIR_VERTEX_VERTEX */
+  PetscInt v[4];  /* vertices of the mesh */
+  PetscReal area; /* m^2 */
 } SbContactPair;
 
 /* Number of vertices on the first side. */
@@ -70,7 +76,9 @@ static inline int SbContactPairSplit(const SbContactPair *pair)
 /* Radius of the obstacle if it is one of the sides, m. */
 static inline PetscReal SbContactPairRadius(SbContactMesh mesh, const SbContactPair *pair)
 {
-  return PetscMax(pair->v[0], pair->v[SbContactPairSplit(pair)]) >= mesh->nbody_vertex ? mesh->radius : 0.;
+  return PetscMax(pair->v[0], pair->v[SbContactPairSplit(pair)]) >= mesh->nbody_vertex
+           ? mesh->radius
+           : 0.;
 }
 
 /* Search and its results; x0 and x1 below are arrays of SbContactMeshGetPositions(). */
@@ -79,21 +87,27 @@ struct _p_SbContactPairs {
   SbContactMesh mesh; /* borrowed */
   PetscReal reach;    /* pairs nearer than this are found, m */
   PetscReal margin;   /* by which boxes are grown, m */
-  PetscReal *box;     /* [nvertex][6] within which vertices may move before pairs are searched for again */
+  PetscReal
+    *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
-  struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
-  PetscBool known;                    /* cleared by who changes `near` */
-  const uint8_t *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
+  struct SbContactFeatures
+    *features;     /* [6] vertices, triangles and edges, each of this rank and of others */
+  PetscBool known; /* cleared by who changes `near` */
+  const uint8_t
+    *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
-  SbContactPair *pair;    /* [n] all that have nodes of this rank, in no order */
-  PetscInt nsearch, most; /* searches; number of pairs at which they end, and whether the last one did */
+  SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
+  PetscInt nsearch,
+    most; /* searches; number of pairs at which they end, and whether the last one did */
   PetscBool full;
 };
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscReal reach, SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
-/* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not collective. */
+/* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not
+   collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
-/* The gap, m: the distance less the radius; closest points and direction in `distance`. Not collective. */
+/* The gap, m: the distance less the radius; closest points and direction in `distance`. Not
+   collective. */
 PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
 /* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m. */
@@ -105,35 +119,44 @@ static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbCont
   const PetscReal reach = distance + SbContactPairRadius(mesh, pair);
 
   for (int k = 0; k < 3 && !pair->side; k++) {
-    PetscReal low[2] = {PETSC_MAX_REAL, PETSC_MAX_REAL}, high[2] = {PETSC_MIN_REAL, PETSC_MIN_REAL};
+    PetscReal low[2] = {PETSC_MAX_REAL, PETSC_MAX_REAL};
+    PetscReal high[2] = {PETSC_MIN_REAL, PETSC_MIN_REAL};
 
     for (int a = 0; a < 4; a++) {
-      const PetscReal p = x0[3 * pair->v[a] + k], q = x1[3 * pair->v[a] + k];
+      const PetscReal p = x0[3 * pair->v[a] + k];
+      const PetscReal q = x1[3 * pair->v[a] + k];
       const int side = a >= split;
 
       low[side] = PetscMin(low[side], PetscMin(p, q));
       high[side] = PetscMax(high[side], PetscMax(p, q));
     }
-    if (low[0] > high[1] + reach || low[1] > high[0] + reach) return PETSC_TRUE;
+    if (low[0] > high[1] + reach || low[1] > high[0] + reach)
+      return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
-/* Largest collision-free fraction, 0..1, of the motion from x0 to x1, for this rank's pairs; each keeps a
-   tenth of its gap. Not collective. */
-PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
-                                     PetscReal *part);
+/* Largest collision-free fraction, 0..1, of the motion from x0 to x1, for this rank's pairs; each
+   keeps a tenth of its gap. Not collective. */
+PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[],
+                                     const PetscReal x1[], PetscReal *part);
 /* A penetrating vertex, or the midpoint of the penetrating part of an edge. */
 typedef struct {
   PetscInt n, v[5];
   PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
   PetscReal normal[3], depth, area; /* separation direction; m, m^2 */
 } SbPenetration;
-/* Of a vertex: adjacent to intersected ones; its edges or triangles intersect a surface; it is inside one. */
-enum { SB_OVERLAP_ADJACENT = 1, SB_OVERLAP_INTERSECTED, SB_OVERLAP_INSIDE };
+/* Of a vertex: adjacent to intersected ones; its edges or triangles intersect a surface; it is
+   inside one. */
+enum {
+  SB_OVERLAP_ADJACENT = 1,
+  SB_OVERLAP_INTERSECTED,
+  SB_OVERLAP_INSIDE
+};
 /* Start with {0}; release with PetscFree(point) and PetscFree(near). The same on every rank. */
 typedef struct {
-  PetscInt ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
-  PetscInt part[2];   /* of the first of them: body, or nbody for the obstacle */
+  PetscInt
+    ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
+  PetscInt part[2];            /* of the first of them: body, or nbody for the obstacle */
   PetscReal place[3], deepest; /* position of it; largest penetration, m */
   PetscInt n, size;
   SbPenetration *point; /* [n] with a separation direction */
@@ -142,34 +165,38 @@ typedef struct {
 /* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
-/* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of
-   body[0] is within the surface of body[1] at x. Slow: for the start of a run. Collective. */
+/* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
+   a tet of body[0] is within the surface of body[1] at x. Slow: for the start of a run.
+   Collective. */
 PetscErrorCode SbContactMeshIsInside(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
                                      PetscBool *found);
 
-/* Energy of a gap d, J, and its first two derivatives: barrier of the width w (m), pressure k (Pa) and area
-   (m^2); 0 from w on, infinite at 0. */
+/* Energy of a gap d, J, and its first two derivatives: barrier of the width w (m), pressure k (Pa)
+   and area (m^2); 0 from w on, infinite at 0. */
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);
 /*
-  SbBarrierPair - energy, gradient and Hessian of a pair at x; edges that are nearly parallel count less.
+  SbBarrierPair - energy, gradient and Hessian of a pair at x; edges that are nearly parallel count
+  less.
 
-  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N;
-  H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
+  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J;
+  gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
-void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap, const SbDistance *distance,
-                   const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
-                   PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
+void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap,
+                   const SbDistance *distance, const PetscReal x[], PetscReal width,
+                   PetscReal pressure, PetscReal *energy, PetscReal gradient[12], PetscBool clamp,
+                   PetscReal H[144]);
 
-/* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix. Start with {0}; release
-   with PetscFree(block) and PetscFree(slot). */
+/* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix. Start with
+   {0}; release with PetscFree(block) and PetscFree(slot). */
 typedef struct {
   PetscInt n, size;
   SbBlock *block;        /* [n] the lower number first */
   PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
-/* Adds the 3x3 block of bodies' vertices v and w, rows `ld` numbers apart, and its transpose for w and v. */
-PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
-                                  PetscInt ld);
-/* Moves the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed
-   components, each pair of nodes once. Not collective. */
+/* Adds the 3x3 block of bodies' vertices v and w, rows `ld` numbers apart, and its transpose for w
+   and v. */
+PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w,
+                                  const PetscReal H[], PetscInt ld);
+/* Moves the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at
+   prescribed components, each pair of nodes once. Not collective. */
 PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, SbContactBlocks *blocks, SbBlocks *nodes);

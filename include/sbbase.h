@@ -1,5 +1,6 @@
 /*
-  sbbase.h - layer 0: options described by tables, errors and warnings, formulas of time and position.
+  sbbase.h - layer 0: options described by tables, errors and warnings, formulas of time and
+  position.
 */
 #pragma once
 #include <petsc.h>
@@ -8,10 +9,11 @@
 #include "sbcompat.h"
 
 #define SB_VERSION "0.1.0"
-#define SB_NAME_MAX 64         /* longest name of a body, set or effect, with the terminating zero */
+#define SB_NAME_MAX 64 /* longest name of a body, set or effect, with the terminating zero */
 #define SB_OPTION_COUNT_MAX 16 /* most numbers or formulas in one option */
 
-#define SB_OPTION_DEFAULT "default" /* -body_default_<key> applies to bodies without their own <key> */
+#define SB_OPTION_DEFAULT \
+  "default" /* -body_default_<key> applies to bodies without their own <key> */
 
 /* options */
 typedef enum {
@@ -26,24 +28,27 @@ typedef enum {
 } SbOptionKind;
 
 /*
-  One row describes one option of ours. Rows are `static const` arrays beside the code that reads them;
-  registered, they are the table from which -help, the checks, -scenario_view and docs/options.md are made.
+  One row describes one option of ours. Rows are `static const` arrays beside the code that reads
+  them; registered, they are the table from which -help, the checks, -scenario_view and
+  docs/options.md are made.
 */
 typedef struct {
   const char *key; /* last part of the name: "young" in -body_liver_young */
   SbOptionKind kind;
   PetscInt count;   /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
   const char *unit; /* "Pa", "kg/m^3"; "" when there is none */
-  /* default as it would be typed; NULL: must be given; "": none, number, truth value or choice stay */
+  /* default as it would be typed; NULL: must be given; "": none, number, truth value or choice
+     stay */
   const char *preset;
   const char *range; /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
   const char *help;  /* one sentence */
 } SbOption;
 
 /*
-  Where an option is read: -<klass>_<instance>_<key>, or -<key> when klass is "" (program-wide options).
-  `type` is the registered name of the implementation that reads it ("gravity", "corotated"; "" for what all
-  instances of the class have); it selects the rows, it is not part of the option's name.
+  Where an option is read: -<klass>_<instance>_<key>, or -<key> when klass is "" (program-wide
+  options). `type` is the registered name of the implementation that reads it ("gravity",
+  "corotated"; "" for what all instances of the class have); it selects the rows, it is not part of
+  the option's name.
 */
 typedef struct {
   char klass[SB_NAME_MAX]; /* "", "body", "set", "effect" */
@@ -52,24 +57,28 @@ typedef struct {
 } SbScope;
 extern const SbScope SbRunScope; /* of the program-wide options */
 
-/* Adds n rows to the table, PETSC_DECIDE: up to one without a key. Names and rows must live as long as the
-   program. Not collective. */
-PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);
+/* Adds n rows to the table, PETSC_DECIDE: up to one without a key. Names and rows must live as long
+   as the program. Not collective. */
+PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n,
+                                 const SbOption rows[]);
 void SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
 /*
-  Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()), or, of
-  bodies, for all by -body_default_<key>; else the preset of the row. Each value read is remembered with its
-  text (for SbOptionsView(), SbOptionsCheck()). Errors (PETSC_ERR_USER, one line that names the full option,
-  value, range, unit): unreadable, out of range, missing; a key without a row is a programming error.
+  Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()),
+  or, of bodies, for all by -body_default_<key>; else the preset of the row. Each value read is
+  remembered with its text (for SbOptionsView(), SbOptionsCheck()). Errors (PETSC_ERR_USER, one line
+  that names the full option, value, range, unit): unreadable, out of range, missing; a key without
+  a row is a programming error.
 */
 PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value);
 PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value);
 PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value);
 PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[]);
 PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[]);
-/* names: PetscFree(); choice: position in `range`, into an int or an enum; second: whether it is 1. */
-PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX]);
+/* names: PetscFree(); choice: position in `range`, into an int or an enum; second: whether it is
+   1. */
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
+                             char (**names)[SB_NAME_MAX]);
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, void *choice);
 PetscErrorCode SbOptionSecond(const SbScope *scope, const char *key, PetscBool *second);
 /* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>. */
@@ -84,39 +93,50 @@ const SbOption *SbOptionFind(const SbScope *scope, const char *key);
 /* Full name, e.g. "-body_liver_young", for messages. */
 void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
-/* Examines the options of ours that nobody read (src/base/option_check.c): warns of one that is of no use in
-   this run, with the reason; one that does not exist ends the run, with the nearest names. Collective. */
+/* Examines the options of ours that nobody read (src/base/option_check.c): warns of one that is of
+   no use in this run, with the reason; one that does not exist ends the run, with the nearest
+   names. Collective. */
 PetscErrorCode SbOptionsCheck(void);
-/* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line may
-   override. After all rows are registered. Collective. */
+/* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line
+   may override. After all rows are registered. Collective. */
 PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file);
-/* Call once, when the user's options are all in the database and before the program adds its own (presets of
-   solvers): what is added later is not the user's. Without this call everything counts. Not collective. */
+/* Call once, when the user's options are all in the database and before the program adds its own
+   (presets of solvers): what is added later is not the user's. Without this call everything counts.
+   Not collective. */
 PetscErrorCode SbOptionsRemember(void);
-/* At the end of a run: warns about each option of the user's that nobody read; n: how many. Collective. */
+/* At the end of a run: warns about each option of the user's that nobody read; n: how many.
+   Collective. */
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
-/* The complete scenario as an option file that runs again: every option of ours read so far with its value,
-   help as comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
+/* The complete scenario as an option file that runs again: every option of ours read so far with
+   its value, help as comment, then the PETSc options that the user gave. Collective; rank 0
+   writes. */
 PetscErrorCode SbOptionsView(PetscViewer viewer);
 /*
   SbOptionsHelp - the manual for -help, from the table.
 
-  Collective; rank 0 prints. topic: "": how to run it, a first scene, the topics; "all": everything; else a
-  class, a type, the first word of options, or a word in their names and texts. Errors: PETSC_ERR_USER.
+  Collective; rank 0 prints. topic: "": how to run it, a first scene, the topics; "all": everything;
+  else a class, a type, the first word of options, or a word in their names and texts. Errors:
+  PETSC_ERR_USER.
 */
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
-/* The table for programs (scripts/manual): columns class, type, option, kind, count, unit, required, default,
-   range, meaning, with tabs between them and a headline. Collective; rank 0 writes; file "-": to stdout. */
+/* The table for programs (scripts/manual): columns class, type, option, kind, count, unit,
+   required, default, range, meaning, with tabs between them and a headline. Collective; rank 0
+   writes; file "-": to stdout. */
 PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
-/* ASCII viewer on a file, "" or "-": standard output; an error on every rank if not writable. Collective. */
+/* ASCII viewer on a file, "" or "-": standard output; an error on every rank if not writable.
+   Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
-PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; before PetscFinalize() */
+PetscErrorCode
+SbOptionsReset(void); /* forgets what was read and registered; before PetscFinalize() */
 
-/* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when
-   none is near. NULL among the names is passed over: PetscFunctionListGet() counts its closing one. */
-void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
+/* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or
+   "; "" when none is near. NULL among the names is passed over: PetscFunctionListGet() counts its
+   closing one. */
+void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+                    char text[]);
 /* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
-void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
+void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
+                   char text[]);
 /* The same for the types in a list. */
 PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[]);
 /* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
@@ -125,28 +145,35 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings);
 /* errors and warnings */
 
 /*
-  SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a
-  bad option file) is not printed where it happens, but by SbErrorFinish(). Other errors get PETSc's trace.
-  Collective; after MPI_Init(), before PetscInitialize(). program: a literal, begins error lines and warnings.
+  SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT,
+  PETSC_ERR_FILE_*, a bad option file) is not printed where it happens, but by SbErrorFinish().
+  Other errors get PETSc's trace. Collective; after MPI_Init(), before PetscInitialize(). program: a
+  literal, begins error lines and warnings.
 */
 PetscErrorCode SbErrorHandlerInstall(const char *program);
 void SbErrorSetTrace(PetscBool trace); /* the stack of calls with every error, also of the input */
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
-/* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's error. */
+/* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's
+   error. */
 void SbErrorFindYamlLine(void);
-#define SB_EXIT_STOPPED 75 /* of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
-/* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete.
-   stopped: no error but a requested stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
+#define SB_EXIT_STOPPED \
+  75 /* of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
+/* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is
+   complete. stopped: no error but a requested stop: the line says so, and the exit code is
+   SB_EXIT_STOPPED. */
 void SbErrorPost(PetscBool stopped, const char *message);
-/* Callback on one rank when the run fails, before the error line, in any state of PETSc; no communication. */
+/* Callback on one rank when the run fails, before the error line, in any state of PETSc; no
+   communication. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
-/* Callback on this rank at the start of SbErrorFinish(), with or without an error, to remove files. */
+/* Callback on this rank at the start of SbErrorFinish(), with or without an error, to remove
+   files. */
 void SbErrorSetCleanup(void (*fn)(void));
 /*
-  SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then
-  MPI_Finalize(), or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code,
-  non-zero on all ranks when one failed. `ierr` is the code that came up, 0 after PetscFinalize().
+  SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the
+  run; then MPI_Finalize(), or MPI_Abort() when other ranks do not arrive within a few seconds.
+  Returns the exit code, non-zero on all ranks when one failed. `ierr` is the code that came up, 0
+  after PetscFinalize().
 */
 int SbErrorFinish(PetscErrorCode ierr);
 /* An error of one rank (rank 0, a child process), to be raised by all. */
@@ -154,7 +181,8 @@ typedef struct {
   int code;
   char text[1024];
 } SbCaughtError;
-/* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message; internal errors also have a trace. */
+/* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message; internal errors also have a
+   trace. */
 PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
 /* Keeps the error of a call that this rank makes alone: SB_CATCH(&caught, call). */
@@ -168,7 +196,8 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
   } while (0)
 /* Raises the error caught by the lowest failed rank on all ranks. Collective. */
 PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
-/* One line `supple: warning: ...` on stderr by rank 0 of comm; printf format without newline. Collective. */
+/* One line `supple: warning: ...` on stderr by rank 0 of comm; printf format without newline.
+   Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 /* texts */
@@ -181,13 +210,15 @@ int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
 /* arrays */
 
-/* Enlarges *array, of *size elements of `unit` bytes, to at least `need`, and twice: appending is cheap. */
+/* Enlarges *array, of *size elements of `unit` bytes, to at least `need`, and twice: appending is
+   cheap. */
 PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
 /*
-  SbBucketByKey - positions 0..n-1 by key: those with key k are item[start[k]..start[k + 1]), ascending.
+  SbBucketByKey - positions 0..n-1 by key: those with key k are item[start[k]..start[k + 1]),
+  ascending.
 
-  Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey + 1],
-  item[start[nkey]]; the caller frees both.
+  Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey +
+  1], item[start[nkey]]; the caller frees both.
 */
 PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
                              PetscInt **item);
@@ -196,11 +227,11 @@ PetscErrorCode SbSortByKeys(PetscInt n, size_t size, int nkey, void *item);
 /*
   SbAllgatherv - one array on all ranks, of those of all ranks in their order.
 
-  Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the caller frees;
-  before (or NULL), entries of lower ranks.
+  Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the
+  caller frees; before (or NULL), entries of lower ranks.
 */
-PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
-                            void *all, PetscInt *before);
+PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine,
+                            PetscInt *total, void *all, PetscInt *before);
 
 /* memory */
 
@@ -210,10 +241,11 @@ void SbMemoryReturnLarge(void);
 /* threads */
 
 /*
-  SbThreadsSetOne - from here on loaded libraries (OpenMP's, BLAS) compute on the calling thread alone.
+  SbThreadsSetOne - from here on loaded libraries (OpenMP's, BLAS) compute on the calling thread
+  alone.
 
-  Not collective. Returns the number of threads that some library would still use, 1 when all obey. For
-  libraries that are loaded later call it again.
+  Not collective. Returns the number of threads that some library would still use, 1 when all obey.
+  For libraries that are loaded later call it again.
 */
 int SbThreadsSetOne(void);
 
@@ -222,24 +254,28 @@ int SbThreadsSetOne(void);
 /*
   SbFormula - a number as a function of time t (s) and rest position x, y, z (m).
 
-  Text: numbers, t x y z, pi, + - * / ^, parentheses, unary minus, functions sin cos tan asin acos atan atan2
-  exp log sqrt abs min max floor tanh step(a) (0 for a < 0, else 1), ramp(a) (a clamped to [0, 1]),
-  clamp(a, lo, hi); or `table:FILE`, a file with two columns (t in s, value; comma or blanks; # comments),
-  linear in between, constant outside. Compiled once to a stack program; evaluation allocates nothing.
+  Text: numbers, t x y z, pi, + - * / ^, parentheses, unary minus, functions sin cos tan asin acos
+  atan atan2 exp log sqrt abs min max floor tanh step(a) (0 for a < 0, else 1), ramp(a) (a clamped
+  to [0, 1]), clamp(a, lo, hi); or `table:FILE`, a file with two columns (t in s, value; comma or
+  blanks; # comments), linear in between, constant outside. Compiled once to a stack program;
+  evaluation allocates nothing.
 */
 typedef struct _p_SbFormula *SbFormula;
 /* where: option name, for messages; x may be NULL when the formula does not use it. */
-PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula);
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
+                               SbFormula *formula);
 PetscReal SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);
 PetscBool SbFormulaUses(SbFormula formula, char variable); /* 't': time; 'x': position */
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
-  Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
+  Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the
+  word `live`.
 
-  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0:
-  no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
-  its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an
-  accepted step that ended at t, reads new targets from the file. Collective.
+  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real
+  time, 0: no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name
+  in the history and its unit (may be NULL); Get, its value at time t of the present step; Set
+  changes it. Advance: after an accepted step that ended at t, reads new targets from the file.
+  Collective.
 */
 void SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);

@@ -1,15 +1,17 @@
 /*
   sbcompat.h - every difference between the PETSc releases that supple builds with, in one place.
 
-  Supported: 3.18 (Debian 12) and 3.25 or newer. The callback conventions changed one by one in 3.23 and 3.24,
-  so these (and the untested releases between 3.18 and them) are refused here instead of failing later.
+  Supported: 3.18 (Debian 12) and 3.25 or newer. The callback conventions changed one by one in 3.23
+  and 3.24, so these (and the untested releases between 3.18 and them) are refused here instead of
+  failing later.
 */
 #pragma once
 #include <petscsys.h>
 #include <string.h>
 
 #if PETSC_VERSION_LT(3, 18, 0) || (PETSC_VERSION_GE(3, 19, 0) && PETSC_VERSION_LT(3, 25, 0))
-  #error "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one"
+  #error \
+    "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one"
 #endif
 #if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
   #error "supple needs a PETSc with real double-precision scalars"
@@ -32,9 +34,10 @@
 #endif
 
 /*
-  Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx,
-  of the same C type. SB_DESTROY_CTX(type, arg): the struct in both; SB_CTX_TO_DESTROY(ctx): what it passes.
-  Of a PetscContainer, whose callback gets its pointer likewise: SbContainerSetDestroy().
+  Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer
+  releases &ctx, of the same C type. SB_DESTROY_CTX(type, arg): the struct in both;
+  SB_CTX_TO_DESTROY(ctx): what it passes. Of a PetscContainer, whose callback gets its pointer
+  likewise: SbContainerSetDestroy().
 */
 #if PETSC_VERSION_LT(3, 24, 0)
   #define SB_DESTROY_CTX(type, arg) ((type *)(arg))
@@ -62,8 +65,8 @@ typedef char *SbErrorText;
 typedef const char *SbErrorText;
 #endif
 
-/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is not a
-   number. */
+/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is
+   not a number. */
 #if PETSC_VERSION_LT(3, 25, 0)
   #define SB_OPERATION(f) ((void (*)(void))(f))
   #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FNORM_NAN
@@ -81,11 +84,12 @@ typedef const char *SbErrorText;
     SNESConverged(snes, iteration, xnorm, ynorm, fnorm)
 #endif
 
-/* Newton without a line search. Gram-Schmidt of GMRES is repeated where it loses digits. Whether PETSc calls
-   -ts_dt deprecated, in favour of -ts_time_step; here both names always work. */
+/* Newton without a line search. Gram-Schmidt of GMRES is repeated where it loses digits. Whether
+   PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names always work. */
 #if PETSC_VERSION_LT(3, 26, 0)
   #define SB_LINESEARCH_NONE SNESLINESEARCHBASIC
-  #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
+  #define SbKSPRefineOrthogonalization(ksp) \
+    KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
   #define SB_TS_DT_RENAMED 0
 #else
   #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
@@ -94,7 +98,8 @@ typedef const char *SbErrorText;
   #define SB_TS_DT_RENAMED 1
 #endif
 
-/* PetscHasExternalPackage(), also where CHOLMOD and UMFPACK are only known as SuiteSparse as a whole. */
+/* PetscHasExternalPackage(), also where CHOLMOD and UMFPACK are only known as SuiteSparse as a
+   whole. */
 static inline PetscErrorCode SbHasPackage(const char name[], PetscBool *has)
 {
   PetscFunctionBeginUser;

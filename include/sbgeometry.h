@@ -1,7 +1,7 @@
 /*
-  sbgeometry.h - layer 1: distances, intersection, continuous collision detection, trees of boxes, location:
-  arrays in, arrays out. Not collective throughout; nothing here knows a mesh, a surface or contact. Lengths
-  in any unit, the same throughout a call.
+  sbgeometry.h - layer 1: distances, intersection, continuous collision detection, trees of boxes,
+  location: arrays in, arrays out. Not collective throughout; nothing here knows a mesh, a surface
+  or contact. Lengths in any unit, the same throughout a call.
 */
 #pragma once
 #include "sbbase.h"
@@ -23,8 +23,10 @@ static inline void SbBoxClear(PetscReal box[6])
 static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
 {
   for (int k = 0; k < 3; k++) {
-    if (other[k] < box[k]) box[k] = other[k];
-    if (other[3 + k] > box[3 + k]) box[3 + k] = other[3 + k];
+    if (other[k] < box[k])
+      box[k] = other[k];
+    if (other[3 + k] > box[3 + k])
+      box[3 + k] = other[3 + k];
   }
 }
 
@@ -36,7 +38,8 @@ static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
 /* Length of the diagonal of a box that is not empty. */
 static inline PetscReal SbBoxDiagonal(const PetscReal box[6])
 {
-  return PetscSqrtReal(PetscSqr(box[3] - box[0]) + PetscSqr(box[4] - box[1]) + PetscSqr(box[5] - box[2]));
+  return PetscSqrtReal(PetscSqr(box[3] - box[0]) + PetscSqr(box[4] - box[1]) +
+                       PetscSqr(box[5] - box[2]));
 }
 
 /* The axis along which a box is longest, the first of equal ones. */
@@ -45,11 +48,13 @@ static inline int SbBoxLongest(const PetscReal box[6])
   int axis = 0;
 
   for (int k = 1; k < 3; k++)
-    if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
+    if (box[3 + k] - box[k] > box[3 + axis] - box[axis])
+      axis = k;
   return axis;
 }
 
-/* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its inside. */
+/* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its
+   inside. */
 typedef enum {
   SB_FEATURE_CORNER_0,
   SB_FEATURE_CORNER_1,
@@ -63,8 +68,9 @@ typedef enum {
 /*
   SbTriangleClosestPoint - the point of a triangle nearest to p.
 
-  Input: p[3]; x[k][3], corners, m. Output: weight[3], none negative, sum 1; d2, squared distance, m^2.
-  Triangles without area are segments or points; the place then is never SB_FEATURE_FACE. NaN in, NaN out.
+  Input: p[3]; x[k][3], corners, m. Output: weight[3], none negative, sum 1; d2, squared distance,
+  m^2. Triangles without area are segments or points; the place then is never SB_FEATURE_FACE. NaN
+  in, NaN out.
 */
 SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *const x[3],
                                          PetscReal weight[3], PetscReal *d2);
@@ -80,11 +86,12 @@ PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const Pets
 /* intersection.c */
 
 /*
-  Whether a segment from p to q and a triangle with the corners t share a point; whether two triangles with
-  the vertices a[3] and b[3] of x[][3] share more than common vertices and a common edge. Touching counts;
-  rounding: src/geometry/intersection.c.
+  Whether a segment from p to q and a triangle with the corners t share a point; whether two
+  triangles with the vertices a[3] and b[3] of x[][3] share more than common vertices and a common
+  edge. Touching counts; rounding: src/geometry/intersection.c.
 */
-PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3]);
+PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3],
+                                 PetscReal const *const t[3]);
 PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const PetscInt b[3]);
 
 /* distance.c, ccd.c: pairs */
@@ -100,7 +107,8 @@ typedef enum {
 typedef struct {
   SbPairKind feature; /* closest: of an edge pair also a vertex and an edge, or two vertices */
   int mask;           /* bit a: vertex a belongs to the closest feature */
-  /* sum 0; sum_a weight[a] x_a leads from the closest point of the second side to the first; 0 off mask */
+  /* sum 0; sum_a weight[a] x_a leads from the closest point of the second side to the first; 0 off
+     mask */
   PetscReal weight[4];
   PetscReal d;    /* the distance, m */
   PetscReal n[3]; /* unit vector from the second side to the first; 0 where it has none */
@@ -109,17 +117,19 @@ typedef struct {
 /*
   SbDistanceFind - the closest features of a pair, their distance, direction and closest points.
 
-  Input: x[4][3], vertices, m; those that the kind has are read. Edges and triangles may be degenerate: then
-  the closest feature is a lower one. The gradient of d with respect to vertex a is weight[a] n.
+  Input: x[4][3], vertices, m; those that the kind has are read. Edges and triangles may be
+  degenerate: then the closest feature is a lower one. The gradient of d with respect to vertex a is
+  weight[a] n.
 */
 void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *distance);
 
 /*
-  SbDistanceHessian - a grad d grad d^T + b Hess d for the closest features as found, with factor[2] = (a, b).
+  SbDistanceHessian - a grad d grad d^T + b Hess d for the closest features as found, with factor[2]
+  = (a, b).
 
-  For an energy f(d): a = f'', b = f'. Input: x[4][3] as for SbDistanceFind(), m; distance, d > 0; clamp,
-  whether its positive semi-definite part (the nearest such matrix) is wanted. Output: H[12][12], rows and
-  columns 3 a + k; symmetric.
+  For an energy f(d): a = f'', b = f'. Input: x[4][3] as for SbDistanceFind(), m; distance, d > 0;
+  clamp, whether its positive semi-definite part (the nearest such matrix) is wanted. Output:
+  H[12][12], rows and columns 3 a + k; symmetric.
 */
 void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const PetscReal factor[2],
                        PetscBool clamp, PetscReal H[]);
@@ -127,8 +137,8 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const Pe
 /*
   SbEdgeCross - |u x v|^2 of two edges u, v, m^4: zero where they are parallel: no smooth distance.
 
-  Input: x[4][3], ends of the first and of the second edge, m. Output: g[12], H[12][12], its first and second
-  derivatives; either may be NULL.
+  Input: x[4][3], ends of the first and of the second edge, m. Output: g[12], H[12][12], its first
+  and second derivatives; either may be NULL.
 */
 PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 
@@ -136,23 +146,26 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 void SbSymmetricProjectPSD(int n, PetscReal A[]);
 
 /*
-  SbTimeOfImpact - a conservative time of impact of a pair of features: never later than the true one.
+  SbTimeOfImpact - a conservative time of impact of a pair of features: never later than the true
+  one.
 
-  The vertices go on straight lines from x0[4][3] to x1[4][3], m. The gap is their distance less the radius, g
-  at the start; least = min(separation, g / 2). At the time returned the gap is between least + 0.9 k and
-  least + k, k = min(keep (g - least), most), and nowhere before smaller. Much rotation at a small gap takes
-  many steps; after 1024 the time reached is returned, at which more is left.
+  The vertices go on straight lines from x0[4][3] to x1[4][3], m. The gap is their distance less the
+  radius, g at the start; least = min(separation, g / 2). At the time returned the gap is between
+  least + 0.9 k and least + k, k = min(keep (g - least), most), and nowhere before smaller. Much
+  rotation at a small gap takes many steps; after 1024 the time reached is returned, at which more
+  is left.
 
-  least is not below SB_CCD_ROUNDING eps |x|, the rounding of coordinates, plus the same of |x1 - x0|. For a
-  gap not larger than this at the start, or negative, or NaN, the time is 0, unless they move alike.
+  least is not below SB_CCD_ROUNDING eps |x|, the rounding of coordinates, plus the same of |x1 -
+  x0|. For a gap not larger than this at the start, or negative, or NaN, the time is 0, unless they
+  move alike.
 
   Output: time, in [0, 1]; 1 if there is no impact. Returns whether there is one.
 */
 typedef struct {
   PetscReal radius;     /* sum of the radii of the balls or capsules around vertices and edges, m */
   PetscReal separation; /* gap that remains, m */
-  PetscReal keep;       /* fraction of the gap beyond it that remains, above 0 and below 1; usually 0.1 */
-  PetscReal most;       /* largest gap kept by `keep`, m; 0: no limit */
+  PetscReal keep; /* fraction of the gap beyond it that remains, above 0 and below 1; usually 0.1 */
+  PetscReal most; /* largest gap kept by `keep`, m; 0: no limit */
 } SbCCDLimits;
 #define SB_CCD_ROUNDING 32
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
@@ -161,28 +174,33 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
 /* box_tree.c: boxes that meet or are near */
 
 /*
-  A tree over boxes with four children to a node: four boxes form a group, four groups one of the next level.
-  Boxes that are empty or have NaN coordinates intersect nothing; that may change with the positions.
+  A tree over boxes with four children to a node: four boxes form a group, four groups one of the
+  next level. Boxes that are empty or have NaN coordinates intersect nothing; that may change with
+  the positions.
 */
 #define SB_BOX_TREE_LEVELS 32
 typedef struct {
   PetscInt n;
   int nlevel;
-  PetscInt start[SB_BOX_TREE_LEVELS + 1]; /* first group of each level; level 0: boxes, the last: one group */
-  PetscInt *order;                        /* [4 start[1]] box at each place of level 0, -1: none */
-  PetscReal (*group)[6][4]; /* [start[nlevel] + 1] corners of the four boxes or groups in it, m; last: hull */
-  PetscReal hull[6];        /* of all, m */
-  PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
+  PetscInt start[SB_BOX_TREE_LEVELS +
+                 1]; /* first group of each level; level 0: boxes, the last: one group */
+  PetscInt *order;   /* [4 start[1]] box at each place of level 0, -1: none */
+  PetscReal (
+    *group)[6]
+           [4]; /* [start[nlevel] + 1] corners of the four boxes or groups in it, m; last: hull */
+  PetscReal hull[6]; /* of all, m */
+  PetscReal size;    /* of all hulls over that of the boxes, when the order was made */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
-/* Refits the tree to moved boxes[n][6], m, O(n); rebuilds it when groups have grown by half over them. */
+/* Refits the tree to moved boxes[n][6], m, O(n); rebuilds it when groups have grown by half over
+   them. */
 PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 
 /*
-  The boxes not farther from a box (or a point, as a box without extent) than sqrt(limit2), near ones first on
-  the whole; 0: those that meet it. The caller lowers `limit2` as it measures what is in them, until nothing
-  nearer is left:
+  The boxes not farther from a box (or a point, as a box without extent) than sqrt(limit2), near
+  ones first on the whole; 0: those that meet it. The caller lowers `limit2` as it measures what is
+  in them, until nothing nearer is left:
 
       for (SbBoxNearestBegin(&tree, box, limit2, &nearest); SbBoxNearestNext(&nearest, &i);) {
         const PetscReal d2 = ...;
@@ -205,9 +223,9 @@ void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal 
 PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i);
 
 /*
-  All pairs of a box of one tree, grown by `grown` on each side, m, and a box of another that meet; with the
-  same tree twice all pairs of two boxes of it, each once, in either order. Next writes up to `room` >= 16
-  pairs to pair[room][2] and returns how many: 0 at the end.
+  All pairs of a box of one tree, grown by `grown` on each side, m, and a box of another that meet;
+  with the same tree twice all pairs of two boxes of it, each once, in either order. Next writes up
+  to `room` >= 16 pairs to pair[room][2] and returns how many: 0 at the end.
 */
 typedef struct {
   int level[2];
@@ -232,9 +250,9 @@ PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const
 /*
   SbSignedDistance - distance from a closed surface of triangles, m, negative inside.
 
-  Input: x[nvert][3], m; tri[ntri][3], counter-clockwise seen from outside; across[ntri][3], triangle beyond
-  edge k, which runs from corner k to the next: borrowed. Evaluate: x[3], m; output: n[3], unit outward normal
-  at the nearest point of the surface, or one of them.
+  Input: x[nvert][3], m; tri[ntri][3], counter-clockwise seen from outside; across[ntri][3],
+  triangle beyond edge k, which runs from corner k to the next: borrowed. Evaluate: x[3], m; output:
+  n[3], unit outward normal at the nearest point of the surface, or one of them.
 */
 typedef struct _p_SbSignedDistance *SbSignedDistance;
 PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], PetscInt ntri,
@@ -248,7 +266,8 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance distance, const PetscReal x[
 /* The root of a vertex in a forest of parents up[], whose paths are halved on the way. */
 static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
 {
-  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
+  for (; up[v] != v; v = up[v])
+    up[v] = up[up[v]];
   return v;
 }
 
@@ -264,11 +283,14 @@ static inline PetscBool SbUnionJoin(PetscInt up[], PetscInt a, PetscInt b)
 /*
   SbWeld - merges points within `tolerance` of each other, m; 0: at the same position.
 
-  Input: x[n][3], m; chains, whether chains of such pairs are merged as a whole, else each point joins the
-  first earlier one that is not merged itself. Output: map[n], the first of the points merged with each point.
+  Input: x[n][3], m; chains, whether chains of such pairs are merged as a whole, else each point
+  joins the first earlier one that is not merged itself. Output: map[n], the first of the points
+  merged with each point.
 */
-PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
-/* Numbers the trees in the order of their roots: up[n] becomes the tree of each; returns their number. */
+PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains,
+                      PetscInt map[]);
+/* Numbers the trees in the order of their roots: up[n] becomes the tree of each; returns their
+   number. */
 PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
 /* Removes points that are not in used[nused], and renumbers these. Keeps the order. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
@@ -285,7 +307,8 @@ static inline uint64_t SbKeyOfPair(PetscInt a, PetscInt b)
 }
 /* Sorts by key, then by slot. */
 void SbKeysSort(PetscInt n, SbKey item[]);
-/* Of sorted items: number of those from i on with its key; the first one with a key, -1: there is none. */
+/* Of sorted items: number of those from i on with its key; the first one with a key, -1: there is
+   none. */
 PetscInt SbKeysAlike(PetscInt n, const SbKey item[], PetscInt i);
 PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key);
 
@@ -295,25 +318,28 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 /* locate.c */
 
 /*
-  SbLocator - which tet holds a point. The arrays are borrowed. Flat and inverted tets contain no point. Tets
-  are curved by edge_off[ncell][6][3], nodes at edges 01 02 03 12 13 23 from their middles; NULL: straight.
-  The weights of a curved one are l of its map x(l) (sbquadratic.h).
+  SbLocator - which tet holds a point. The arrays are borrowed. Flat and inverted tets contain no
+  point. Tets are curved by edge_off[ncell][6][3], nodes at edges 01 02 03 12 13 23 from their
+  middles; NULL: straight. The weights of a curved one are l of its map x(l) (sbquadratic.h).
 
-  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point
-  the one in which it lies deepest, or the first of equal ones; of a point in none the nearest place. Returns
-  the distance from there, m.
+  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold
+  the point the one in which it lies deepest, or the first of equal ones; of a point in none the
+  nearest place. Returns the distance from there, m.
 */
 typedef struct _p_SbLocator *SbLocator;
 PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
                                const PetscReal edge_off[], SbLocator *locator);
 PetscErrorCode SbLocatorDestroy(SbLocator *locator);
-PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
-/* The l of the map of a tet with curved edges: x(l) = point, sum 1; false: Newton's method found none. */
+PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell,
+                        PetscReal weight[4]);
+/* The l of the map of a tet with curved edges: x(l) = point, sum 1; false: Newton's method found
+   none. */
 PetscBool SbTetCurvedBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
                                  const PetscReal point[3], PetscReal l[4]);
 /* The ten nodes of a tet with its edges off their middles by off[6][3]. */
 void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
                 PetscReal node[SB_CELL_NODES][3]);
-/* The weights of the corners v of a tet at a point: sum w_a x_a = point, sum 1; negative outside. */
+/* The weights of the corners v of a tet at a point: sum w_a x_a = point, sum 1; negative
+   outside. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal point[3],
                       PetscReal weight[4]);

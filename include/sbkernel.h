@@ -1,13 +1,14 @@
 /*
   sbkernel.h - layer 0: what batch kernels are made of: lanes, versions for processors, 3x3 algebra.
 
-  A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel is a loop
-  over lanes around straight-line code, so that the compiler turns each scalar of the text into one vector
-  register. The functions below are that code on one lane; matrices are row-major, A[3*i+j] is A_ij.
+  A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel
+  is a loop over lanes around straight-line code, so that the compiler turns each scalar of the text
+  into one vector register. The functions below are that code on one lane; matrices are row-major,
+  A[3*i+j] is A_ij.
 
-  A batch is 8 wide: one AVX-512 register of doubles, two of AVX2. Measured on Zen 4, co-rotated cell with
-  gradient, rotation, ten blocks, stress and force: 0.071 us per tet with 4, 0.043 with 8, 0.042 with 16,
-  where the general tangent gets slower.
+  A batch is 8 wide: one AVX-512 register of doubles, two of AVX2. Measured on Zen 4, co-rotated
+  cell with gradient, rotation, ten blocks, stress and force: 0.071 us per tet with 4, 0.043 with 8,
+  0.042 with 16, where the general tangent gets slower.
 */
 #pragma once
 #include <petscsys.h>
@@ -17,10 +18,11 @@
 typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocates it */
 
 /*
-  SB_KERNEL in front of a function compiles it for AVX-512, for AVX2 and for the baseline; the loader picks
-  one when the program starts. All three give the same bits: -std=c11 keeps multiplications and additions
-  apart (fusing them was measured to gain 5 %, and would make results depend on the processor). Off where it
-  cannot work or is in the way: other compilers and processors, debug and sanitizer builds.
+  SB_KERNEL in front of a function compiles it for AVX-512, for AVX2 and for the baseline; the
+  loader picks one when the program starts. All three give the same bits: -std=c11 keeps
+  multiplications and additions apart (fusing them was measured to gain 5 %, and would make results
+  depend on the processor). Off where it cannot work or is in the way: other compilers and
+  processors, debug and sanitizer builds.
 */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__gnu_linux__) && \
   !defined(SB_DEBUG) && !defined(SB_SANITIZE) && !defined(__SANITIZE_ADDRESS__) &&               \
@@ -39,12 +41,14 @@ typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocat
 /* Copies n numbers of lane l out of and into a batch. */
 SB_INLINE void SbPackGet(int n, const SbPack a[], int l, PetscReal x[])
 {
-  for (int k = 0; k < n; k++) x[k] = a[k][l];
+  for (int k = 0; k < n; k++)
+    x[k] = a[k][l];
 }
 
 SB_INLINE void SbPackPut(int n, const PetscReal x[], int l, SbPack a[])
 {
-  for (int k = 0; k < n; k++) a[k][l] = x[k];
+  for (int k = 0; k < n; k++)
+    a[k][l] = x[k];
 }
 
 SB_INLINE PetscReal SbDot3(const PetscReal a[3], const PetscReal b[3])
@@ -61,7 +65,8 @@ SB_INLINE PetscReal SbDot9(const PetscReal A[9], const PetscReal B[9])
 /* c = a - b */
 SB_INLINE void SbSubtract(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
 {
-  for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
+  for (int k = 0; k < 3; k++)
+    c[k] = a[k] - b[k];
 }
 
 /* |a - b|^2 */
@@ -75,7 +80,8 @@ SB_INLINE PetscReal SbNormalise(PetscReal a[3])
 {
   const PetscReal length = PetscSqrtReal(SbDot3(a, a));
 
-  for (int k = 0; k < 3 && length > 0; k++) a[k] /= length;
+  for (int k = 0; k < 3 && length > 0; k++)
+    a[k] /= length;
   return length;
 }
 
@@ -99,14 +105,16 @@ SB_INLINE void SbMatMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[
 SB_INLINE void SbMatTransposeMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
 {
   for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) C[3 * i + j] = A[i] * B[j] + A[3 + i] * B[3 + j] + A[6 + i] * B[6 + j];
+    for (int j = 0; j < 3; j++)
+      C[3 * i + j] = A[i] * B[j] + A[3 + i] * B[3 + j] + A[6 + i] * B[6 + j];
 }
 
 /* C = A B^T */
 SB_INLINE void SbMatMulTranspose(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
 {
   for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) C[3 * i + j] = SbDot3(A + 3 * i, B + 3 * j);
+    for (int j = 0; j < 3; j++)
+      C[3 * i + j] = SbDot3(A + 3 * i, B + 3 * j);
 }
 
 /* cof A = d(det A)/dA, the transposed adjugate; its rows are cross products of the rows of A. */
@@ -125,17 +133,18 @@ SB_INLINE PetscReal SbMatDet(const PetscReal A[9])
   return SbDot3(A, c);
 }
 
-/* The proper rotation R next to F: det R = +1, the maximiser of R : F, for every F; R^T F is symmetric. Where
-   the maximiser is not unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned,
-   I for F = 0. A lane that is not finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the
-   sum of the two smaller signed stretches: that is rounding of F seen through the condition number of the
-   problem. A lane's result does not depend on the others. Not collective. */
+/* The proper rotation R next to F: det R = +1, the maximiser of R : F, for every F; R^T F is
+   symmetric. Where the maximiser is not unique (rank one, F = 0, reflections with equal stretches)
+   some maximiser is returned, I for F = 0. A lane that is not finite gives NaN. Error of R about 5
+   eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches: that is rounding
+   of F seen through the condition number of the problem. A lane's result does not depend on the
+   others. Not collective. */
 void SbPolar(const SbPack F[9], SbPack R[9]);
 
-/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22, right to
-   rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and S = R^T F this is
-   the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
-   Not collective. */
+/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22,
+   right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and
+   S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the
+   sign of det F being in s. Not collective. */
 void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
 
 /* F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign. */

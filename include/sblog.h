@@ -1,5 +1,6 @@
 /*
-  sblog.h - layer 0: log events and stages, for the files that log: the list grows with every new phase.
+  sblog.h - layer 0: log events and stages, for the files that log: the list grows with every new
+  phase.
 */
 #pragma once
 #include "sbbase.h"
@@ -27,18 +28,21 @@ extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
 extern PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;
 PetscErrorCode SbLogInitialize(void);
 /*
-  SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when first asked for.
+  SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when first asked
+  for.
 
   Not collective, but to be called alike on all ranks: PETSc identifies events by their order.
 
   Input:
-    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other
+    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5),
+    "Out" (other
                  output), "Est" (estimates), "Mesh" (re-meshing), and the name in the scenario
   Output:
     event      - of all that have this name
 */
 PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);
-/* Phases of a run. Events of a phase do not contain each other; the solve is PETSc's KSP and PC events. */
+/* Phases of a run. Events of a phase do not contain each other; the solve is PETSc's KSP and PC
+   events. */
 typedef enum {
   SB_PHASE_MESH,
   SB_PHASE_SETUP,

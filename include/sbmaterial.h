@@ -1,11 +1,11 @@
 /*
   sbmaterial.h - layer 2: material laws on batches of deformation gradients.
 
-  A batch holds SB_BATCH tets side by side (sbkernel.h): every quantity is an array over lanes, so the
-  compiler vectorises each loop, and a lane's result does not depend on the other lanes. Laws know neither
-  meshes nor elements. Sign and frame: F = dx/dX, P = dPsi/dF first Piola-Kirchhoff stress (Pa), row =
-  current, column = reference; F[3*i+j] is F_ij. Inputs and outputs of a kernel never overlap. A lane whose F
-  is not finite gives results that are not finite.
+  A batch holds SB_BATCH tets side by side (sbkernel.h): every quantity is an array over lanes, so
+  the compiler vectorises each loop, and a lane's result does not depend on the other lanes. Laws
+  know neither meshes nor elements. Sign and frame: F = dx/dX, P = dPsi/dF first Piola-Kirchhoff
+  stress (Pa), row = current, column = reference; F[3*i+j] is F_ij. Inputs and outputs of a kernel
+  never overlap. A lane whose F is not finite gives results that are not finite.
 */
 #pragma once
 #include "sbbase.h"
@@ -15,76 +15,86 @@ typedef struct _p_SbMaterial *SbMaterial;
 
 /* Tangents of a law. A law without a warped one refuses it. */
 typedef enum {
-  SB_TANGENT_WARPED,   /* Hooke's tensor turned by R: symmetric, positive definite, leaves out dR/dF */
-  SB_TANGENT_EXACT,    /* dP/dF: Newton converges quadratically; indefinite in compression */
+  SB_TANGENT_WARPED, /* Hooke's tensor turned by R: symmetric, positive definite, leaves out dR/dF */
+  SB_TANGENT_EXACT,  /* dP/dF: Newton converges quadratically; indefinite in compression */
   SB_TANGENT_EXACT_SPD /* dP/dF with its negative eigenvalues raised to zero */
 } SbTangentKind;
 
 typedef struct {
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
-  /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume:
-     tr(eps) (linear), tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa,
-     positive in compression: resists the change of volume, and oscillates from cell to cell where an element
-     locks. */
+  /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change
+     of volume: tr(eps) (linear), tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p =
+     -lambda theta, Pa, positive in compression: resists the change of volume, and oscillates from
+     cell to cell where an element locks. */
   void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
-  /* The tangent is the isotropic Hooke tensor of lambda and mu, turned by R: fills R. NULL when the law needs
-     the full tangent. Co-rotated has it with the warped tangent, linear always (R = I). */
+  /* The tangent is the isotropic Hooke tensor of lambda and mu, turned by R: fills R. NULL when the
+     law needs the full tangent. Co-rotated has it with the warped tangent, linear always (R =
+     I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9]);
-  /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as for a law
-     of R^T F: fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is cheaper than the full
-     tangent. W = -mu I is Hooke's tensor turned by R. NULL when the law is not of this kind. Co-rotated has
-     it with its exact tangents; with the warped one `frame` takes its place. */
+  /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as
+     for a law of R^T F: fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is
+     cheaper than the full tangent. W = -mu I is Hooke's tensor turned by R. NULL when the law is
+     not of this kind. Co-rotated has it with its exact tangents; with the warped one `frame` takes
+     its place. */
   void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
-  /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows with
-     lambda but the stress. At rest D = I. With a frame or a spin D is their R. */
+  /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows
+     with lambda but the stress. At rest D = I. With a frame or a spin D is their R. */
   void (*volumetric)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9]);
-  /* C += p d^2 theta/dF^2 (C as in tangent), for the derivative of a pressure p (Pa, tension) that does not
-     come from F alone; with the filtered tangent only where that is not negative. NULL: it vanishes, or it is
-     in W of spin, which is proportional to lambda theta - 2 mu. */
+  /* C += p d^2 theta/dF^2 (C as in tangent), for the derivative of a pressure p (Pa, tension) that
+     does not come from F alone; with the filtered tangent only where that is not negative. NULL: it
+     vanishes, or it is in W of spin, which is proportional to lambda theta - 2 mu. */
   void (*curvature)(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p, SbPack C[81]);
 } SbMaterialOps;
 
 struct _p_SbMaterial {
   char law[SB_NAME_MAX], name[SB_NAME_MAX]; /* name: of the body or inclusion */
-  PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
+  PetscLogEvent
+    event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
-  PetscReal E, nu;      /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
-  PetscReal lambda, mu; /* Lame parameters at rest, Pa: from E and nu, or set by the law's constructor */
-  PetscReal density;    /* kg/m^3 */
-  PetscBool linear;     /* stress is linear in F: K is constant */
-  PetscBool adaptive;   /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  PetscBool softens;    /* stress has a maximum in compression, beyond which cells invert */
-  PetscBool jacobian;   /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
+  PetscReal E, nu; /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
+  PetscReal lambda,
+    mu; /* Lame parameters at rest, Pa: from E and nu, or set by the law's constructor */
+  PetscReal density; /* kg/m^3 */
+  PetscBool linear;  /* stress is linear in F: K is constant */
+  PetscBool
+    adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
+  PetscBool softens; /* stress has a maximum in compression, beyond which cells invert */
+  PetscBool
+    jacobian; /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
   SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
 };
 
 extern PetscFunctionList SbMaterialList;
-/* Adds a law; tangent: its option of this name (classes "body" and "inclusion", type = law), NULL: it has one
-   tangent only. create() fills the table and the flags of a material whose numbers are set. The first tangent
-   is the warped one of a law with a spin, else the exact one. Not collective, same on all ranks. */
-PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial), const SbOption *tangent);
+/* Adds a law; tangent: its option of this name (classes "body" and "inclusion", type = law), NULL:
+   it has one tangent only. create() fills the table and the flags of a material whose numbers are
+   set. The first tangent is the warped one of a law with a spin, else the exact one. Not
+   collective, same on all ranks. */
+PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial),
+                                  const SbOption *tangent);
 /* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope of a body
-   or inclusion (its `type` is not examined). The material is owned by the caller. Errors: PETSC_ERR_USER for
-   an unknown law and for what the option readers refuse. Not collective, same on all ranks. */
+/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope
+   of a body or inclusion (its `type` is not examined). The material is owned by the caller. Errors:
+   PETSC_ERR_USER for an unknown law and for what the option readers refuse. Not collective, same on
+   all ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
 /* The same from numbers: E > 0 in Pa, nu in (-1, 0.5), density > 0 in kg/m^3, first tangent. */
-PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       SbMaterial *m);
+PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
+                                       PetscReal density, SbMaterial *m);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
-/* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its tangent follows
-   that of m, which owns it. Not collective. */
+/* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its
+   tangent follows that of m, which owns it. Not collective. */
 PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
-/* At rest: modulus of the fastest wave, rho c^2, the stiffest for one length; and of compression. Pa */
+/* At rest: modulus of the fastest wave, rho c^2, the stiffest for one length; and of compression.
+   Pa */
 SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
 {
   return m->lambda + 2. * m->mu;
@@ -103,10 +113,11 @@ SB_INLINE void SbMaterialRotation(const struct _p_SbMaterial *m, const SbPack F[
   else
     SbPolar(F, R);
 }
-/* dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, Pa/s, with R the rotation in F and H the
-   gradient of the velocity, 1/s: the stress of stiffness-proportional damping, per second of beta; R = I for
-   the linear law. One rule for every other law and every tangent: it never feeds energy in (H : dP >= 0), and
-   where the cell is unstrained (F = R) it is the law's tangent and vanishes for a spin. In a strained cell a
-   spin is damped in proportion to the strain. Not collective. */
+/* dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, Pa/s, with R the rotation in F
+   and H the gradient of the velocity, 1/s: the stress of stiffness-proportional damping, per second
+   of beta; R = I for the linear law. One rule for every other law and every tangent: it never feeds
+   energy in (H : dP >= 0), and where the cell is unstrained (F = R) it is the law's tangent and
+   vanishes for a spin. In a strained cell a spin is damped in proportion to the strain. Not
+   collective. */
 void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
                              SbPack dP[9]);

@@ -1,15 +1,17 @@
 /*
-  sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned with the
-  help of METIS, and held as plain arrays with one layer of overlap.
+  sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned
+  with the help of METIS, and held as plain arrays with one layer of overlap.
 */
 #pragma once
 #include "sbbase.h"
 
-#define SB_SET_MAX 63                /* named sets that one scenario may use: one bit each, bit 0 is taken */
-#define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
-#define SB_CURVED ((uint64_t)1)      /* bit 0 of SbMesh.cell_set: an edge is curved at rest */
+#define SB_SET_MAX 63 /* named sets that one scenario may use: one bit each, bit 0 is taken */
+#define SB_ON_BOUNDARY \
+  ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
+#define SB_CURVED ((uint64_t)1) /* bit 0 of SbMesh.cell_set: an edge is curved at rest */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
-#define SB_SLIVER 0.5 /* degrees: tets with a smaller dihedral angle are slivers, which slow down solvers */
+#define SB_SLIVER \
+  0.5 /* degrees: tets with a smaller dihedral angle are slivers, which slow down solvers */
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
 
 /* Program that fills a surface with tets. */
@@ -28,20 +30,22 @@ typedef enum {
 typedef struct {
   PetscReal size;            /* wanted edge; 0: the mean edge of the surface */
   PetscReal merge_tolerance; /* closer vertices are merged; negative: 1e-7 of the diagonal */
-  PetscReal untangle; /* by how much self-intersections may be smoothed; negative: half the mean edge */
-  PetscReal angle;    /* degrees; edges with sharper turns are kept when the surface is remeshed */
-  PetscReal seconds;  /* time limit of gmsh, and of tetgen, s */
+  PetscReal
+    untangle; /* by how much self-intersections may be smoothed; negative: half the mean edge */
+  PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is remeshed */
+  PetscReal seconds; /* time limit of gmsh, and of tetgen, s */
   SbTetBackend backend;
   SbTetSurface surface;
 } SbTetOptions;
 /*
-  A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on
-  all ranks. Groups of the file are there as the bits of the sets that they mean.
+  A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is
+  alike on all ranks. Groups of the file are there as the bits of the sets that they mean.
 */
 typedef struct {
-  PetscInt step;   /* step after which it was made; 0: the mesh of the file */
-  PetscReal mass;  /* kg, of the body on this mesh: densities are scaled; 0: as its materials say */
-  PetscReal bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
+  PetscInt step;  /* step after which it was made; 0: the mesh of the file */
+  PetscReal mass; /* kg, of the body on this mesh: densities are scaled; 0: as its materials say */
+  PetscReal
+    bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
   PetscInt nvert, ncell, ntri, nedge;
   PetscReal *x;       /* [nvert][3] rest position, placed, m */
   PetscInt *cell;     /* [ncell][4] positively oriented; every vertex is used */
@@ -49,25 +53,29 @@ typedef struct {
   uint64_t *vert_set; /* [nvert] SB_SET_BIT() of sets that are groups */
   uint64_t *tri_set;  /* [ntri] */
   uint64_t *cell_set; /* [ncell] */
-  PetscInt *edge;     /* [nedge][2] edges that are curved at rest: vertices, the lower one first; ascending */
+  PetscInt
+    *edge; /* [nedge][2] edges that are curved at rest: vertices, the lower one first; ascending */
   PetscReal *edge_off; /* [nedge][3] their nodes from their middles, m */
 } SbMemoryMesh;
 
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
   char name[SB_NAME_MAX];
-  char copy_of[SB_NAME_MAX]; /* body of the scenario that it is a copy of (-body_<name>_copies); else "" */
-  /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz), n cells along the
-     shortest side; groups xmin xmax ymin ymax zmin zmax */
+  char copy_of
+    [SB_NAME_MAX]; /* body of the scenario that it is a copy of (-body_<name>_copies); else "" */
+  /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz), n cells
+     along the shortest side; groups xmin xmax ymin ymax zmin zmax */
   char mesh[PETSC_MAX_PATH_LEN];
-  PetscInt mesh_step;     /* of the file of a run: the step whose positions it has; 0 at rest, -1 the last */
-  PetscReal scale;        /* factor on the file's coordinates, first */
-  PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
-  PetscReal translate[3]; /* m, third */
-  SbTetOptions tet;       /* for a mesh that is a surface; m */
+  PetscInt
+    mesh_step; /* of the file of a run: the step whose positions it has; 0 at rest, -1 the last */
+  PetscReal scale;           /* factor on the file's coordinates, first */
+  PetscReal rotate[4];       /* axis (need not be normed) and angle in degrees, second */
+  PetscReal translate[3];    /* m, third */
+  SbTetOptions tet;          /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
   PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
-  PetscBool edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
+  PetscBool
+    edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
   char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
   PetscReal density;             /* kg/m^3 */
   PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
@@ -76,27 +84,29 @@ typedef struct {
   struct {
     PetscInt set, material; /* set that holds the tets; number of the material */
   } inclusion[SB_INCLUSION_MAX];
-  SbMemoryMesh *in_memory; /* a mesh in memory instead of the file, NULL: none; owned by the model */
+  SbMemoryMesh
+    *in_memory; /* a mesh in memory instead of the file, NULL: none; owned by the model */
   /* found by SbMeshCreate(), equal on all ranks */
   PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
   PetscInt npart;                /* connected parts */
   PetscReal volume;              /* rest volume, m^3 */
   PetscReal min_dihedral;        /* smallest dihedral angle, degrees */
   PetscInt nsliver;              /* tets with one below SB_SLIVER */
-  PetscReal max_radius_ratio;    /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
-  PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
-  char note[768];                /* repairs and remarks, "unused vertices left out: 3, ..."; "" when none */
+  PetscReal
+    max_radius_ratio; /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
+  PetscReal bbox[6];  /* xmin ymin zmin xmax ymax zmax, placed, m */
+  char note[768];     /* repairs and remarks, "unused vertices left out: 3, ..."; "" when none */
 } SbBody;
 /* Diagonal of the smallest body's box, m. Not collective. */
 PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[]);
 
 /*
-  A named set of the scenario: where loads and supports act. From a gmsh physical group of that name (of any
-  body, or of one when written body.group; a group without a name is called surface_12, volume_3, ...), or a
-  shape in the placed rest frame. A shape holds the vertices inside it, the boundary facets with three and the
-  tets with four of these, with a slack of 1e-6 of the body's diagonal. A group of surfaces holds its
-  triangles (inner ones too) and their vertices; a group of volumes its tets, their vertices and boundary
-  facets.
+  A named set of the scenario: where loads and supports act. From a gmsh physical group of that name
+  (of any body, or of one when written body.group; a group without a name is called surface_12,
+  volume_3, ...), or a shape in the placed rest frame. A shape holds the vertices inside it, the
+  boundary facets with three and the tets with four of these, with a slack of 1e-6 of the body's
+  diagonal. A group of surfaces holds its triangles (inner ones too) and their vertices; a group of
+  volumes its tets, their vertices and boundary facets.
 */
 typedef enum {
   SB_SET_GROUP,
@@ -111,23 +121,24 @@ typedef struct {
   char name[SB_NAME_MAX];
   SbSetShape shape;
   char group[2 * SB_NAME_MAX]; /* SB_SET_GROUP: group or body.group; SB_SET_BODY: body */
-  /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol); sphere: cx cy cz r;
-     halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
+  /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol); sphere: cx cy cz
+     r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
   PetscReal p[8];
   PetscInt nvert, nfacet, ncell; /* by SbMeshCreate(), of all ranks; nfacet: boundary facets */
   PetscBool prescribed;          /* an effect prescribes every displacement there */
 } SbSet;
 
 /*
-  SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the
-  ghosts that touch them: every cell with an owned vertex is here. With nodes at faces or edges every cell
-  that shares a vertex with an owned cell is here; else no ghost cell without an owned vertex. Constant after
-  creation.
+  SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first,
+  then the ghosts that touch them: every cell with an owned vertex is here. With nodes at faces or
+  edges every cell that shares a vertex with an owned cell is here; else no ghost cell without an
+  owned vertex. Constant after creation.
 */
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
   MPI_Comm comm;
-  PetscSF cell_sf, vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
+  PetscSF cell_sf,
+    vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
   PetscInt nbody;
   SbBody *body; /* [nbody] borrowed: the model owns the bodies */
   PetscInt nset;
@@ -135,51 +146,62 @@ struct _p_SbMesh {
 
   PetscInt Nvert, Ncell; /* global counts */
   PetscInt nvert_owned, nvert;
-  PetscInt gvert_start; /* global number of this rank's first owned vertex; owned ones follow each other */
-  PetscInt *gvert;      /* [nvert] global vertex number (depends on the partition); ghosts ascending */
-  PetscInt *vert_orig;  /* [nvert] original number: in the order of bodies, then of used vertices in files */
-  PetscInt *vert_body;  /* [nvert] */
-  PetscReal *x;         /* [nvert][3] rest position, placed, m */
-  uint64_t *vert_set;   /* [nvert] SB_SET_BIT(k) when in set k */
+  PetscInt
+    gvert_start; /* global number of this rank's first owned vertex; owned ones follow each other */
+  PetscInt *gvert; /* [nvert] global vertex number (depends on the partition); ghosts ascending */
+  PetscInt *
+    vert_orig; /* [nvert] original number: in the order of bodies, then of used vertices in files */
+  PetscInt *vert_body; /* [nvert] */
+  PetscReal *x;        /* [nvert][3] rest position, placed, m */
+  uint64_t *vert_set;  /* [nvert] SB_SET_BIT(k) when in set k */
 
   PetscInt ncell_owned, ncell;
-  PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
+  PetscInt *cell; /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
-  PetscInt *cell_body; /* [ncell]; owned and ghost cells by body, inclusion, curved or not, lowest vertex */
-  PetscInt *cell_material; /* [ncell] number of the body, or material of its first inclusion with the cell */
-  uint64_t *cell_set;      /* [ncell] SB_SET_BIT(k), SB_CURVED */
-  PetscReal *edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
-  uint64_t *face_set;  /* [ncell][4] face f is opposite vertex f: SB_ON_BOUNDARY, SB_SET_BIT(k) in set k */
+  PetscInt *
+    cell_body; /* [ncell]; owned and ghost cells by body, inclusion, curved or not, lowest vertex */
+  PetscInt *
+    cell_material; /* [ncell] number of the body, or material of its first inclusion with the cell */
+  uint64_t *cell_set; /* [ncell] SB_SET_BIT(k), SB_CURVED */
+  PetscReal *
+    edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
+  uint64_t
+    *face_set; /* [ncell][4] face f is opposite vertex f: SB_ON_BOUNDARY, SB_SET_BIT(k) in set k */
 };
 
 /*
-  SbMeshCreate - reads, checks, transforms, merges, partitions and distributes the bodies. Collective.
+  SbMeshCreate - reads, checks, transforms, merges, partitions and distributes the bodies.
+  Collective.
 
-  Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both must outlive
-  the mesh).
+  Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both
+  must outlive the mesh).
   Options read: -mesh_partitioner, -mesh_report (one line of checks and quality per body on rank 0).
-  Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names body, file, line or cell, and what
-  to do. Fatal: unreadable or truncated file, no tets, other volume cells, 2D mesh, NaN or infinite
-  coordinate, degenerate tet, duplicate tet, face shared by three tets, set that selects nothing. Repaired and
-  reported: unused vertices, negative orientation. Reported: several connected parts, non-manifold surface
-  edges.
+  Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names body, file, line or cell,
+  and what to do. Fatal: unreadable or truncated file, no tets, other volume cells, 2D mesh, NaN or
+  infinite coordinate, degenerate tet, duplicate tet, face shared by three tets, set that selects
+  nothing. Repaired and reported: unused vertices, negative orientation. Reported: several connected
+  parts, non-manifold surface edges.
 */
-PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
-                            SbMesh *mesh);
+PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset,
+                            SbSet set[], SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
-/* Edges of the local cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03 12 13 23;
-   PetscFree(). Not collective. */
+/* Edges of the local cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03
+   12 13 23; PetscFree(). Not collective. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
-/* Star forest of the leaves 0, 1, ... n - 1 with the roots root[n], of which this rank has the next nroot.
-   Collective; the caller destroys it. */
+/* Star forest of the leaves 0, 1, ... n - 1 with the roots root[n], of which this rank has the next
+   nroot. Collective; the caller destroys it. */
 PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const PetscInt root[],
                               PetscSF *forest);
 /* Brings n numbers of each root to its leaves, or those of each leaf to its root. Collective. */
-PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
-PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf, void *root);
-PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
+PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root,
+                                 void *leaf);
+PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf,
+                              void *root);
+PetscErrorCode
+SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 extern const SbOption SbMeshRows[];
-/* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not collective. */
+/* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not
+   collective. */
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Allocates a mesh in memory, zeroed. Not collective. */
@@ -193,8 +215,8 @@ PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
   SbSetParse - reads the description of a set. Not collective.
 
   Input: option - full name, for messages; text - group:NAME, group:BODY.NAME,
-  box:xmin,ymin,zmin,xmax,ymax,zmax, plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r, halfspace:nx,ny,nz,d,
-  body:NAME or boundary (lengths in m).
+  box:xmin,ymin,zmin,xmax,ymax,zmax, plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r,
+  halfspace:nx,ny,nz,d, body:NAME or boundary (lengths in m).
   Output: shape, group, p of set; its name is left alone.
   Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
 */
@@ -207,14 +229,16 @@ typedef struct {
   PetscInt *which;    /* [nsend] which of the caller's items they are, or NULL */
   PetscMPIInt *dest;  /* [nsend] rank to which each goes */
   PetscInt *position; /* [nsend] of a record among those that leave, by rank */
-  PetscMPIInt size, *scount, *sfirst, *rcount, *rfirst; /* [size] to and from each rank, the first of them */
+  PetscMPIInt size, *scount, *sfirst, *rcount,
+    *rfirst; /* [size] to and from each rank, the first of them */
 } SbRoute;
 
-/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. The route takes over
-   which and dest. Collective. */
-PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest, SbRoute *route);
+/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. The route
+   takes over which and dest. Collective. */
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest,
+                             SbRoute *route);
 PetscErrorCode SbRouteDestroy(SbRoute *route);
 /* Sends records of `unit` bytes, of which record[which[i]] (NULL: record[i]) goes to dest[i];
    received[nrecv] by rank, PetscFree(). Collective. */
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
-                           void *received);
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[],
+                           const void *record, void *received);

@@ -1,7 +1,9 @@
 /*
-  sbmeshfile.h - layer 2: a mesh read by SbImportRead(), on one rank: measured, repaired, refined, written.
+  sbmeshfile.h - layer 2: a mesh read by SbImportRead(), on one rank: measured, repaired, refined,
+  written.
 
-  Not collective. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, a line that names the file and what to do.
+  Not collective. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, a line that names the file and
+  what to do.
 */
 #pragma once
 #include "sbmesh.h"
@@ -27,7 +29,8 @@ typedef struct {
   PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
 } SbMeshStatistics;
 /*
-  SbMeshFileMeasure - statistics, after checks and repairs (unused vertices, orientation) as those of a run.
+  SbMeshFileMeasure - statistics, after checks and repairs (unused vertices, orientation) as those
+  of a run.
 
   Errors: what SbMeshCreate() refuses.
 */
@@ -38,24 +41,26 @@ typedef struct {
   PetscInt nwelded;          /* vertices that went into another one */
   PetscInt ncollapsed;       /* tets that used a vertex twice, dropped */
   PetscInt nflat;            /* flat tets, dropped */
-  PetscInt nslit;      /* those of them that had no face on the boundary: a slit without width is left */
+  PetscInt nslit; /* those of them that had no face on the boundary: a slit without width is left */
   PetscInt nduplicate; /* duplicate tets, removed; their groups are joined */
   PetscInt nturned;    /* inverted tets, reoriented */
   PetscInt nunused;    /* vertices that no tet uses, dropped */
-  PetscInt nitem;      /* duplicate, collapsed or unused triangles, lines, points of groups, removed */
+  PetscInt nitem; /* duplicate, collapsed or unused triangles, lines, points of groups, removed */
 } SbRepair;
 /*
   SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.
 
   Input:
-    merge_tolerance - vertices at most so far apart become one, m; 0: none; below 0: 1e-9 of the diagonal
+    merge_tolerance - vertices at most so far apart become one, m; 0: none; below 0: 1e-9 of the
+    diagonal
   Output:
     done - counts of repairs
   Errors: remaining defects that SbMeshCreate() would refuse: overlapping tets, no tets.
 */
 PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 
-/* Cuts every tet into eight, every triangle into four, every line into two; groups are carried over. */
+/* Cuts every tet into eight, every triangle into four, every line into two; groups are carried
+   over. */
 PetscErrorCode SbMeshFileRefine(SbImport *import);
 
 typedef enum {
@@ -67,7 +72,8 @@ typedef enum {
   SB_MESH_H5
 } SbMeshFormat;
 /*
-  SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf beside it.
+  SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf
+  beside it.
 
   The file is written beside its target and renamed when it is whole.
 */

@@ -1,12 +1,14 @@
 /*
-  sbmeshio.h - layer 2: a body as its reader delivers it, services for readers. Not collective throughout.
+  sbmeshio.h - layer 2: a body as its reader delivers it, services for readers. Not collective
+  throughout.
 */
 #pragma once
 #include <hdf5.h>
 #include <sys/types.h>
 #include "sbmeshfile.h"
 
-#define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
+#define SB_GROUP_MAX \
+  (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
 /* numbers.c: from numbers of a file to indices in memory */
 typedef struct {
@@ -28,25 +30,27 @@ typedef struct {
   const char *end;
   const char *at;    /* next byte */
   const char *token; /* the last token, for messages */
-  char comment;      /* begins a comment up to the end of the line, which is passed over; 0: none does */
-  PetscBool binary;  /* the numbers that follow are binary */
-  PetscBool bytes;   /* messages count bytes instead of lines */
-  PetscBool swap;    /* from a machine with the other byte order */
+  char comment; /* begins a comment up to the end of the line, which is passed over; 0: none does */
+  PetscBool binary; /* the numbers that follow are binary */
+  PetscBool bytes;  /* messages count bytes instead of lines */
+  PetscBool swap;   /* from a machine with the other byte order */
 } SbScan;
 
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
-/* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages, that of
-   `number`. A point: three finite ones. */
+/* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for
+   messages, that of `number`. A point: three finite ones. */
 PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number, PetscReal *value);
 PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number, PetscReal x[3]);
-/* A count of items with at least these bytes each, as text and in binary: an error if the file is shorter. */
+/* A count of items with at least these bytes each, as text and in binary: an error if the file is
+   shorter. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
 /* The same of a "number of <what>" that it reads, in binary of 8 bytes. */
-PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes, int64_t *n);
+PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes,
+                           int64_t *n);
 /* Binary format of a number. */
 typedef struct {
   char kind; /* 'i' signed, 'u' unsigned, 'f' floating point */
@@ -55,7 +59,8 @@ typedef struct {
 /* The next word, one of the names that VTK's and PLY files have for types. */
 PetscErrorCode SbScanType(SbScan *scan, SbNumberType *type);
 /* n numbers of this type from bytes. */
-void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[]);
+void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes,
+                      double value[]);
 /* Whether there is a next word; empty at the end of the file. */
 PetscBool SbScanWord(SbScan *scan, size_t size, char word[]);
 void SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
@@ -68,9 +73,10 @@ PetscBool SbScanMore(SbScan *scan, char comment);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
             SbScanPosition(scan, sb_position), sb_text);                            \
   } while (0)
-#define SB_SCAN_ENDS(scan, what, ...)                                                                      \
-  SB_SCAN_ERROR(scan, "the file ends where " what " is expected; it is truncated, write or copy it again", \
-                __VA_ARGS__)
+#define SB_SCAN_ENDS(scan, what, ...)                                                          \
+  SB_SCAN_ERROR(                                                                               \
+    scan, "the file ends where " what " is expected; it is truncated, write or copy it again", \
+    __VA_ARGS__)
 
 /* import.c: one body in memory */
 
@@ -95,7 +101,8 @@ enum {
 };
 
 /* Progress callback: `done` of `total` items, named by `what` ("tets read"); total 0: not known. */
-typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
+typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total,
+                                         void *ctx);
 
 /* Simplices of one dimension. */
 typedef struct {
@@ -118,14 +125,16 @@ typedef struct {
 /* The node of an edge of 10-node tets. */
 typedef struct {
   PetscInt end[2],
-    node;           /* vertices, end[0] < end[1]; -1: off is known, -1 - r: from row r of a file's list */
+    node; /* vertices, end[0] < end[1]; -1: off is known, -1 - r: from row r of a file's list */
   PetscReal off[3]; /* from the middle of the edge, m once placed */
 } SbMiddle;
 
-/* A body as its reader delivers it. Zeroed before; freed by SbImportDestroy(), also after an error. */
+/* A body as its reader delivers it. Zeroed before; freed by SbImportDestroy(), also after an
+   error. */
 struct _p_SbImport {
-  char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
-  char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
+  char where[PETSC_MAX_PATH_LEN +
+             2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
+  char body[SB_NAME_MAX];      /* "liver"; "" in supple-mesh */
   PetscInt nvert;
   PetscReal *x;         /* [nvert][3] m once placed */
   int64_t *vert_number; /* [nvert] number in the file */
@@ -138,12 +147,15 @@ struct _p_SbImport {
   PetscInt capacity[3]; /* of group, tags_start, tags_group */
   SbNumbers groups;     /* by 4 tag + dim */
   SbCount nmiddle;
-  SbMiddle *middle;  /* [nmiddle] edges of 10-node tets; once read those off the middle, once, ascending */
+  SbMiddle
+    *middle; /* [nmiddle] edges of 10-node tets; once read those off the middle, once, ascending */
   PetscBool surface; /* input: all triangles are read, and tets are optional */
   SbTetOptions tet;  /* input: parameters for filling a surface with tets */
-  PetscReal scale;   /* input: scale factor, applied after reading; a reader that has scaled sets it to 1 */
-  char note[512];    /* repairs by the reader, for SbBody.note */
-  PetscInt step;     /* input: step of a run's output whose positions are read; 0 at rest, -1 the last one */
+  PetscReal
+    scale; /* input: scale factor, applied after reading; a reader that has scaled sets it to 1 */
+  char note[512]; /* repairs by the reader, for SbBody.note */
+  PetscInt
+    step; /* input: step of a run's output whose positions are read; 0 at rest, -1 the last one */
   SbMeshProgress progress; /* input: progress callback of long reads; may be NULL */
   void *progress_ctx;
   /* while a file is read; SbImportForget() */
@@ -160,52 +172,63 @@ struct _p_SbImport {
   PetscInt npinched;    /* surface edges with more than two facets */
 };
 
-/* Reads a mesh of any kind that -body_<name>_mesh takes, and places it; nothing in it is checked. Of the
-   body: name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet. */
+/* Reads a mesh of any kind that -body_<name>_mesh takes, and places it; nothing in it is checked.
+   Of the body: name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate,
+   tet. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
-/* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or -1. */
+/* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or
+   -1. */
 void SbImportDropVertices(SbImport *import, PetscInt keep[]);
-/* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending; nodes that are
-   no corner of a tet are no vertices any more. Output: found[nmiddle], which of those in a list are edges of
-   tets, or NULL: it is an error if one is not; largest, off the middle over the length. Errors: an edge with
-   two nodes at different places, or twice in a list. Not collective. */
+/* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending;
+   nodes that are no corner of a tet are no vertices any more. Output: found[nmiddle], which of
+   those in a list are edges of tets, or NULL: it is an error if one is not; largest, off the middle
+   over the length. Errors: an edge with two nodes at different places, or twice in a list. Not
+   collective. */
 PetscErrorCode SbImportMiddles(SbImport *import, PetscBool found[], PetscReal *largest);
 /* The error of one that is listed and of no tet. */
 PetscErrorCode SbImportLostMiddle(const SbImport *import, const SbMiddle *lost);
 /* The note of the reader about n edges off their middle. */
 void SbImportNoteMiddles(SbImport *import, PetscInt n, PetscReal largest);
-/* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`,
-   zeroed at first, in which the mesh of its file is kept for the next one; destroy it. */
-PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *import);
-/* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
+/* The same of a body that may be one of many copies: `before`, the body before it or NULL, and
+   `shared`, zeroed at first, in which the mesh of its file is kept for the next one; destroy it. */
+PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared,
+                                SbImport *import);
+/* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the
+   file. */
 typedef struct {
   PetscInt N, block, first;
 } SbSlabRows;
-/* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not there. */
+/* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not
+   there. */
 void SbImportSlabs(const SbBody *body, PetscInt *ncell);
 /*
   SbImportSlab - slab k of n of such a mesh, placed. Not collective.
 
   Output:
-    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of
+    import - the k-th block of the vertices and that of the simplices of each dimension, with
+    numbers of
              vertices in the file, from 0 on; all groups
     rows   - of the vertices
   Errors: those of SbImportRead() that these blocks show.
 */
-PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
-/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; supple-mesh: "-size". */
+PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import,
+                            SbSlabRows *rows);
+/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; supple-mesh:
+   "-size". */
 #define SB_IMPORT_OPTION_MAX (SB_NAME_MAX + 32)
-const char *SbImportOption(const SbImport *import, const char *key, char name[SB_IMPORT_OPTION_MAX]);
+const char *SbImportOption(const SbImport *import, const char *key,
+                           char name[SB_IMPORT_OPTION_MAX]);
 /* A .msh of any version. */
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */
 PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 
-/* In a forked child of `parent`: resets signal handlers, masks and terminal of the parent; the child ends
-   with the parent, and after `seconds` by SIGALRM, also after exec. */
+/* In a forked child of `parent`: resets signal handlers, masks and terminal of the parent; the
+   child ends with the parent, and after `seconds` by SIGALRM, also after exec. */
 void SbChildIsolate(pid_t parent, PetscReal seconds);
-/* Allocates (*array NULL) or enlarges an array of a reader; freed by SbImportDestroy() at the latest. */
+/* Allocates (*array NULL) or enlarges an array of a reader; freed by SbImportDestroy() at the
+   latest. */
 PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 /* The same for one more of `unit` bytes each. */
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
@@ -214,23 +237,27 @@ PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);
-/* Allocates n simplices of a dimension that has none yet, numbered from 1 on; the caller fills them. */
+/* Allocates n simplices of a dimension that has none yet, numbered from 1 on; the caller fills
+   them. */
 PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
 PetscErrorCode SbItemsFree(SbItems *items);
 /* Copies item `from` to item `to`. */
 void SbItemsMove(SbItems *items, int dim, PetscInt to, PetscInt from);
 /* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
-PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
+PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name,
+                             PetscInt *group);
 /* The tag set that holds this group alone. */
 PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
                                  PetscInt *tags);
-/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
+/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made
+   when new. */
 PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
-/* Notes that an item belongs to a group; SbImportJoinGroups() adds to each item the groups noted for it. */
+/* Notes that an item belongs to a group; SbImportJoinGroups() adds to each item the groups noted
+   for it. */
 PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
 PetscErrorCode SbImportJoinGroups(SbImport *import);
-/* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only of those
-   that have groups and share none. Adds how many went. */
+/* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only
+   of those that have groups and share none. Adds how many went. */
 PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, PetscInt *ndropped);
 
 /* edges.c: pairs of vertices that an item joins */
@@ -250,9 +277,10 @@ void SbImportEdgeNodes(const SbImport *import, const SbImportEdges *edges, Petsc
 
 /* write_h5.c: indices of HDF5 files for ParaView */
 
-/* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file, path: a printf format. */
-void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
-  PETSC_ATTRIBUTE_FORMAT(6, 7);
+/* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file, path: a printf
+   format. */
+void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes,
+                 const char *format, ...) PETSC_ATTRIBUTE_FORMAT(6, 7);
 
 /* import_h5.c: what is in the fields.h5 of a run */
 

@@ -1,5 +1,6 @@
 /*
-  sbquadratic.h - layer 0: tets with ten nodes, at corners and edges: basis, map, rules. Not collective.
+  sbquadratic.h - layer 0: tets with ten nodes, at corners and edges: basis, map, rules. Not
+  collective.
 */
 #pragma once
 #include "sbbase.h"
@@ -18,5 +19,7 @@ extern const SbPointRule SbRuleQuintic; /* degree 5, positive weights: stresses 
 extern const SbPointRule SbRuleFacet;   /* degree 5 on a triangle, L[3] (Radon 1948) */
 /* The ten basis functions at L. */
 void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES]);
-/* Corners of the P1 tet with the derivatives of the map x of ten nodes at L, but for a translation. */
-void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3], PetscReal corner[4][3]);
+/* Corners of the P1 tet with the derivatives of the map x of ten nodes at L, but for a
+   translation. */
+void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3],
+                        PetscReal corner[4][3]);

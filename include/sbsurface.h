@@ -4,8 +4,8 @@
 
 /*
   Surfaces that cut space into regions; every triangle knows the region on each of its sides.
-  SbSurfaceDestroy(). A body without inner surfaces has one region: side is {-1, 0} for triangles seen
-  counter-clockwise from outside.
+  SbSurfaceDestroy(). A body without inner surfaces has one region: side is {-1, 0} for triangles
+  seen counter-clockwise from outside.
 */
 typedef struct {
   PetscInt nvert, ntri, nregion;
@@ -13,13 +13,15 @@ typedef struct {
   PetscInt *tri;   /* [ntri][3] */
   PetscInt *tags;  /* [ntri] tag set in the import that the tets go to, 0: of no group */
   int64_t *number; /* [ntri] in the file, for messages */
-  PetscInt *side;  /* [ntri][2] region in front (corners counter-clockwise) and behind; -1: nothing there */
+  PetscInt
+    *side; /* [ntri][2] region in front (corners counter-clockwise) and behind; -1: nothing there */
   PetscInt *region_tags; /* [nregion] tag set of the tets of each region */
 } SbSurface;
 
 PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *surface);
 PetscErrorCode SbSurfaceDestroy(SbSurface *surface);
-/* Volume of each region, volume[nregion], NULL: not wanted; returns the mean edge of the triangles. */
+/* Volume of each region, volume[nregion], NULL: not wanted; returns the mean edge of the
+   triangles. */
 PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
 
 /*
@@ -30,16 +32,17 @@ PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
     surface - closed; no two triangles cut each other; lengths in any unit
     options - size in that unit, mesher, whether the triangles are kept
   Output:
-    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region,
-           item[2] with every triangle whose tag set is not empty, and note. With SB_TET_KEEP the first
-           surface->nvert vertices are those of the surface, bit by bit and in order, and its triangles are
-           the facets of the tets, inner ones too.
+    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of
+    its region,
+           item[2] with every triangle whose tag set is not empty, and note. With SB_TET_KEEP the
+           first surface->nvert vertices are those of the surface, bit by bit and in order, and its
+           triangles are the facets of the tets, inner ones too.
 
-  Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then body has no
-  mesh.
+  Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then
+  body has no mesh.
 */
-PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface, const SbTetOptions *options,
-                                SbImport *body);
+PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface,
+                                const SbTetOptions *options, SbImport *body);
 
 /* The reader of a body that is a surface, which becomes tets by body->tet. */
 PetscErrorCode SbImportRead_Surface(const char *path, SbImport *body);

@@ -9,7 +9,8 @@
 typedef struct {
   PetscInt ncell;
   PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
-  SbKey *face;     /* [4 ncell] of the two other vertices, ascending for each lowest; slots 4 cell + face */
+  SbKey
+    *face; /* [4 ncell] of the two other vertices, ascending for each lowest; slots 4 cell + face */
   PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
   PetscInt nboundary;
   PetscInt nshared;   /* faces of more than two cells */
@@ -29,10 +30,12 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 /* Adds "what: n" to a note, unless n is 0. */
 static inline void SbNoteCount(size_t size, char note[], const char *what, PetscInt n)
 {
-  if (n) SbAppend(size, note, "%s%s: %" PetscInt_FMT, note[0] ? ", " : "", what, n);
+  if (n)
+    SbAppend(size, note, "%s%s: %" PetscInt_FMT, note[0] ? ", " : "", what, n);
 }
 
-/* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and nlost. */
+/* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and
+   nlost. */
 PetscErrorCode SbImportDropUnused(SbImport *import);
 /* Removes unused vertices, orients cells, checks for defects; builds the faces. */
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
@@ -45,11 +48,11 @@ typedef struct {
 void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
 
 /*
-  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and around it, 1
-  for the regular one, 0 for a flat one, negative when it is inverted. Not collective.
+  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and
+  around it, 1 for the regular one, 0 for a flat one, negative when it is inverted. Not collective.
 */
 PetscReal SbTetQuality(const PetscReal x[], const PetscInt vert[4]);
-/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least Jacobian, where
-   P2 uses it and at its nodes, over that of the straight tet. */
+/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least
+   Jacobian, where P2 uses it and at its nodes, over that of the straight tet. */
 PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
 PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);

@@ -3,9 +3,9 @@
 
     supple SCENARIO.opts [-option value ...]          or     mpirun -n 4 supple SCENARIO.yml
 
-  Options are read and checked before the computation; a run that fails keeps its output and ends with an
-  error line and a non-zero code. Open MPI refuses to start as root unless OMPI_ALLOW_RUN_AS_ROOT=1 and
-  OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
+  Options are read and checked before the computation; a run that fails keeps its output and ends
+  with an error line and a non-zero code. Open MPI refuses to start as root unless
+  OMPI_ALLOW_RUN_AS_ROOT=1 and OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
 */
 #include <signal.h>
 #include "sb.h"
@@ -32,6 +32,7 @@ static PetscErrorCode simulate(Scene *s)
 
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
+
   /* set-up: meshes of a restart, space, integrator, monitors */
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(SbOutputLock(s->run));
@@ -53,7 +54,8 @@ static PetscErrorCode simulate(Scene *s)
   SbOutputFile(s->run, "ledger.csv", file, &quiet);
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
-  if (s->run->stop_reason[0]) SbErrorPost(s->run->stopped, s->run->stop_reason);
+  if (s->run->stop_reason[0])
+    SbErrorPost(s->run->stopped, s->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,11 +70,13 @@ static PetscErrorCode supple(int argc, char *argv[])
   char petsc[256];
 
   PetscFunctionBeginUser;
+
   /* initialise libraries and error handling */
   PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(SbCommandLine(&argc, argv, &command));
   ierr = PetscInitialize(&argc, &argv, command.scenario, NULL);
-  if (ierr) SbErrorFindYamlLine();
+  if (ierr)
+    SbErrorFindYamlLine();
   PetscCall(ierr);
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
@@ -82,14 +86,17 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
-  if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() does it */
+  if (!left)
+    PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() does it */
   PetscCall(SbRegisterAll());
   PetscCall(SbOptionBool(&SbRunScope, "error_trace", &trace));
   SbErrorSetTrace(trace);
-  for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
+  for (PetscInt i = 0; i < command.nfile; i++)
+    PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
   if (bare)
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* followed by the error that there is nothing to run */
+    PetscCall(
+      SbOptionsHelp(PETSC_COMM_WORLD, "")); /* followed by the error that there is nothing to run */
 
   /* -help, -version, -options_table: print, without a simulation */
   if (command.help) {
@@ -124,7 +131,8 @@ static PetscErrorCode supple(int argc, char *argv[])
     PetscCall(SbLedgerDestroy(&scene.ledger));
     PetscCall(SbRunDestroy(&scene.run));
     PetscCall(SbModelDestroy(&scene.model));
-    if (!command.view) PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
+    if (!command.view)
+      PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
   }
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
@@ -133,8 +141,10 @@ static PetscErrorCode supple(int argc, char *argv[])
 
 int main(int argc, char *argv[])
 {
-  // Open MPI would create an unused lock file for each HDF5 file, and abort above 255 characters of path
+  // Open MPI would create an unused lock file for each HDF5 file, and abort above 255 characters of
+  // path
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
-  if (MPI_Init(&argc, &argv)) return 1;
+  if (MPI_Init(&argc, &argv))
+    return 1;
   return SbErrorFinish(supple(argc, argv));
 }

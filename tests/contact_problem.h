@@ -1,5 +1,6 @@
 /*
-  contact_problem.h - linear system of two blocks in barrier contact, with a given contact stiffness.
+  contact_problem.h - linear system of two blocks in barrier contact, with a given contact
+  stiffness.
 */
 #pragma once
 #include "scene.h"
@@ -9,11 +10,13 @@ typedef struct {
   Mat K;
   Vec F, Y;
   SbBlocks blocks;
-  PetscInt npair;  /* number of contact blocks of all ranks */
-  PetscReal scale; /* current mean diagonal of the contact blocks over that of K, at nodes in contact */
+  PetscInt npair; /* number of contact blocks of all ranks */
+  PetscReal
+    scale; /* current mean diagonal of the contact blocks over that of K, at nodes in contact */
 } ContactProblem;
 
-/* Tangent K + M / h^2 at rest of two blocks of an element, `cells` along the edge of the upper one, and their contact blocks. Collective. */
+/* Tangent K + M / h^2 at rest of two blocks of an element, `cells` along the edge of the upper one,
+   and their contact blocks. Collective. */
 static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *element, PetscReal h,
                                                   const char *more, ContactProblem *p)
 {
@@ -35,7 +38,8 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
     "-body_low_poisson 0.4 -body_low_density 1000 -body_high_material linear -body_high_young 1e5 "
     "-body_high_poisson 0.4 -body_high_density 1000 -body_low_element %s -body_high_element %s "
     "-effects hold,meet -effect_hold_type fixed -effect_hold_on low.zmin -effect_meet_type contact "
-    "-effect_meet_response barrier -effect_meet_barrier_width 1e-4 -time euler_implicit -ts_dt %g %s",
+    "-effect_meet_response barrier -effect_meet_barrier_width 1e-4 -time euler_implicit -ts_dt %g "
+    "%s",
     (int)PetscMax(1, cells * 4 / 5), (int)cells, element, element, (double)h, more));
   PetscCall(test_scene_open(text, &p->scene));
   s = p->scene.model->space;
@@ -62,8 +66,8 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
 
     f[i] = s->fixed[i / 3] & (1 << i % 3)
              ? 0.
-             : s->node_mass[i / 3] *
-                 ((i % 3 == 2 ? -9.81 : 0.3) + PetscSinReal(40. * x[i % 3] + 70. * x[0] + 90. * x[1]));
+             : s->node_mass[i / 3] * ((i % 3 == 2 ? -9.81 : 0.3) +
+                                      PetscSinReal(40. * x[i % 3] + 70. * x[0] + 90. * x[1]));
   }
   PetscCall(VecRestoreArray(p->F, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -73,7 +77,8 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
 static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal ratio)
 {
   const SbSpace s = p->scene.model->space;
-  PetscReal sum[3] = {0., 0., 0.}, *own;
+  PetscReal sum[3] = {0., 0., 0.};
+  PetscReal *own;
   const PetscScalar *d;
   Vec D;
 
@@ -87,7 +92,8 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
   PetscCall(MatGetDiagonal(p->K, D));
   PetscCall(VecGetArrayRead(D, &d));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (own[i] <= 0.) continue;
+    if (own[i] <= 0.)
+      continue;
     sum[0] += own[i];
     sum[1] += d[3 * i] + d[3 * i + 1] + d[3 * i + 2];
   }
@@ -95,7 +101,8 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
   PetscCall(VecDestroy(&D));
   PetscCall(PetscFree(own));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  for (PetscInt k = 0; k < 9 * p->blocks.n; k++) p->blocks.block[k / 9].H[k % 9] *= ratio * sum[1] / sum[0];
+  for (PetscInt k = 0; k < 9 * p->blocks.n; k++)
+    p->blocks.block[k / 9].H[k % 9] *= ratio * sum[1] / sum[0];
   p->scale = ratio;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

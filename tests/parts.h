@@ -1,10 +1,11 @@
 /*
-  parts.h - test scenes, one for each effect, element, material, integrator, field, other output and estimator
-  of the program.
+  parts.h - test scenes, one for each effect, element, material, integrator, field, other output and
+  estimator of the program.
 
-  The lists come from the program's registries; the table below has the options that name each one in the
-  scene. The test of unused features (tests/verify/verify_unnamed.c) and the cost table
-  (tests/perf/effect_cost.c) loop over both, so that a new type fails the test until it has a row here.
+  The lists come from the program's registries; the table below has the options that name each one
+  in the scene. The test of unused features (tests/verify/verify_unnamed.c) and the cost table
+  (tests/perf/effect_cost.c) loop over both, so that a new type fails the test until it has a row
+  here.
 */
 #pragma once
 #include "../src/base/option.h"
@@ -14,16 +15,22 @@
 #define PART_TEXT 4096 /* longest scenario, characters */
 #define PART_STEPS "8" /* steps of every run */
 
-/* A soft bar along x that rotates about its centre; one linear solve per step. Its sets are used by the parts only. */
-#define PART_SCENE                                                                                        \
-  "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 -body_bar_poisson 0.4 " \
-  "-body_bar_density 1000 -body_bar_angular_velocity 0,2,0 -sets end,tip,skin -set_end_at plane:1,0,0,0 " \
-  "-set_tip_at plane:1,0,0,0.4 -set_skin_at body:bar -snes_type ksponly -ksp_rtol 1e-4 -solver cg_icc "   \
+/* A soft bar along x that rotates about its centre; one linear solve per step. Its sets are used by
+   the parts only. */
+#define PART_SCENE                                                                               \
+  "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 "              \
+  "-body_bar_poisson 0.4 "                                                                       \
+  "-body_bar_density 1000 -body_bar_angular_velocity 0,2,0 -sets end,tip,skin -set_end_at "      \
+  "plane:1,0,0,0 "                                                                               \
+  "-set_tip_at plane:1,0,0,0.4 -set_skin_at body:bar -snes_type ksponly -ksp_rtol 1e-4 -solver " \
+  "cg_icc "                                                                                      \
   "-output_fields none -output_history false -progress false "
-#define PART_TIME "-time euler_implicit -ts_dt 0.0166666666666666667 -ts_max_time 0.13333333333333333 "
+#define PART_TIME \
+  "-time euler_implicit -ts_dt 0.0166666666666666667 -ts_max_time 0.13333333333333333 "
 /* A plane below the end of the bar, which it hits. */
-#define PART_FLOOR                                                                                    \
-  "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on skin " \
+#define PART_FLOOR                                                                               \
+  "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on " \
+  "skin "                                                                                        \
   "-effect_floor_obstacle plane:0,0,1,-1e-4 "
 /* Incomplete Cholesky breaks down with DG. */
 #define PART_ELEMENT "-solver cg_two_level "
@@ -32,26 +39,31 @@ typedef struct {
   const char *family, *name;
   const char *options; /* options that name the part; "": the scene does */
   const char *scene;   /* further options that it needs, also in the run without it; NULL: none */
-  const char *events;  /* log events that it begins, comma-separated; NULL: one of its family and name */
-  PetscBool apart;     /* it can be restricted to one of two bodies, and works with explicit integrators */
+  const char
+    *events; /* log events that it begins, comma-separated; NULL: one of its family and name */
+  PetscBool
+    apart; /* it can be restricted to one of two bodies, and works with explicit integrators */
 } Part;
 
 static const Part parts[] = {
   {"effect", "gravity", "-effects gravity", NULL, NULL, PETSC_FALSE}, /* acts on all bodies */
   {"effect", "body_force",
-   "-effects push -effect_push_type body_force -effect_push_on skin -effect_push_density 0;0;-9810", NULL,
-   NULL, PETSC_TRUE},
-  {"effect", "traction",
-   "-effects pull -effect_pull_type traction -effect_pull_on tip -effect_pull_vector 0;0;100", NULL, NULL,
-   PETSC_TRUE},
-  {"effect", "pressure", "-effects air -effect_air_type pressure -effect_air_on skin -effect_air_value 100",
+   "-effects push -effect_push_type body_force -effect_push_on skin -effect_push_density 0;0;-9810",
    NULL, NULL, PETSC_TRUE},
-  {"effect", "point_force",
-   "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1", NULL, NULL,
+  {"effect", "traction",
+   "-effects pull -effect_pull_type traction -effect_pull_on tip -effect_pull_vector 0;0;100", NULL,
+   NULL, PETSC_TRUE},
+  {"effect", "pressure",
+   "-effects air -effect_air_type pressure -effect_air_on skin -effect_air_value 100", NULL, NULL,
    PETSC_TRUE},
-  {"effect", "fixed", "-effects clamp -effect_clamp_type fixed -effect_clamp_on end", NULL, NULL, PETSC_TRUE},
+  {"effect", "point_force",
+   "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1",
+   NULL, NULL, PETSC_TRUE},
+  {"effect", "fixed", "-effects clamp -effect_clamp_type fixed -effect_clamp_on end", NULL, NULL,
+   PETSC_TRUE},
   {"effect", "prescribed_displacement",
-   "-effects turn -effect_turn_type prescribed_displacement -effect_turn_on end -effect_turn_angle 100*t "
+   "-effects turn -effect_turn_type prescribed_displacement -effect_turn_on end -effect_turn_angle "
+   "100*t "
    "-effect_turn_axis 1,0,0 -effect_turn_axis_point 0,0.05,0.05",
    NULL, NULL, PETSC_TRUE},
   {"effect", "damping",
@@ -70,22 +82,27 @@ static const Part parts[] = {
   {"time", "euler_implicit", "", NULL, "", PETSC_FALSE},
   {"time", "newmark", "-time newmark", NULL, "", PETSC_FALSE},
   {"time", "genalpha", "-time genalpha", NULL, "", PETSC_FALSE},
-  {"time", "euler_symplectic", "-time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "", PETSC_FALSE},
-  {"time", "euler_explicit", "-time euler_explicit -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "", PETSC_FALSE},
+  {"time", "euler_symplectic", "-time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "",
+   PETSC_FALSE},
+  {"time", "euler_explicit", "-time euler_explicit -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "",
+   PETSC_FALSE},
   {"time", "alpha2", "-time alpha2", NULL, "", PETSC_FALSE},
   {"time", "static", "-time static -static_steps " PART_STEPS,
    "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on end ", "", PETSC_FALSE},
   {"output", "fields", "-output_fields position,displacement,velocity,von_mises", NULL,
-   "SbOut_fields,SbField_position,SbField_displacement,SbField_velocity,SbField_von_mises,SbField_body",
+   "SbOut_fields,SbField_position,SbField_displacement,SbField_velocity,SbField_von_mises,SbField_"
+   "body",
    PETSC_FALSE},
   {"output", "contacts", "-output_contacts true", PART_FLOOR "-output_fields displacement ", NULL,
    PETSC_FALSE},
   {"output", "history", "-output_history true", NULL, NULL, PETSC_FALSE},
-  {"output", "probes", "-probes tip -probe_tip_at 0.4,0.05,0.05", "-output_history true ", NULL, PETSC_FALSE},
+  {"output", "probes", "-probes tip -probe_tip_at 0.4,0.05,0.05", "-output_history true ", NULL,
+   PETSC_FALSE},
   {"output", "checkpoint", "-checkpoint_every_steps 1", NULL, NULL, PETSC_FALSE},
   {"output", "progress", "-progress true", NULL, NULL, PETSC_FALSE},
   {"estimator", "ledger", "-ledger true", NULL, NULL, PETSC_FALSE},
-  {"remesh", "remesh", "-remesh_quality 1e-6", NULL, NULL, PETSC_FALSE}, /* enabled, but never necessary */
+  {"remesh", "remesh", "-remesh_quality 1e-6", NULL, NULL,
+   PETSC_FALSE}, /* enabled, but never necessary */
 };
 
 /* Output options that belong to a part above: the one that each names, or modifies. */
@@ -127,8 +144,10 @@ static inline const SbOptionRow *part_output_rows(PetscInt *n)
 {
   const SbOptionRow *first = SbTheOptions.row;
 
-  while (first->row != SbOutputRows) first++;
-  for (*n = 0; SbOutputRows[*n].key;) (*n)++;
+  while (first->row != SbOutputRows)
+    first++;
+  for (*n = 0; SbOutputRows[*n].key;)
+    (*n)++;
   return first;
 }
 
@@ -142,16 +161,18 @@ static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n
   PetscCall(PetscFunctionListGet(list, &all, &count));
   *n = 0;
   for (int i = 0; i < count; i++) /* PETSc 3.18 counts the closing NULL */
-    if (all[i]) PetscCall(PetscStrncpy(names[(*n)++], all[i], SB_NAME_MAX));
+    if (all[i])
+      PetscCall(PetscStrncpy(names[(*n)++], all[i], SB_NAME_MAX));
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  part_names - all names of a family, from the registry of the program; those of "output" from the rows above.
-  Not collective; after SbRegisterAll().
+  part_names - all names of a family, from the registry of the program; those of "output" from the
+  rows above. Not collective; after SbRegisterAll().
 */
-static inline PetscErrorCode part_names(const char *family, PetscInt *n, char names[PART_NAMES][SB_NAME_MAX])
+static inline PetscErrorCode part_names(const char *family, PetscInt *n,
+                                        char names[PART_NAMES][SB_NAME_MAX])
 {
   PetscFunctionBeginUser;
   *n = 0;
@@ -159,7 +180,8 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
     const char *types[SB_EFFECT_TYPES];
 
     *n = SbEffectTypes(types);
-    for (PetscInt i = 0; i < *n; i++) PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
+    for (PetscInt i = 0; i < *n; i++)
+      PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
   } else if (!strcmp(family, "element")) {
     PetscCall(part_names_list(SbElementList, n, names));
   } else if (!strcmp(family, "material")) {
@@ -169,13 +191,15 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
     int count;
 
     PetscCall(PetscStrToArray(SbIntegrators, '|', &count, &words));
-    for (int i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], words[i], SB_NAME_MAX));
+    for (int i = 0; i < count; i++)
+      PetscCall(PetscStrncpy(names[(*n)++], words[i], SB_NAME_MAX));
     PetscCall(PetscStrToArrayDestroy(count, words));
   } else if (!strcmp(family, "field")) {
     PetscInt count;
     const SbField *field = SbFieldGetAll(&count);
 
-    for (PetscInt i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], field[i].name, SB_NAME_MAX));
+    for (PetscInt i = 0; i < count; i++)
+      PetscCall(PetscStrncpy(names[(*n)++], field[i].name, SB_NAME_MAX));
   } else {
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts); i++)
       if (!strcmp(parts[i].family, family))
@@ -184,15 +208,18 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Row of a name; fields need none. `part` has borrowed pointers that are valid until the next call. Not collective. */
-static inline PetscErrorCode part_find(const char *family, const char *name, Part *part, PetscBool *found)
+/* Row of a name; fields need none. `part` has borrowed pointers that are valid until the next call.
+   Not collective. */
+static inline PetscErrorCode part_find(const char *family, const char *name, Part *part,
+                                       PetscBool *found)
 {
   static char options[2 * SB_NAME_MAX], events[4 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   *found = PETSC_FALSE;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts) && !*found; i++) {
-    if (strcmp(parts[i].family, family) || strcmp(parts[i].name, name)) continue;
+    if (strcmp(parts[i].family, family) || strcmp(parts[i].name, name))
+      continue;
     *part = parts[i];
     *found = PETSC_TRUE;
   }
@@ -209,24 +236,28 @@ static inline PetscErrorCode part_find(const char *family, const char *name, Par
         PetscCall(PetscSNPrintf(events, sizeof(events), "Sb%s_%s", part_families[k].kind, name));
     part->events = events;
   }
-  if (*found && !part->scene) part->scene = "";
+  if (*found && !part->scene)
+    part->scene = "";
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scenario: the scene with the options that a part needs, and those that name it ("": without the part). Not collective. */
+/* Scenario: the scene with the options that a part needs, and those that name it ("": without the
+   part). Not collective. */
 static inline PetscErrorCode part_text(const char *mesh, const char *scene, const char *options,
                                        char text[PART_TEXT])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, PART_TEXT, PART_SCENE, mesh));
-  if (!strstr(options, "-time static")) PetscCall(PetscStrlcat(text, PART_TIME, PART_TEXT));
+  if (!strstr(options, "-time static"))
+    PetscCall(PetscStrlcat(text, PART_TIME, PART_TEXT));
   PetscCall(PetscStrlcat(text, scene, PART_TEXT));
   PetscCall(PetscStrlcat(text, " ", PART_TEXT));
   PetscCall(PetscStrlcat(text, options, PART_TEXT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number of calls of an event in all stages, and its time, s; 0 if it does not exist. Not collective. */
+/* Number of calls of an event in all stages, and its time, s; 0 if it does not exist. Not
+   collective. */
 static inline PetscErrorCode part_event(const char *name, PetscInt *count, PetscLogDouble *seconds)
 {
   const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
@@ -248,7 +279,8 @@ static inline PetscErrorCode part_event(const char *name, PetscInt *count, Petsc
 
 /* ------------------------------------------------------------------ what is allocated */
 
-/* Allocations of PETSc since part_watch(); separately those in files of supple, and in the folders of optional features. */
+/* Allocations of PETSc since part_watch(); separately those in files of supple, and in the folders
+   of optional features. */
 static struct {
   PetscInt n, n_ours;          /* numbers of allocations */
   double bytes, bytes_ours;    /* total bytes, including freed ones */
@@ -257,18 +289,20 @@ static struct {
 
 static PetscErrorCode (*part_malloc)(size_t, PetscBool, int, const char[], const char[], void **);
 
-static inline PetscErrorCode part_count(size_t size, PetscBool clear, int line, const char function[],
-                                        const char file[], void **memory)
+static inline PetscErrorCode part_count(size_t size, PetscBool clear, int line,
+                                        const char function[], const char file[], void **memory)
 {
   static const char *const folders[] = {"base", "contact", "effect", "element", "fem", "material",
                                         "mesh", "model",   "output", "scene",   "time"};
 
   part_allocated.n++;
   part_allocated.bytes += (double)size;
-  for (size_t i = 0; file && !strncmp(file, "src/", 4) && i < PETSC_STATIC_ARRAY_LENGTH(folders); i++) {
+  for (size_t i = 0; file && !strncmp(file, "src/", 4) && i < PETSC_STATIC_ARRAY_LENGTH(folders);
+       i++) {
     const size_t length = strlen(folders[i]);
 
-    if (strncmp(file + 4, folders[i], length) || file[4 + length] != '/') continue;
+    if (strncmp(file + 4, folders[i], length) || file[4 + length] != '/')
+      continue;
     part_allocated.n_ours++;
     part_allocated.bytes_ours += (double)size;
     part_allocated.n_effect += !strcmp(folders[i], "effect") || !strcmp(folders[i], "contact");

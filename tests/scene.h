@@ -1,6 +1,6 @@
 /*
-  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option
-  database.
+  scene.h - builds a scene from an option string in a test program. Each call begins with an empty
+  option database.
 */
 #pragma once
 #include <sb.h>
@@ -37,8 +37,8 @@ static inline PetscErrorCode test_options(const char *options)
 }
 
 /*
-  Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to
-  the folder `dir` unless it is NULL.
+  Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with
+  output to the folder `dir` unless it is NULL.
 */
 static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, const char *options,
                                                 TestScene *scene)
@@ -52,23 +52,26 @@ static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, 
   }
   PetscCall(SbSceneCreate(comm, &scene->model));
   PetscCall(test_scene_run(scene));
-  if (dir) PetscCall(SbOutputSetFromOptions(scene->run));
+  if (dir)
+    PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));
   PetscCall(SbLedgerAttach(scene->ledger));
   PetscCall(SbRemeshAttach(scene->remesh, scene->run));
-  if (dir) PetscCall(SbOutputAttach(scene->run));
+  if (dir)
+    PetscCall(SbOutputAttach(scene->run));
   PetscCall(SbMeshValidate(scene->model->mesh));
   PetscCall(SbSpaceValidate(scene->model->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-#define test_scene_open_in(dir, options, scene) test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene)
+#define test_scene_open_in(dir, options, scene) \
+  test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene)
 #define test_scene_open(options, scene) test_scene_open_in(NULL, options, scene)
 
 /* The same of options in printf format. */
-static inline PetscErrorCode test_vopen(MPI_Comm comm, const char *dir, TestScene *scene, const char *format,
-                                        va_list args)
+static inline PetscErrorCode test_vopen(MPI_Comm comm, const char *dir, TestScene *scene,
+                                        const char *format, va_list args)
 {
   char text[TEST_TEXT];
   size_t length;
@@ -133,21 +136,26 @@ static inline PetscErrorCode test_scene_close(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The error of a source, J^(1/2), and the energy that it is relative to, J: as in history.csv, checkpoints. */
-static inline PetscErrorCode test_ledger(SbRun run, SbErrorSource source, PetscReal *error, PetscReal *stored)
+/* The error of a source, J^(1/2), and the energy that it is relative to, J: as in history.csv,
+   checkpoints. */
+static inline PetscErrorCode test_ledger(SbRun run, SbErrorSource source, PetscReal *error,
+                                         PetscReal *stored)
 {
   PetscInt k = 0;
 
   PetscFunctionBeginUser;
-  while (k < run->ncarried && strcmp(run->carried[k].name, "ledger_stored_0")) k++;
+  while (k < run->ncarried && strcmp(run->carried[k].name, "ledger_stored_0"))
+    k++;
   PetscCheck(k < run->ncarried, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is no ledger");
   *stored = *run->carried[k].value;
   *error = *run->column[source].value * PetscSqrtReal(*stored);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacement (or any vector of the run) at the vertex nearest to a rest position, on every rank. */
-static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
+/* Displacement (or any vector of the run) at the vertex nearest to a rest position, on every
+   rank. */
+static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[3],
+                                           PetscReal value[3])
 {
   SbSpace s = m->space;
   const PetscScalar *u;
@@ -164,7 +172,8 @@ static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal d2 = 0.;
 
-    for (PetscInt k = 0; k < 3; k++) d2 += PetscSqr(s->node_x[3 * i + k] - at[k]);
+    for (PetscInt k = 0; k < 3; k++)
+      d2 += PetscSqr(s->node_x[3 * i + k] - at[k]);
     if (d2 < mine.distance) {
       mine.distance = d2;
       node = i;
@@ -172,21 +181,24 @@ static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[
   }
   PetscCallMPI(MPI_Allreduce(&mine, &best, 1, MPI_DOUBLE_INT, MPI_MINLOC, m->comm));
   PetscCall(VecGetArrayRead(U, &u));
-  for (PetscInt k = 0; k < 3; k++) value[k] = rank == best.rank ? u[3 * node + k] : 0.;
+  for (PetscInt k = 0; k < 3; k++)
+    value[k] = rank == best.rank ? u[3 * node + k] : 0.;
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCallMPI(MPI_Bcast(value, 3, MPIU_REAL, best.rank, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets a vector by a function of the rest position, independent of the partition. */
-static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U)
+static inline PetscErrorCode test_fill(SbModel m,
+                                       void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U)
 {
   SbSpace s = m->space;
   PetscScalar *u;
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) f(s->node_x + 3 * i, u + 3 * i);
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    f(s->node_x + 3 * i, u + 3 * i);
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,8 +1,9 @@
 /*
   slivers.h - a box of tets with a given fraction of slivers of a given smallest dihedral angle.
 
-  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has
-  the angle; vertices are taken in random order until the fraction is reached. No tet is inverted.
+  Interior vertices without common tets are moved, each in a random direction, until the first of
+  its tets has the angle; vertices are taken in random order until the fraction is reached. No tet
+  is inverted.
 */
 #pragma once
 #include "verify/verify.h"
@@ -14,18 +15,24 @@ typedef struct {
   PetscReal degrees; /* smallest dihedral angle of the slivers */
 } Slivers;
 
-/* Smallest dihedral angle in degrees of a tet with the corners x[v[a]], negative if it is inverted. */
+/* Smallest dihedral angle in degrees of a tet with the corners x[v[a]], negative if it is
+   inverted. */
 static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
 {
-  PetscReal e[3][3], normal[4][3], most = -1., det = 0.;
+  PetscReal e[3][3], normal[4][3];
+  PetscReal most = -1.;
+  PetscReal det = 0.;
 
   for (int a = 0; a < 3; a++)
-    for (int k = 0; k < 3; k++) e[a][k] = x[3 * v[a + 1] + k] - x[3 * v[0] + k];
+    for (int k = 0; k < 3; k++)
+      e[a][k] = x[3 * v[a + 1] + k] - x[3 * v[0] + k];
   for (int k = 0; k < 3; k++) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const int i = (k + 1) % 3;
+    const int j = (k + 2) % 3;
 
     for (int a = 0; a < 3; a++) {
-      const PetscReal *p = e[(a + 1) % 3], *q = e[(a + 2) % 3];
+      const PetscReal *p = e[(a + 1) % 3];
+      const PetscReal *q = e[(a + 2) % 3];
 
       normal[a + 1][k] = q[i] * p[j] - q[j] * p[i];
     }
@@ -34,7 +41,9 @@ static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
   }
   for (int a = 0; a < 4; a++) {
     for (int b = 0; b < a; b++) {
-      PetscReal aa = 0., bb = 0., ab = 0.;
+      PetscReal aa = 0.;
+      PetscReal bb = 0.;
+      PetscReal ab = 0.;
 
       for (int k = 0; k < 3; k++) {
         aa += normal[a][k] * normal[a][k];
@@ -47,7 +56,8 @@ static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
   return (det > 0. ? 180. : -180.) / PETSC_PI * acos(PetscMin(1., most));
 }
 
-/* Smallest angle of the tets at vertex at[3], and number of those within a hundredth of `degrees`. */
+/* Smallest angle of the tets at vertex at[3], and number of those within a hundredth of
+   `degrees`. */
 static inline PetscReal slivers_star(const Slivers *s, const PetscInt at[3], const PetscReal x[],
                                      PetscInt *count)
 {
@@ -63,7 +73,8 @@ static inline PetscReal slivers_star(const Slivers *s, const PetscInt at[3], con
       PetscReal angle;
 
       verify_tet(s->n, c, w, v);
-      if (v[0] != vertex && v[1] != vertex && v[2] != vertex && v[3] != vertex) continue;
+      if (v[0] != vertex && v[1] != vertex && v[2] != vertex && v[3] != vertex)
+        continue;
       angle = slivers_angle(x, v);
       least = PetscMin(least, angle);
       *count += angle < 1.01 * s->degrees;
@@ -73,9 +84,13 @@ static inline PetscReal slivers_star(const Slivers *s, const PetscInt at[3], con
 }
 
 /* Moves a vertex in a random direction; returns the number of new slivers. */
-static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const PetscInt at[3], PetscReal x[])
+static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const PetscInt at[3],
+                                    PetscReal x[])
 {
-  PetscReal *p = x + 3 * verify_vertex(s->n, at), start[3], e[3], good = 0., bad = 0.;
+  PetscReal *p = x + 3 * verify_vertex(s->n, at);
+  PetscReal start[3], e[3];
+  PetscReal good = 0.;
+  PetscReal bad = 0.;
   PetscInt count;
 
   for (int k = 0; k < 3; k++) {
@@ -86,13 +101,15 @@ static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const 
   for (int it = 0; it < 200; it++) {
     const PetscReal t = bad > 0. ? 0.5 * (good + bad) : good + 1. / 64.;
 
-    for (int k = 0; k < 3; k++) p[k] = start[k] + t * e[k];
+    for (int k = 0; k < 3; k++)
+      p[k] = start[k] + t * e[k];
     if (slivers_star(s, at, x, &count) >= s->degrees)
       good = t;
     else
       bad = t;
   }
-  for (int k = 0; k < 3; k++) p[k] = start[k] + good * e[k];
+  for (int k = 0; k < 3; k++)
+    p[k] = start[k] + good * e[k];
   (void)slivers_star(s, at, x, &count);
   return count;
 }
@@ -101,7 +118,8 @@ static inline void slivers_place(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal *all = (const PetscReal *)place->ctx;
 
-  for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(place->n, place->at) + k];
+  for (int k = 0; k < 3; k++)
+    x[k] = all[3 * verify_vertex(place->n, place->at) + k];
 }
 
 /* Writes the mesh. Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
@@ -127,7 +145,8 @@ static inline PetscErrorCode slivers_write(const Slivers *s, char path[512], Pet
           x[3 * verify_vertex(s->n, at) + k] = s->size[k] * (PetscReal)at[k] / (PetscReal)s->n[k];
           inner = (PetscBool)(inner && at[k] && at[k] < s->n[k]);
         }
-        for (int k = 0; inner && k < 3; k++) place[nplace][k] = at[k];
+        for (int k = 0; inner && k < 3; k++)
+          place[nplace][k] = at[k];
         nplace += inner;
       }
     }

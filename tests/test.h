@@ -1,10 +1,10 @@
 /*
-  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the
-  same on every rank.
+  test.h - framework of test programs: checks are counted and continue after a failure; the verdict
+  is the same on every rank.
 
-  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check
-  prints its position and values; the last line is "N passed, N failed", and the exit code is 1 if a check
-  failed on any rank. SB_TEST_BEGIN sets test_rank and test_size.
+  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A
+  failed check prints its position and values; the last line is "N passed, N failed", and the exit
+  code is 1 if a check failed on any rank. SB_TEST_BEGIN sets test_rank and test_size.
 */
 #pragma once
 #include <sbbase.h>
@@ -32,7 +32,8 @@ static inline void PETSC_ATTRIBUTE_FORMAT(4, 5)
   fflush(stdout);
 }
 
-#define SB_CHECK(cond, ...) sb_test_record((cond) ? PETSC_TRUE : PETSC_FALSE, __FILE__, __LINE__, __VA_ARGS__)
+#define SB_CHECK(cond, ...) \
+  sb_test_record((cond) ? PETSC_TRUE : PETSC_FALSE, __FILE__, __LINE__, __VA_ARGS__)
 #define SB_CHECK_NEAR(value, expected, tolerance, what)                                         \
   do {                                                                                          \
     const double sb_v = (double)(value), sb_e = (double)(expected), sb_t = (double)(tolerance); \
@@ -46,12 +47,13 @@ static inline void PETSC_ATTRIBUTE_FORMAT(4, 5)
 /* Text of the last error. */
 static char sb_test_text[2048];
 
-static inline PetscErrorCode sb_test_keep(MPI_Comm comm, int line, const char *function, const char *file,
-                                          PetscErrorCode code, PetscErrorType kind, const char *text,
-                                          void *ctx)
+static inline PetscErrorCode sb_test_keep(MPI_Comm comm, int line, const char *function,
+                                          const char *file, PetscErrorCode code,
+                                          PetscErrorType kind, const char *text, void *ctx)
 {
   (void)comm, (void)line, (void)function, (void)file, (void)ctx;
-  if (kind == PETSC_ERROR_INITIAL) (void)snprintf(sb_test_text, sizeof(sb_test_text), "%s", text ? text : "");
+  if (kind == PETSC_ERROR_INITIAL)
+    (void)snprintf(sb_test_text, sizeof(sb_test_text), "%s", text ? text : "");
   return code;
 }
 
@@ -66,19 +68,23 @@ static inline PetscBool sb_test_names(const char *text, const char *names)
     end = names + strcspn(names, "|");
     n = (size_t)(end - names);
     for (at = text; *at; at++) {
-      if (strncmp(at, names, n)) continue;
-      if (at > text && SB_WORD(at[-1]) && SB_WORD(names[0])) continue;
-      if (!SB_WORD(at[n]) || !SB_WORD(end[-1])) break;
+      if (strncmp(at, names, n))
+        continue;
+      if (at > text && SB_WORD(at[-1]) && SB_WORD(names[0]))
+        continue;
+      if (!SB_WORD(at[n]) || !SB_WORD(end[-1]))
+        break;
     }
-    if (n && !*at) return PETSC_FALSE;
+    if (n && !*at)
+      return PETSC_FALSE;
   }
   return PETSC_TRUE;
 #undef SB_WORD
 }
 
 /*
-  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line,
-  value, with | between them. How the sentence reads is not checked.
+  The call must fail with the code `expected`, in one line that names all of `names`: option, file,
+  line, value, with | between them. How the sentence reads is not checked.
 */
 #define SB_CHECK_ERROR(call, expected, names)                                                     \
   do {                                                                                            \
@@ -111,7 +117,8 @@ static inline PetscReal test_random(unsigned *state)
 
 static inline int sb_test_end(void)
 {
-  int sums[2] = {0, 0}, mine[2] = {sb_test_passed, sb_test_failed};
+  int sums[2] = {0, 0};
+  int mine[2] = {sb_test_passed, sb_test_failed};
 
   (void)MPI_Allreduce(mine, sums, 2, MPI_INT, MPI_SUM, PETSC_COMM_WORLD);
   test_print("%d passed, %d failed\n", sums[0], sums[1]);

@@ -1,12 +1,13 @@
 /*
-  error.c - error handling: an error reaches the user as one line, once, and every rank ends with a non-zero
-  code.
+  error.c - error handling: an error reaches the user as one line, once, and every rank ends with a
+  non-zero code.
 
-  PETSc's own handler prints a trace on every rank, which hides the relevant message. A *user error* (a wrong
-  option, an unreadable file) needs no trace; its message is kept while the error code is returned up to
-  main(), and SbErrorFinish() prints it. There all ranks enter a non-blocking reduction, which selects the
-  lowest rank with an error to print. If others are blocked in a collective call, a rank that failed alone
-  cannot complete it: after a grace period it prints the message and aborts the run.
+  PETSc's own handler prints a trace on every rank, which hides the relevant message. A *user error*
+  (a wrong option, an unreadable file) needs no trace; its message is kept while the error code is
+  returned up to main(), and SbErrorFinish() prints it. There all ranks enter a non-blocking
+  reduction, which selects the lowest rank with an error to print. If others are blocked in a
+  collective call, a rank that failed alone cannot complete it: after a grace period it prints the
+  message and aborts the run.
 
   Internal errors are printed with PETSc's trace immediately, and as one line at the end too.
 */
@@ -25,19 +26,27 @@ static struct {
   char message[2048];  /* message of the last error */
   char file[256];      /* names of the option files, for messages about YAML */
   const char *program; /* program name, prefix of every message */
-  void (*failure_handler)(const char *message, void *ctx); /* called on the rank that prints the error */
+  void (*failure_handler)(const char *message,
+                          void *ctx); /* called on the rank that prints the error */
   void *failure_ctx;
   void (*at_end)(void);
 } state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
 
 static PetscBool is_user_error(PetscErrorCode n, const char *function)
 {
-  static const int ours[] = {
-    PETSC_ERR_USER,       PETSC_ERR_USER_INPUT,      PETSC_ERR_FILE_OPEN,        PETSC_ERR_FILE_READ,
-    PETSC_ERR_FILE_WRITE, PETSC_ERR_FILE_UNEXPECTED, PETSC_ERR_ARG_UNKNOWN_TYPE, PETSC_ERR_MISSING_FACTOR};
+  static const int ours[] = {PETSC_ERR_USER,
+                             PETSC_ERR_USER_INPUT,
+                             PETSC_ERR_FILE_OPEN,
+                             PETSC_ERR_FILE_READ,
+                             PETSC_ERR_FILE_WRITE,
+                             PETSC_ERR_FILE_UNEXPECTED,
+                             PETSC_ERR_ARG_UNKNOWN_TYPE,
+                             PETSC_ERR_MISSING_FACTOR};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
-    if ((int)n == ours[i]) return PETSC_TRUE;
+    if ((int)n == ours[i])
+      return PETSC_TRUE;
+
   /* errors in options and option files, which PETSc raises under other codes */
   return (PetscBool)((function && (!strncmp(function, "PetscOptionsInsert", 18) ||
                                    !strncmp(function, "PetscOptionsStringTo", 20) ||
@@ -45,9 +54,10 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                    !strcmp(function, "PetscParseLayerYAML"))));
 }
 
-/* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc failed. */
-static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file, size_t size,
-                                 char given[])
+/* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc
+   failed. */
+static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file,
+                                 size_t size, char given[])
 {
   const char *rooms[] = {"src/ksp/", "src/snes/", "src/ts/", "src/mat/", "src/vec/", "src/dm/"};
   PetscBool petsc = PETSC_FALSE;
@@ -55,16 +65,19 @@ static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const c
   given[0] = 0;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rooms); i++)
     petsc = (PetscBool)(petsc || (file && strstr(file, rooms[i])));
-  if (!petsc || (n != PETSC_ERR_SUP && n != PETSC_ERR_ARG_WRONG && n != PETSC_ERR_ARG_WRONGSTATE &&
-                 n != PETSC_ERR_ARG_OUTOFRANGE && n != PETSC_ERR_ARG_INCOMP && n != PETSC_ERR_ARG_NULL &&
-                 n != PETSC_ERR_USER && n != PETSC_ERR_ARG_UNKNOWN_TYPE && n != PETSC_ERR_MISSING_FACTOR))
+  if (!petsc ||
+      (n != PETSC_ERR_SUP && n != PETSC_ERR_ARG_WRONG && n != PETSC_ERR_ARG_WRONGSTATE &&
+       n != PETSC_ERR_ARG_OUTOFRANGE && n != PETSC_ERR_ARG_INCOMP && n != PETSC_ERR_ARG_NULL &&
+       n != PETSC_ERR_USER && n != PETSC_ERR_ARG_UNKNOWN_TYPE && n != PETSC_ERR_MISSING_FACTOR))
     return PETSC_FALSE;
   for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
-    const char *name = SbTheOptions.user[i].name, *value = SbTheOptions.user[i].value;
+    const char *name = SbTheOptions.user[i].name;
+    const char *value = SbTheOptions.user[i].value;
     const size_t length = strlen(name);
 
     if (length > 5 && !strcmp(name + length - 5, "_type") &&
-        (strstr(name, "ksp_") || strstr(name, "pc_") || strstr(name, "snes_") || strstr(name, "mat_")))
+        (strstr(name, "ksp_") || strstr(name, "pc_") || strstr(name, "snes_") ||
+         strstr(name, "mat_")))
       SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value ? value : "");
   }
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
@@ -88,13 +101,17 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
     if (choice) {
-      for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n')) *c = ' ';
+      for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n'))
+        *c = ' ';
       SbAppend(sizeof(state.message), state.message, "%s%s%s", given[0] ? ", with " : "", given,
                state.trace ? "" : " (-error_trace shows where)");
     }
   }
-  if (state.pending && !state.trace) return n;
-  /* PETSC_COMM_SELF: on a larger one PETSc's handler lets the other ranks sleep and exit with code 0 */
+  if (state.pending && !state.trace)
+    return n;
+
+  /* PETSC_COMM_SELF: on a larger one PETSc's handler lets the other ranks sleep and exit with code
+     0 */
   return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
 }
 
@@ -125,11 +142,13 @@ static PetscBool reads_lines(char text[], PetscInt n, char **end)
   char kept;
 
   *end = text;
-  for (PetscInt i = 0; i < n && **end; i++) *end += strcspn(*end, "\n") + (strchr(*end, '\n') != NULL);
+  for (PetscInt i = 0; i < n && **end; i++)
+    *end += strcspn(*end, "\n") + (strchr(*end, '\n') != NULL);
   kept = **end;
   **end = 0;
   ierr = PetscOptionsCreate(&trial);
-  if (!ierr) ierr = PetscOptionsInsertStringYAML(trial, text);
+  if (!ierr)
+    ierr = PetscOptionsInsertStringYAML(trial, text);
   (void)PetscOptionsDestroy(&trial);
   **end = kept;
   return (PetscBool)!ierr;
@@ -146,24 +165,29 @@ void SbErrorFindYamlLine(void)
 
   if (strstr(state.message, "YAML") && dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))
     f = fopen(state.file, "r");
-  if (!f) return;
+  if (!f)
+    return;
   size = fread(text, 1, sizeof(text) - 1, f);
   text[size] = 0;
   (void)fclose(f);
-  for (const char *c = text; *c; c++) n += *c == '\n' || !c[1];
+  for (const char *c = text; *c; c++)
+    n += *c == '\n' || !c[1];
   memcpy(message, state.message, sizeof(message));
-  while (n > 1 && !reads_lines(text, n - 1, &end)) n--;
+  while (n > 1 && !reads_lines(text, n - 1, &end))
+    n--;
   (void)reads_lines(text, n - 1, &end);
-  (void)snprintf(state.message, sizeof(state.message), "%.1900s, line %d: '%.*s'%s", message, (int)n,
-                 (int)PetscMin(strcspn(end, "\n"), 60), end,
-                 memchr(end, '\t', strcspn(end, "\n")) ? "; YAML takes blanks, no tabs"
-                                                       : "; compare its indentation, colons and quotes");
+  (void)snprintf(state.message, sizeof(state.message), "%.1900s, line %d: '%.*s'%s", message,
+                 (int)n, (int)PetscMin(strcspn(end, "\n"), 60), end,
+                 memchr(end, '\t', strcspn(end, "\n"))
+                   ? "; YAML takes blanks, no tabs"
+                   : "; compare its indentation, colons and quotes");
 }
 
 void SbErrorPost(PetscBool stopped, const char *message)
 {
   SbFormat(sizeof(state.message), state.message, "%s", message);
-  if (stopped) state.code = SB_EXIT_STOPPED;
+  if (stopped)
+    state.code = SB_EXIT_STOPPED;
   state.pending = state.posted = PETSC_TRUE;
 }
 
@@ -181,23 +205,29 @@ void SbErrorSetCleanup(void (*fn)(void))
 /* Prints the error line; on one rank only. */
 static void print_error(void)
 {
-  if (state.failure_handler) (*state.failure_handler)(state.message, state.failure_ctx);
+  if (state.failure_handler)
+    (*state.failure_handler)(state.message, state.failure_ctx);
   (void)fflush(stdout);
-  (void)fprintf(stderr, "%s: %s: %s\n", state.program, state.code == SB_EXIT_STOPPED ? "stopped" : "error",
-                state.message);
+  (void)fprintf(stderr, "%s: %s: %s\n", state.program,
+                state.code == SB_EXIT_STOPPED ? "stopped" : "error", state.message);
   (void)fflush(stderr);
 }
 
 int SbErrorFinish(PetscErrorCode ierr)
 {
-  enum { SPEAKER, FAILED }; /* SPEAKER, encoded: lowest rank with a user error, else with any error */
+  enum {
+    SPEAKER,
+    FAILED
+  }; /* SPEAKER, encoded: lowest rank with a user error, else with any error */
   const int failed = ierr ? 1 : state.posted ? state.code : 0;
-  int mine[2], all[2], done = 0;
+  int mine[2], all[2];
+  int done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;
   double end;
 
-  if (state.at_end) (*state.at_end)();
+  if (state.at_end)
+    (*state.at_end)();
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
   mine[SPEAKER] = -rank - (state.pending ? 0 : size) - (failed ? 0 : 2 * size);
@@ -206,13 +236,15 @@ int SbErrorFinish(PetscErrorCode ierr)
   end = MPI_Wtime() + GRACE + 0.1 * PetscMin(rank, 20);
   while (!done && (!failed || MPI_Wtime() < end)) {
     (void)MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-    if (!done) (void)usleep(1000);
+    if (!done)
+      (void)usleep(1000);
   }
   if (!done) {
     print_error();
     (void)MPI_Abort(state.comm, 1);
   }
-  if (all[FAILED] && all[SPEAKER] == mine[SPEAKER]) print_error();
+  if (all[FAILED] && all[SPEAKER] == mine[SPEAKER])
+    print_error();
   (void)MPI_Comm_free(&state.comm);
   (void)MPI_Finalize();
   return all[FAILED];
@@ -242,7 +274,8 @@ PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught)
   PetscCallMPI(MPI_Comm_size(comm, &size));
   who = caught->code ? rank : size;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &who, 1, MPI_INT, MPI_MIN, comm));
-  if (who == size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (who == size)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Bcast(&first, (int)sizeof(first), MPI_BYTE, who, comm));
   SETERRQ(comm, (PetscErrorCode)first.code, "%s", first.text);
 }
@@ -254,7 +287,8 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rank)
+    PetscFunctionReturn(PETSC_SUCCESS);
   (void)fflush(stdout);
   (void)fprintf(stderr, "%s: warning: ", state.program);
   va_start(args, format);

@@ -1,15 +1,16 @@
 /*
-  formula.c - formulas of time and position: a recursive descent parser makes postfix code for a stack
-  machine.
+  formula.c - formulas of time and position: a recursive descent parser makes postfix code for a
+  stack machine.
 
     expression = term { (+|-) term }
     term       = unary { (*|/) unary }
     unary      = (+|-) unary | power
     power      = primary [ ^ unary ]              so -2^2 = -4 and 2^3^2 = 2^9
-    primary    = number | t | x | y | z | pi | function ( expression {, expression} ) | ( expression )
+    primary    = number | t | x | y | z | pi | function ( expression {, expression} ) | ( expression
+    )
 
-  The code has no branches, so its stack depth is known when it is compiled; formulas that need a deeper stack
-  are an error. Not supported: comparisons (use step(a)), units, user-defined names.
+  The code has no branches, so its stack depth is known when it is compiled; formulas that need a
+  deeper stack are an error. Not supported: comparisons (use step(a)), units, user-defined names.
 */
 #include <ctype.h>
 #include "formula.h"
@@ -36,12 +37,15 @@ static const struct {
   PetscReal (*f2)(PetscReal, PetscReal);
   PetscReal (*f3)(PetscReal, PetscReal, PetscReal);
 } functions[] = {
-  {"sin", 1, sin, NULL, NULL},      {"cos", 1, cos, NULL, NULL},      {"tan", 1, tan, NULL, NULL},
-  {"asin", 1, asin, NULL, NULL},    {"acos", 1, acos, NULL, NULL},    {"atan", 1, atan, NULL, NULL},
-  {"atan2", 2, NULL, atan2, NULL},  {"exp", 1, exp, NULL, NULL},      {"log", 1, log, NULL, NULL},
-  {"sqrt", 1, sqrt, NULL, NULL},    {"abs", 1, fabs, NULL, NULL},     {"min", 2, NULL, fmin, NULL},
-  {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},  {"tanh", 1, tanh, NULL, NULL},
-  {"step", 1, step_of, NULL, NULL}, {"ramp", 1, ramp_of, NULL, NULL}, {"clamp", 3, NULL, NULL, clamp_of},
+  {"sin", 1, sin, NULL, NULL},      {"cos", 1, cos, NULL, NULL},
+  {"tan", 1, tan, NULL, NULL},      {"asin", 1, asin, NULL, NULL},
+  {"acos", 1, acos, NULL, NULL},    {"atan", 1, atan, NULL, NULL},
+  {"atan2", 2, NULL, atan2, NULL},  {"exp", 1, exp, NULL, NULL},
+  {"log", 1, log, NULL, NULL},      {"sqrt", 1, sqrt, NULL, NULL},
+  {"abs", 1, fabs, NULL, NULL},     {"min", 2, NULL, fmin, NULL},
+  {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},
+  {"tanh", 1, tanh, NULL, NULL},    {"step", 1, step_of, NULL, NULL},
+  {"ramp", 1, ramp_of, NULL, NULL}, {"clamp", 3, NULL, NULL, clamp_of},
 };
 static const char *const variables[] = {"t", "x", "y", "z", "pi"}; /* and a constant */
 
@@ -61,15 +65,16 @@ static PetscErrorCode expression(Parser *p, const char *operators);
 
 static void skip_blanks(Parser *p)
 {
-  while (isspace((unsigned char)*p->next)) p->next++;
+  while (isspace((unsigned char)*p->next))
+    p->next++;
 }
 
 /* Raises a one-line error that says what is wrong and in which column, from 1. */
 static PetscErrorCode complain(const Parser *p, const char *at, const char *what)
 {
   PetscFunctionBeginUser;
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: column %d of '%s': %s", p->where, (int)(at - p->text) + 1,
-          p->text, what);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: column %d of '%s': %s", p->where,
+          (int)(at - p->text) + 1, p->text, what);
 }
 
 static PetscErrorCode emit(Parser *p, char op, int index, PetscReal number, int change)
@@ -77,7 +82,8 @@ static PetscErrorCode emit(Parser *p, char op, int index, PetscReal number, int 
   PetscFunctionBeginUser;
   p->formula->step[p->formula->nstep++] = (SbFormulaStep){op, index, number, change};
   p->depth += change;
-  if (p->depth > SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
+  if (p->depth > SB_FORMULA_STACK)
+    PetscCall(complain(p, p->next, "the formula is nested too deeply"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,7 +94,8 @@ static PetscErrorCode expect(Parser *p, char c)
   PetscFunctionBeginUser;
   skip_blanks(p);
   PetscCall(PetscSNPrintf(what, sizeof(what), "expected '%c'", c));
-  if (*p->next != c) PetscCall(complain(p, p->next, what));
+  if (*p->next != c)
+    PetscCall(complain(p, p->next, what));
   p->next++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -99,38 +106,50 @@ static PetscErrorCode word(Parser *p)
   char name[32];
   size_t n = 0;
   const char *known[PETSC_STATIC_ARRAY_LENGTH(functions) + 5];
-  char near[128] = "", what[256];
+  char near[128] = "";
+  char what[256];
   PetscInt nknown = 0;
 
   PetscFunctionBeginUser;
   for (; isalnum((unsigned char)*p->next) || *p->next == '_'; p->next++)
-    if (n + 1 < sizeof(name)) name[n++] = *p->next;
+    if (n + 1 < sizeof(name))
+      name[n++] = *p->next;
   name[n] = 0;
   for (int i = 0; i < 5; i++) {
-    if (strcmp(name, variables[i])) continue;
-    if (i < 4) p->formula->uses[i > 0] = PETSC_TRUE;
+    if (strcmp(name, variables[i]))
+      continue;
+    if (i < 4)
+      p->formula->uses[i > 0] = PETSC_TRUE;
     PetscCall(emit(p, i < 4 ? 'v' : 'n', i, PETSC_PI, 1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
-    if (strcmp(name, functions[i].name)) continue;
+    if (strcmp(name, functions[i].name))
+      continue;
+
     // function call: sin(expression), atan2(expression, expression), ...
     PetscCall(expect(p, '('));
     for (int k = 0; k < functions[i].narg; k++) {
-      if (k) PetscCall(expect(p, ','));
+      if (k)
+        PetscCall(expect(p, ','));
       PetscCall(expression(p, SUM));
     }
     PetscCall(expect(p, ')'));
     PetscCall(emit(p, 'f', (int)i, 0, 1 - functions[i].narg));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   // an unknown name: suggest similar ones
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[nknown++] = functions[i].name;
-  for (int i = 0; i < 5; i++) known[nknown++] = variables[i];
-  if (n > 1) SbSuggestNames(name, nknown, known, sizeof(near), near);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++)
+    known[nknown++] = functions[i].name;
+  for (int i = 0; i < 5; i++)
+    known[nknown++] = variables[i];
+  if (n > 1)
+    SbSuggestNames(name, nknown, known, sizeof(near), near);
   PetscCall(PetscSNPrintf(
     what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
-    near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
+    near[0] ? "?"
+            : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
   PetscCall(complain(p, begin, what));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,7 +164,8 @@ static PetscErrorCode unary(Parser *p)
     const PetscBool minus = (PetscBool)(*p->next++ == '-');
 
     PetscCall(unary(p));
-    if (minus) PetscCall(emit(p, 'm', 0, 0, 0));
+    if (minus)
+      PetscCall(emit(p, 'm', 0, 0, 0));
   } else {
     const unsigned char c = (unsigned char)*p->next;
 
@@ -163,7 +183,8 @@ static PetscErrorCode unary(Parser *p)
       PetscCall(expression(p, SUM));
       PetscCall(expect(p, ')'));
     } else {
-      PetscCall(complain(p, p->next, c ? "expected a number, a name or '('" : "the formula ends too early"));
+      PetscCall(complain(p, p->next,
+                         c ? "expected a number, a name or '('" : "the formula ends too early"));
     }
     skip_blanks(p);
     if (*p->next == '^') {
@@ -184,18 +205,22 @@ static PetscErrorCode expression(Parser *p, const char *operators)
   PetscFunctionBeginUser;
   for (char op = 0;; op = *p->next++) {
     PetscCall(sum ? expression(p, PRODUCT) : unary(p));
-    if (op) PetscCall(emit(p, op, 0, 0, -1));
+    if (op)
+      PetscCall(emit(p, op, 0, 0, -1));
     skip_blanks(p);
-    if (!*p->next || !strchr(operators, *p->next)) break;
+    if (!*p->next || !strchr(operators, *p->next))
+      break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
-  PetscReal stack[SB_FORMULA_STACK + 2], *a = stack; /* a: the last value; the first is at stack[1] */
+  PetscReal stack[SB_FORMULA_STACK + 2],
+    *a = stack; /* a: the last value; the first is at stack[1] */
 
-  if (!f->step) return SbFormulaEvalTable(f, t);
+  if (!f->step)
+    return SbFormulaEvalTable(f, t);
   for (PetscInt i = 0; i < f->nstep; i++) {
     const SbFormulaStep *s = &f->step[i];
 
@@ -247,7 +272,8 @@ PetscBool SbFormulaUses(SbFormula f, char variable)
 PetscErrorCode SbFormulaDestroy(SbFormula *formula)
 {
   PetscFunctionBeginUser;
-  if (!*formula) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*formula)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbLiveForget(*formula);
   PetscCall(PetscFree((*formula)->step));
   PetscCall(PetscFree((*formula)->row));
@@ -255,7 +281,8 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula)
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
+                               SbFormula *formula)
 {
   SbFormula f;
   Parser p = {.text = text, .next = text, .where = where};
@@ -269,10 +296,12 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
     PetscCall(SbFormulaReadTable(comm, p.next + 6, where, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   /* each instruction comes from at least one character of the text */
   PetscCall(PetscMalloc1(strlen(text) + 1, &f->step));
   p.formula = f;
   PetscCall(expression(&p, SUM));
-  if (*p.next) PetscCall(complain(&p, p.next, "expected an operator"));
+  if (*p.next)
+    PetscCall(complain(&p, p.next, "expected an operator"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

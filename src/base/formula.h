@@ -21,9 +21,12 @@ struct _p_SbFormula {
   PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
 };
 
-/* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and line. */
-PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
-/* Creates the row->count formulas of an option that is `live` (live.c); where: its name. Destroy each. */
+/* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and
+   line. */
+PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where,
+                                  SbFormula formula);
+/* Creates the row->count formulas of an option that is `live` (live.c); where: its name. Destroy
+   each. */
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);

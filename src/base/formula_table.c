@@ -1,9 +1,9 @@
 /*
   formula_table.c - function of time given by a table in a text file with two columns.
 
-  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty
-  lines are ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0 reads the file,
-  which scales to thousands of ranks; an error is broadcast and raised on all ranks.
+  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment;
+  empty lines are ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0
+  reads the file, which scales to thousands of ranks; an error is broadcast and raised on all ranks.
 */
 #include <errno.h>
 #include "formula.h"
@@ -17,16 +17,19 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file, strerror(errno));
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file,
+             strerror(errno));
   for (int number = 1; fgets(line, sizeof(line), f); number++) {
     PetscReal row[2];
-    char *next = line, *end;
+    char *next = line;
+    char *end;
     PetscBool valid = PETSC_TRUE;
 
     // two numbers, or a blank line
     line[strcspn(line, "#")] = 0;
     next += strspn(next, blanks);
-    if (!*next) continue;
+    if (!*next)
+      continue;
     for (int i = 0; i < 2; i++) {
       row[i] = strtod(next, &end);
       valid = (PetscBool)(valid && end > next && isfinite(row[i]));
@@ -39,8 +42,8 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
 
       (void)snprintf(times, sizeof(times), "%g s does not come after %g s", (double)row[0],
                      (double)(*rows)[*n - 1][0]);
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s, line %d: time %s; times must ascend", where, file,
-              number, times);
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s, line %d: time %s; times must ascend", where,
+              file, number, times);
     }
     PetscCall(SbReserve(*n + 1, sizeof(**rows), &room, rows));
     PetscCall(PetscArraycpy((*rows)[*n], row, 2));
@@ -51,7 +54,8 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula)
+PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where,
+                                  SbFormula formula)
 {
   PetscMPIInt rank;
   SbCaughtError caught = {0, ""};
@@ -62,11 +66,13 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
     FILE *f = fopen(file, "r");
 
     SB_CATCH(&caught, read_rows(f, file, where, &formula->nrow, &formula->row));
-    if (f) (void)fclose(f);
+    if (f)
+      (void)fclose(f);
   }
   PetscCall(SbCaughtRaise(comm, &caught));
   PetscCallMPI(MPI_Bcast(&formula->nrow, 1, MPIU_INT, 0, comm));
-  if (rank) PetscCall(PetscMalloc1(formula->nrow, &formula->row));
+  if (rank)
+    PetscCall(PetscMalloc1(formula->nrow, &formula->row));
   PetscCallMPI(MPI_Bcast(formula->row, (PetscMPIInt)(2 * formula->nrow), MPIU_REAL, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -74,11 +80,14 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *f, PetscReal t)
 {
   PetscReal(*const row)[2] = f->row;
-  PetscInt lo = 0, hi = f->nrow - 1;
+  PetscInt lo = 0;
+  PetscInt hi = f->nrow - 1;
   PetscReal w;
 
-  if (t <= row[lo][0]) return row[lo][1];
-  if (t >= row[hi][0]) return row[hi][1];
+  if (t <= row[lo][0])
+    return row[lo][1];
+  if (t >= row[hi][0])
+    return row[hi][1];
   while (hi - lo > 1) {
     const PetscInt mid = (lo + hi) / 2;
 

@@ -2,13 +2,13 @@
   live.c - interactive control: formulas whose values are read from a file during the run;
   -effect_<name>_displacement live, and other formulas of effects.
 
-  The file, live.txt in the folder of the run, has a line `NAME x y z` (m) for each effect with a live
-  displacement, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects.
-  Another program may rewrite it at any time, best by renaming a new file. Rank 0 reads it after each accepted
-  step. A displacement then moves towards the target in a straight line with the speed -live_speed, an angle
-  with -live_angular_speed; other values change at once. Each value is a table of two rows, so that a repeated
-  step has the same values. A run that is faster than -live_pace simulated seconds per second waits; a slower
-  one does not catch up.
+  The file, live.txt in the folder of the run, has a line `NAME x y z` (m) for each effect with a
+  live displacement, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other
+  options of effects. Another program may rewrite it at any time, best by renaming a new file. Rank
+  0 reads it after each accepted step. A displacement then moves towards the target in a straight
+  line with the speed -live_speed, an angle with -live_angular_speed; other values change at once.
+  Each value is a table of two rows, so that a repeated step has the same values. A run that is
+  faster than -live_pace simulated seconds per second waits; a slower one does not catch up.
 */
 #include "formula.h"
 
@@ -27,9 +27,10 @@ static struct {
   PetscInt n;
   Value value[VALUE_MAX];
   char file[PETSC_MAX_PATH_LEN];
-  PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: unlimited */
-  PetscReal clock, begun;               /* origin of wall time and simulated time, s; clock 0: not started */
-  PetscBool warned;                     /* a warning about an invalid line was printed */
+  PetscReal speed, angular_speed,
+    pace;                 /* m/s; degree/s; simulated seconds per second, 0: unlimited */
+  PetscReal clock, begun; /* origin of wall time and simulated time, s; clock 0: not started */
+  PetscBool warned;       /* a warning about an invalid line was printed */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* Linear change from `from` at time t to `to` at t + duration. */
@@ -49,22 +50,24 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
 
   PetscFunctionBeginUser;
   PetscCheck(live.n + n <= VALUE_MAX && name, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s live: %d numbers can be set while a run goes on, three by a vector", where, VALUE_MAX);
+             "%s live: %d numbers can be set while a run goes on, three by a vector", where,
+             VALUE_MAX);
   for (int k = 0; k < n; k++) {
     Value *v = &live.value[live.n + k];
     PetscReal old = 0.;
 
     /* names in the file and in the history; a displacement has the name of its effect */
     (void)snprintf(v->name, sizeof(v->name), "%.*s", length, name + 1);
-    (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length, name + 1,
-                   'x' + k);
+    (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length,
+                   name + 1, 'x' + k);
     v->unit = row->unit[0] ? row->unit : "1";
     v->speed = moved ? &live.speed : !strcmp(row->key, "angle") ? &live.angular_speed : NULL;
     v->n = n;
 
     /* keep the value after re-meshing */
     for (PetscInt i = 0; i < live.n; i++)
-      if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->row[0][1];
+      if (!strcmp(live.value[i].column, v->column))
+        old = live.value[i].formula->row[0][1];
     PetscCall(PetscNew(&formula[k]));
     formula[k]->uses[0] = PETSC_TRUE;
     formula[k]->nrow = 2;
@@ -79,7 +82,8 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
 void SbLiveForget(SbFormula formula)
 {
   for (PetscInt i = 0; i < live.n; i++) {
-    if (live.value[i].formula != formula) continue;
+    if (live.value[i].formula != formula)
+      continue;
     live.n--;
     memmove(&live.value[i], &live.value[i + 1], (size_t)(live.n - i) * sizeof(Value));
     break;
@@ -102,7 +106,8 @@ PetscInt SbLiveCount(void)
 
 const char *SbLiveColumn(PetscInt i, const char **unit)
 {
-  if (unit) *unit = live.value[i].unit;
+  if (unit)
+    *unit = live.value[i].unit;
   return live.value[i].column;
 }
 
@@ -116,7 +121,8 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* Reads targets from the file; one without a valid line stays. Warns of the first invalid line. Rank 0. */
+/* Reads targets from the file; one without a valid line stays. Warns of the first invalid line.
+   Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");
@@ -128,28 +134,35 @@ static PetscErrorCode read_targets(PetscReal target[])
     PetscBool useful = (PetscBool)(!n || line[0] == '#');
 
     for (PetscInt i = 0; i < live.n; i += live.value[i].n) {
-      char *next = line + n, *end;
+      char *next = line + n;
+      char *end;
       PetscReal x[SB_OPTION_COUNT_MAX];
       int k = 0;
 
-      if (strlen(live.value[i].name) != n || strncmp(line, live.value[i].name, n)) continue;
+      if (strlen(live.value[i].name) != n || strncmp(line, live.value[i].name, n))
+        continue;
       for (; k < live.value[i].n; k++) {
         next += strspn(next, " \t,");
         x[k] = strtod(next, &end);
-        if (end == next || !isfinite(x[k])) break;
+        if (end == next || !isfinite(x[k]))
+          break;
         next = end;
       }
-      if (k == live.value[i].n) memcpy(&target[i], x, (size_t)k * sizeof(*x));
+      if (k == live.value[i].n)
+        memcpy(&target[i], x, (size_t)k * sizeof(*x));
       useful = (PetscBool)(useful || k == live.value[i].n);
     }
-    if (useful || live.warned || !strchr(line, '\n')) continue;
+    if (useful || live.warned || !strchr(line, '\n'))
+      continue;
     line[strcspn(line, "\r\n")] = 0;
     live.warned = PETSC_TRUE;
     PetscCall(SbWarning(
-      PETSC_COMM_SELF, "%s: the line '%s' is not one of a value that is live, as `%s` with %d number%s",
-      live.file, line, live.value[0].name, live.value[0].n, live.value[0].n > 1 ? "s" : ""));
+      PETSC_COMM_SELF,
+      "%s: the line '%s' is not one of a value that is live, as `%s` with %d number%s", live.file,
+      line, live.value[0].name, live.value[0].n, live.value[0].n > 1 ? "s" : ""));
   }
-  if (f) (void)fclose(f);
+  if (f)
+    (void)fclose(f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,8 +172,11 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
+
   /* wait if simulated time is ahead of wall time */
-  ahead = live.pace > 0. && live.clock > 0. ? (t - live.begun) / live.pace - (MPI_Wtime() - live.clock) : 0.;
+  ahead = live.pace > 0. && live.clock > 0.
+            ? (t - live.begun) / live.pace - (MPI_Wtime() - live.clock)
+            : 0.;
   if (ahead > 0.)
     PetscCall(PetscSleep(ahead));
   else {
@@ -170,17 +186,21 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
 
   /* from the current values to the targets */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->row[1][1];
-  if (!rank) PetscCall(read_targets(target));
+  for (PetscInt i = 0; i < live.n; i++)
+    target[i] = live.value[i].formula->row[1][1];
+  if (!rank)
+    PetscCall(read_targets(target));
   PetscCallMPI(MPI_Bcast(target, (PetscMPIInt)live.n, MPIU_REAL, 0, comm));
   for (PetscInt first = 0; first < live.n; first += live.value[first].n) {
     const Value *v = &live.value[first];
     PetscReal way = 0.;
 
-    for (PetscInt i = first; i < first + v->n; i++) way += PetscSqr(target[i] - SbLiveGet(i, t));
+    for (PetscInt i = first; i < first + v->n; i++)
+      way += PetscSqr(target[i] - SbLiveGet(i, t));
     way = PetscSqrtReal(way);
     for (PetscInt i = first; i < first + v->n; i++)
-      set_rows(live.value[i].formula, t, SbLiveGet(i, t), v->speed ? way / *v->speed : 0., target[i]);
+      set_rows(live.value[i].formula, t, SbLiveGet(i, t), v->speed ? way / *v->speed : 0.,
+               target[i]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,9 @@
 /*
-  log.c - PETSc log events: one per phase of at least about one percent of a run, three stages, and one event
-  for each effect, material, element and output of a scene.
+  log.c - PETSc log events: one per phase of at least about one percent of a run, three stages, and
+  one event for each effect, material, element and output of a scene.
 
-  The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID), because they
-  time phases, not objects.
+  The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID),
+  because they time phases, not objects.
 */
 #include "sblog.h"
 
@@ -25,7 +25,8 @@ PetscErrorCode SbLogInitialize(void)
     PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
   for (int i = 0; i < 3; i++) {
     PetscCall(PetscLogStageGetId(stages[i], numbers[i]));
-    if (*numbers[i] < 0) PetscCall(PetscLogStageRegister(stages[i], numbers[i]));
+    if (*numbers[i] < 0)
+      PetscCall(PetscLogStageRegister(stages[i], numbers[i]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -37,7 +38,8 @@ PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *eve
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text), "Sb%s_%s", kind, name));
   PetscCall(PetscLogEventGetId(text, event));
-  if (*event < 0) PetscCall(PetscLogEventRegister(text, PETSC_OBJECT_CLASSID, event));
+  if (*event < 0)
+    PetscCall(PetscLogEventRegister(text, PETSC_OBJECT_CLASSID, event));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,7 +52,8 @@ static PetscErrorCode add_seconds(PetscLogEvent event, PetscReal *seconds)
   for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages); s++) {
     PetscEventPerfInfo info;
 
-    if (s && stages[s] <= 0) continue;
+    if (s && stages[s] <= 0)
+      continue;
     PetscCall(PetscLogEventGetPerfInfo(stages[s], event, &info));
     *seconds += (PetscReal)info.time;
   }
@@ -79,7 +82,8 @@ PetscErrorCode SbLogSeconds(PetscReal seconds[SB_PHASE_COUNT])
     PetscLogEvent event;
 
     PetscCall(PetscLogEventGetId(solve[i], &event));
-    if (event >= 0) PetscCall(add_seconds(event, &seconds[SB_PHASE_SOLVE]));
+    if (event >= 0)
+      PetscCall(add_seconds(event, &seconds[SB_PHASE_SOLVE]));
   }
   seconds[SB_PHASE_CONTACT] = PetscMax(0, seconds[SB_PHASE_CONTACT] - seconds[SB_PHASE_SEARCH]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,41 +1,50 @@
 /*
   option.c - registry of options: registered rows, values read so far, options given by the user.
 
-  PETSc's database has the texts; this table has their meaning. A row is found by class, type and key; the
-  full name is -<class>_<instance>_<key>. Two rows with the same full name (key b_c of body a, key c of body
-  a_b) are an error when the second one is read. Names are case-insensitive, as in PETSc.
+  PETSc's database has the texts; this table has their meaning. A row is found by class, type and
+  key; the full name is -<class>_<instance>_<key>. Two rows with the same full name (key b_c of body
+  a, key c of body a_b) are an error when the second one is read. Names are case-insensitive, as in
+  PETSc.
 */
 #include "option.h"
 
 SbOptionTable SbTheOptions;
 const SbScope SbRunScope = {.klass = ""};
 
-/* Grows an array with n elements of `size` bytes by one; capacity is doubled, for constant amortised cost. */
+/* Grows an array with n elements of `size` bytes by one; capacity is doubled, for constant
+   amortised cost. */
 static PetscErrorCode grow(PetscInt n, size_t size, void *array)
 {
   PetscFunctionBeginUser;
-  if (!(n & (n - 1))) PetscCall(PetscRealloc(PetscMax(2 * (size_t)n, 1) * size, (void **)array));
+  if (!(n & (n - 1)))
+    PetscCall(PetscRealloc(PetscMax(2 * (size_t)n, 1) * size, (void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[])
+PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n,
+                                 const SbOption rows[])
 {
   SbOptionRow *r = SbTheOptions.row;
   PetscInt at = -1;
 
   PetscFunctionBeginUser;
   if (n == PETSC_DECIDE)
-    for (n = 0; rows[n].key;) n++;
+    for (n = 0; rows[n].key;)
+      n++;
+
   /* in the order of the manual: at the end of its class, rows of all types before those of one */
   for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
-    if (strcmp(r[i].klass, klass)) continue;
-    if (r[i].row == rows && !strcmp(r[i].type, type)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (strcmp(r[i].klass, klass))
+      continue;
+    if (r[i].row == rows && !strcmp(r[i].type, type))
+      PetscFunctionReturn(PETSC_SUCCESS);
     if (type[0] || !r[i].type[0])
       at = i + 1;
     else if (at < 0)
       at = i;
   }
-  if (at < 0) at = SbTheOptions.nrow;
+  if (at < 0)
+    at = SbTheOptions.nrow;
   PetscCall(PetscRealloc((size_t)(SbTheOptions.nrow + n) * sizeof(*r), &SbTheOptions.row));
   r = SbTheOptions.row + at;
   PetscCall(PetscArraymove(r + n, r, SbTheOptions.nrow - at));
@@ -68,8 +77,8 @@ PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOptio
 {
   PetscFunctionBeginUser;
   *row = SbOptionFind(scope, key);
-  PetscCheck(*row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
-             scope->klass, scope->type);
+  PetscCheck(*row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'",
+             key, scope->klass, scope->type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,7 +88,8 @@ void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[
            scope->klass[0] ? scope->instance : "", key);
 }
 
-PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
+PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row,
+                                  SbOptionRecord **record)
 {
   char name[SB_OPTION_NAME_MAX];
   SbOptionRecord *r;
@@ -88,10 +98,12 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   SbOptionName(scope, row->key, sizeof(name), name);
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
     r = &SbTheOptions.record[i];
-    if (strcasecmp(r->name, name)) continue;
+    if (strcasecmp(r->name, name))
+      continue;
     PetscCheck(!strcmp(r->row->key, row->key), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s has two meanings: %s of %s '%s' and %s of %s '%s'; rename one of the two", name,
-               r->row->key, r->scope.klass, r->scope.instance, row->key, scope->klass, scope->instance);
+               r->row->key, r->scope.klass, r->scope.instance, row->key, scope->klass,
+               scope->instance);
     *record = r;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -117,8 +129,8 @@ PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
-                                 PetscBool *given)
+PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where,
+                                 const char **value, PetscBool *given)
 {
   char name[SB_OPTION_NAME_MAX];
   const char *unused;
@@ -126,6 +138,7 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   SbScope all;
 
   PetscFunctionBeginUser;
+
   /* the instance's own value, or that of the instance it is a copy of */
   *where = *scope;
   SbOptionName(where, key, sizeof(name), name);
@@ -133,7 +146,8 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   for (PetscInt i = 0; i < SbTheOptions.ninherit && !*given; i++) {
     const SbScope *copy = &SbTheOptions.inherit[i];
 
-    if (strcmp(copy->klass, scope->klass) || strcasecmp(copy->instance, scope->instance)) continue;
+    if (strcmp(copy->klass, scope->klass) || strcasecmp(copy->instance, scope->instance))
+      continue;
     PetscCall(PetscStrncpy(where->instance, copy->type, sizeof(where->instance)));
     SbOptionName(where, key, sizeof(name), name);
     PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
@@ -141,10 +155,12 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   }
 
   /* else the value for all bodies, which always counts as read */
-  if (strcmp(scope->klass, "body")) PetscFunctionReturn(PETSC_SUCCESS);
+  if (strcmp(scope->klass, "body"))
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbScopeSet(&all, "body", "", SB_OPTION_DEFAULT);
   SbOptionName(&all, key, sizeof(name), name);
-  PetscCall(PetscOptionsFindPair(NULL, NULL, name, *given ? &unused : value, *given ? &there : given));
+  PetscCall(
+    PetscOptionsFindPair(NULL, NULL, name, *given ? &unused : value, *given ? &there : given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -160,7 +176,8 @@ PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *name, const char *value)
+static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *name,
+                               const char *value)
 {
   PetscFunctionBeginUser;
   PetscCall(grow(*n, sizeof(**users), users));
@@ -170,7 +187,8 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc lists only options that have not been read. Those read are found in a string of all, by name. */
+/* PETSc lists only options that have not been read. Those read are found in a string of all, by
+   name. */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
   PetscInt nleft;
@@ -180,15 +198,18 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
   *n = 0;
   *users = NULL;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
-  for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
+  for (PetscInt i = 0; i < nleft; i++)
+    PetscCall(add_user(n, users, names[i], values[i]));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));
   PetscCall(PetscOptionsGetAll(NULL, &all));
   for (char *token = strtok_r(all, " ", &rest); token; token = strtok_r(NULL, " ", &rest)) {
     PetscBool read = PETSC_FALSE;
     const char *value;
 
-    if (token[0] == '-' && token[1]) PetscCall(PetscOptionsUsed(NULL, token + 1, &read));
-    if (!read) continue;
+    if (token[0] == '-' && token[1])
+      PetscCall(PetscOptionsUsed(NULL, token + 1, &read));
+    if (!read)
+      continue;
     PetscCall(PetscOptionsFindPair(NULL, NULL, token, &value, &read));
     PetscCall(add_user(n, users, token + 1, value));
   }
@@ -221,10 +242,14 @@ PetscErrorCode SbOptionsRemember(void)
 static PetscBool is_list(const char *name)
 {
   for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
-    const size_t length = strlen(name), prefix = strlen(r->klass), n = strlen(r->row->key);
+    const size_t length = strlen(name);
+    const size_t prefix = strlen(r->klass);
+    const size_t n = strlen(r->row->key);
 
-    if (r->row->kind != SB_OPTION_NAMES || length < n || strcasecmp(name + length - n, r->row->key)) continue;
-    if (prefix ? length > n + prefix && !strncasecmp(name, r->klass, prefix) : length == n) return PETSC_TRUE;
+    if (r->row->kind != SB_OPTION_NAMES || length < n || strcasecmp(name + length - n, r->row->key))
+      continue;
+    if (prefix ? length > n + prefix && !strncasecmp(name, r->klass, prefix) : length == n)
+      return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -242,7 +267,8 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file)
   for (PetscInt i = 0; i < n; i++) {
     char *text, *rest;
 
-    if (!values[i] || !is_list(names[i])) continue;
+    if (!values[i] || !is_list(names[i]))
+      continue;
     PetscCall(PetscStrallocpy(values[i], &text));
     for (char *name = strtok_r(text, ", ", &rest); name; name = strtok_r(NULL, ", ", &rest)) {
       PetscCall(grow(SbTheOptions.nlisted, sizeof(*SbTheOptions.listed), &SbTheOptions.listed));
@@ -258,8 +284,10 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file)
 PetscErrorCode SbOptionsReset(void)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
-  for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
+    PetscCall(PetscFree(SbTheOptions.record[i].text));
+  for (PetscInt i = 0; i < SbTheOptions.nlisted; i++)
+    PetscCall(PetscFree(SbTheOptions.listed[i]));
   PetscCall(PetscFree(SbTheOptions.record));
   PetscCall(PetscFree(SbTheOptions.row));
   PetscCall(PetscFree(SbTheOptions.listed));

@@ -4,7 +4,8 @@
 #pragma once
 #include "sbbase.h"
 
-#define SB_OPTION_NAME_MAX (3 * SB_NAME_MAX) /* "-" klass "_" instance "_" key, with the terminating zero */
+#define SB_OPTION_NAME_MAX \
+  (3 * SB_NAME_MAX) /* "-" klass "_" instance "_" key, with the terminating zero */
 
 /* A registered row. */
 typedef struct {
@@ -17,9 +18,10 @@ typedef struct {
   char name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
   SbScope scope;
   const SbOption *row;
-  PetscBool given;        /* given by the user, else `text` is the default */
-  char *text;             /* owned */
-  char want[SB_NAME_MAX]; /* for messages: " in (0, inf) Pa", " in m"; "" without interval and unit */
+  PetscBool given; /* given by the user, else `text` is the default */
+  char *text;      /* owned */
+  char
+    want[SB_NAME_MAX]; /* for messages: " in (0, inf) Pa", " in m"; "" without interval and unit */
 } SbOptionRecord;
 
 /* An option given by the user, of supple or PETSc. */
@@ -35,7 +37,8 @@ typedef struct {
   PetscBool remembered;   /* SbOptionsRemember() has filled `user` */
   SbOptionUser *user;     /* [nuser] */
   PetscInt ninherit;
-  SbScope *inherit; /* [ninherit] `instance` of `klass` inherits missing values from the instance `type` */
+  SbScope *
+    inherit; /* [ninherit] `instance` of `klass` inherits missing values from the instance `type` */
   PetscInt nlisted;
   char **listed; /* [nlisted] names in the lists of the scenario files, with duplicates; owned */
 } SbOptionTable;
@@ -43,13 +46,15 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 
 /* SbOptionFind(), an internal error if there is none. */
 PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOption **row);
-/* Value of an option, given for the instance or for one from which it inherits, and the scope in which it is
-   recorded: its own, or that of the original of a copy. */
-PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
-                                 PetscBool *given);
+/* Value of an option, given for the instance or for one from which it inherits, and the scope in
+   which it is recorded: its own, or that of the original of a copy. */
+PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where,
+                                 const char **value, PetscBool *given);
 /* Finds or creates the record of an option by its full name; borrowed. */
-PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
-/* Raises the error of a missing required option; the message suggests one that the user has misspelt. */
+PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row,
+                                  SbOptionRecord **record);
+/* Raises the error of a missing required option; the message suggests one that the user has
+   misspelt. */
 PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* All names and values in the database at present. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);

@@ -1,29 +1,33 @@
 /*
-  option_check.c - checks options that have not been read: misspelt ones of supple, ones that do not apply to
-  this run, and unused ones of PETSc.
+  option_check.c - checks options that have not been read: misspelt ones of supple, ones that do not
+  apply to this run, and unused ones of PETSc.
 
-  PETSc cannot tell a misspelt option from one that an object created later would read, so it reports nothing;
-  here a misspelling of one of its most common options is an error. All options of supple are read before the
-  computation starts. A name belongs to supple if it begins with the prefix of one of its classes or the first
-  word of a program-wide key, or is a key or within two edits of one, without a prefix of PETSc.
+  PETSc cannot tell a misspelt option from one that an object created later would read, so it
+  reports nothing; here a misspelling of one of its most common options is an error. All options of
+  supple are read before the computation starts. A name belongs to supple if it begins with the
+  prefix of one of its classes or the first word of a program-wide key, or is a key or within two
+  edits of one, without a prefix of PETSc.
 
-  A misspelt option ends the run; a valid but unused one causes a warning with the reason: it is for another
-  integrator, type or effect. An option of an unread instance is valid if a list in the scenario file has that
-  instance and the class has the key: then the command line has removed it from the list. An instance that is
-  in no list is an error.
+  A misspelt option ends the run; a valid but unused one causes a warning with the reason: it is for
+  another integrator, type or effect. An option of an unread instance is valid if a list in the
+  scenario file has that instance and the class has the key: then the command line has removed it
+  from the list. An instance that is in no list is an error.
 */
 #include "option.h"
 
 /* Prefixes of PETSc's options that occur in runs of supple. */
 static PetscBool looks_like_petsc(const char *name)
 {
-  return SbHasPrefix(
-    name,
-    "ksp_ pc_ snes_ ts_ mat_ vec_ dm_ is_ sub_ mg_ fieldsplit_ asm_ log_ malloc options_ petsc on_error_ "
-    "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ citations no_signal_handler info viewer_ "
-    "draw_ display nox saws objects_ checkstack get_total_flops skip_petscrc error_output_ shared_tmp "
-    "not_shared_tmp tmp partition sf_ python blas_ omp_ use_gpu device cuda hip event_ help version "
-    "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ telescope_ levels_ prefix_");
+  return SbHasPrefix(name, "ksp_ pc_ snes_ ts_ mat_ vec_ dm_ is_ sub_ mg_ fieldsplit_ asm_ log_ "
+                           "malloc options_ petsc on_error_ "
+                           "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ "
+                           "citations no_signal_handler info viewer_ "
+                           "draw_ display nox saws objects_ checkstack get_total_flops "
+                           "skip_petscrc error_output_ shared_tmp "
+                           "not_shared_tmp tmp partition sf_ python blas_ omp_ use_gpu device cuda "
+                           "hip event_ help version "
+                           "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ "
+                           "saddle_ telescope_ levels_ prefix_");
 }
 
 /* Most common options of PETSc's solvers, and some that differ from them by two letters. */
@@ -32,24 +36,28 @@ static const char common[] =
   "-ksp_monitor -ksp_view -ksp_gmres_restart -ksp_converged_reason -pc_type -pc_side -pc_view "
   "-pc_asm_overlap -pc_asm_type -pc_gasm_overlap -pc_gasm_type -pc_bjacobi_blocks "
   "-pc_factor_mat_solver_type -pc_factor_levels -pc_gamg_type -pc_factor_mat_ordering_type "
-  "-pc_hypre_type -pc_jacobi_type -pc_gamg_threshold -pc_mg_levels -pc_mg_type -pc_gamg_agg_nsmooths "
+  "-pc_hypre_type -pc_jacobi_type -pc_gamg_threshold -pc_mg_levels -pc_mg_type "
+  "-pc_gamg_agg_nsmooths "
   "-pc_sor_its -pc_sor_lits -pc_factor_shift_type -snes_type -snes_rtol -snes_atol -snes_stol "
   "-snes_max_it -snes_max_funcs -snes_monitor -snes_view -snes_converged_reason -snes_ksp_ew "
   "-snes_lag_jacobian -snes_linesearch_type";
 
-/* Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a program-wide
-   key, as -history_every; its first word as -solver_type or -time_budget (-contact_ksp_type is PETSc's). ""
-   if it is not of supple. */
+/* Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a
+   program-wide key, as -history_every; its first word as -solver_type or -time_budget
+   (-contact_ksp_type is PETSc's). "" if it is not of supple. */
 static void guess(const char *name, size_t size, char text[])
 {
   const size_t n = strcspn(name, "_"); /* length of its first word, perhaps the whole name */
   const PetscBool more =
-    (PetscBool)(!looks_like_petsc(name) && (!name[n] || (name[n + 1] && !looks_like_petsc(name + n + 1))));
+    (PetscBool)(!looks_like_petsc(name) &&
+                (!name[n] || (name[n + 1] && !looks_like_petsc(name + n + 1))));
 
   text[0] = 0;
   for (PetscInt i = 0; i < SbTheOptions.nrow && !text[0]; i++) {
-    const char *key = SbTheOptions.row[i].row->key, *klass = SbTheOptions.row[i].klass;
-    const size_t length = strlen(key), end = length > strlen(name) + 1 ? length - strlen(name) : 0;
+    const char *key = SbTheOptions.row[i].row->key;
+    const char *klass = SbTheOptions.row[i].klass;
+    const size_t length = strlen(key);
+    const size_t end = length > strlen(name) + 1 ? length - strlen(name) : 0;
 
     if (klass[0] && !strcasecmp(key, name))
       SbFormat(size, text, "; did you mean -%s_NAME_%s?", klass, key);
@@ -69,13 +77,14 @@ static const char *class_of(const char *name)
     const char *klass = SbTheOptions.row[i].klass;
     const size_t n = strlen(klass);
 
-    if (n && !strncasecmp(name, klass, n) && name[n] == '_') return klass;
+    if (n && !strncasecmp(name, klass, n) && name[n] == '_')
+      return klass;
   }
   return NULL;
 }
 
-/* Length of the instance in a name, "liver" in "body_liver_young": the longest known one; 0: none. read:
-   options of it have been read, else it is only in a list of a file. */
+/* Length of the instance in a name, "liver" in "body_liver_young": the longest known one; 0: none.
+   read: options of it have been read, else it is only in a list of a file. */
 static size_t instance_of(const char *klass, const char *name, PetscBool *read)
 {
   const char *at = name + strlen(klass) + 1;
@@ -85,11 +94,14 @@ static size_t instance_of(const char *klass, const char *name, PetscBool *read)
   for (PetscInt i = 0; i < SbTheOptions.nrecord + SbTheOptions.nlisted; i++) {
     const PetscBool is_read = (PetscBool)(i < SbTheOptions.nrecord);
     const SbOptionRecord *r = &SbTheOptions.record[i];
-    const char *instance = is_read ? r->scope.instance : SbTheOptions.listed[i - SbTheOptions.nrecord];
+    const char *instance =
+      is_read ? r->scope.instance : SbTheOptions.listed[i - SbTheOptions.nrecord];
     const size_t n = strlen(instance);
 
-    if (is_read && strcmp(r->scope.klass, klass)) continue;
-    if (n <= best || strncasecmp(at, instance, n) || at[n] != '_') continue;
+    if (is_read && strcmp(r->scope.klass, klass))
+      continue;
+    if (n <= best || strncasecmp(at, instance, n) || at[n] != '_')
+      continue;
     best = n;
     *read = is_read;
   }
@@ -107,7 +119,8 @@ typedef enum {
 /* Classifies an option with the prefix of a class: valid if some type of the class has its key. */
 static Verdict verdict_of_class(const char *klass, const char *name, size_t size, char text[])
 {
-  const char *instance = name + strlen(klass) + 1, *key;
+  const char *instance = name + strlen(klass) + 1;
+  const char *key;
   PetscBool read;
   const size_t n = instance_of(klass, name, &read);
   Verdict verdict = WRONG;
@@ -117,24 +130,28 @@ static Verdict verdict_of_class(const char *klass, const char *name, size_t size
       !strncasecmp(instance, SB_OPTION_DEFAULT "_", strlen(SB_OPTION_DEFAULT "_"))) {
     key = instance + strlen(SB_OPTION_DEFAULT "_");
     for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
-      if (!strcmp(SbTheOptions.row[i].klass, klass) && !strcasecmp(SbTheOptions.row[i].row->key, key))
+      if (!strcmp(SbTheOptions.row[i].klass, klass) &&
+          !strcasecmp(SbTheOptions.row[i].row->key, key))
         verdict = UNUSED;
     SbFormat(size, text, "no body takes it, as each has one of its own or is of another type");
     return verdict;
   }
-  if (!n) return WRONG;
+  if (!n)
+    return WRONG;
   key = instance + n + 1;
   for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
     PetscBool own;
 
-    if (strcmp(r->klass, klass) || strcasecmp(r->row->key, key)) continue;
+    if (strcmp(r->klass, klass) || strcasecmp(r->row->key, key))
+      continue;
+
     // whether the row is for all types, or for one of which the instance has been read
     own = (PetscBool)!r->type[0];
     for (PetscInt i = 0; i < SbTheOptions.nrecord && !own; i++) {
       const SbScope *s = &SbTheOptions.record[i].scope;
 
-      own = (PetscBool)(!strcmp(s->klass, klass) && !strcmp(s->type, r->type) && strlen(s->instance) == n &&
-                        !strncasecmp(s->instance, instance, n));
+      own = (PetscBool)(!strcmp(s->klass, klass) && !strcmp(s->type, r->type) &&
+                        strlen(s->instance) == n && !strncasecmp(s->instance, instance, n));
     }
     verdict = read ? UNUSED : LEFT_OUT;
     if (!read)
@@ -142,19 +159,23 @@ static Verdict verdict_of_class(const char *klass, const char *name, size_t size
     else if (own)
       SbFormat(size, text, "%s", r->row->help);
     else
-      SbFormat(size, text, "it is for type %s, and the %s %.*s has another one", r->type, klass, (int)n,
-               instance);
-    if (own || !read) break;
+      SbFormat(size, text, "it is for type %s, and the %s %.*s has another one", r->type, klass,
+               (int)n, instance);
+    if (own || !read)
+      break;
   }
   return verdict;
 }
 
 static PetscErrorCode find_verdict(const char *name, size_t size, char text[], Verdict *verdict)
 {
-  char near[3 * SB_OPTION_NAME_MAX] = "", dashed[SB_OPTION_NAME_MAX], why[1024] = "";
+  char near[3 * SB_OPTION_NAME_MAX] = "";
+  char dashed[SB_OPTION_NAME_MAX];
+  char why[1024] = "";
   const char *klass = class_of(name);
   const SbOption *row = SbOptionFind(&SbRunScope, name);
-  PetscInt n = 0, room = SbTheOptions.nrecord;
+  PetscInt n = 0;
+  PetscInt room = SbTheOptions.nrecord;
   const char **list;
   char(*names)[SB_OPTION_NAME_MAX], **words;
   int ncommon;
@@ -169,26 +190,33 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(PetscStrncpy(text, row->help, size));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is an option of supple */
+  if (!klass && looks_like_petsc(name) &&
+      !SbHasPrefix(name, "ts_")) { /* -ts_dt is an option of supple */
     if (SbHasPrefix(name, "ksp_ pc_ snes_")) {
       PetscCall(PetscStrToArray(common, ' ', &ncommon, &words));
       SbSuggestNames(dashed, ncommon, (const char *const *)words, sizeof(near), near);
       PetscCall(PetscStrToArrayDestroy(ncommon, words));
     }
-    if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (!near[0] || !strcasecmp(near, dashed))
+      PetscFunctionReturn(PETSC_SUCCESS);
     *verdict = WRONG;
-    PetscCall(PetscSNPrintf(text, size, "%s is not an option of PETSc; did you mean %s?", dashed, near));
+    PetscCall(
+      PetscSNPrintf(text, size, "%s is not an option of PETSc; did you mean %s?", dashed, near));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (klass) {
     *verdict = verdict_of_class(klass, name, size, text);
-    if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*verdict != WRONG)
+      PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* similar full names: all options read so far, all program-wide options, and those of all instances named
-     in scenario files and of `default` for all bodies; `near` is "" if there is none */
+
+  /* similar full names: all options read so far, all program-wide options, and those of all
+     instances named in scenario files and of `default` for all bodies; `near` is "" if there is
+     none */
   room += SbTheOptions.nrow * (SbTheOptions.nlisted + 1);
   PetscCall(PetscMalloc2(room, &list, room, &names));
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
+    list[n++] = SbTheOptions.record[i].name;
   for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
     const SbOptionRow *r = &SbTheOptions.row[i];
     const PetscInt instances = r->klass[0] ? SbTheOptions.nlisted + !strcmp(r->klass, "body") : 1;
@@ -204,29 +232,36 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   }
   SbSuggestNames(dashed, n, list, sizeof(near), near);
   PetscCall(PetscFree2(list, names));
-  if (!klass && !near[0]) guess(name, sizeof(why), why);
-  if (!klass && !near[0] && !why[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!klass && !near[0])
+    guess(name, sizeof(why), why);
+  if (!klass && !near[0] && !why[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
   *verdict = WRONG;
   if (near[0])
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
   else if (klass) {
     /* reason for an unread option with the prefix of a class, without a similar name */
-    char keys[768] = "", instances[256] = "";
-    const char *at = name + strlen(klass) + 1, *last = NULL;
+    char keys[768] = "";
+    char instances[256] = "";
+    const char *at = name + strlen(klass) + 1;
+    const char *last = NULL;
 
-    /* keys read for the instance of the name: "body liver has mesh, young"; instances of the class that have
-       been read: "liver, stone"; "" if there are none */
+    /* keys read for the instance of the name: "body liver has mesh, young"; instances of the class
+       that have been read: "liver, stone"; "" if there are none */
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
       const char *instance = r->scope.instance;
       const size_t length = strlen(instance);
 
-      if (strcmp(r->scope.klass, klass)) continue;
+      if (strcmp(r->scope.klass, klass))
+        continue;
       if (!last || strcmp(last, instance))
         SbAppend(sizeof(instances), instances, "%s%s", last ? ", " : "", instance);
       last = instance;
-      if (strncasecmp(at, instance, length) || at[length] != '_') continue;
-      if (!keys[0]) SbFormat(sizeof(keys), keys, "%s %s has ", klass, instance);
+      if (strncasecmp(at, instance, length) || at[length] != '_')
+        continue;
+      if (!keys[0])
+        SbFormat(sizeof(keys), keys, "%s %s has ", klass, instance);
       SbAppend(sizeof(keys), keys, "%s%s", keys[strlen(keys) - 1] == ' ' ? "" : ", ", r->row->key);
     }
     if (keys[0])
@@ -243,18 +278,21 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
 {
   const SbOption *row = r->row;
   const size_t before = strlen(r->name) - strlen(row->key) - 1; /* length of "body_liver_" */
-  PetscInt nleft, n = 0;
+  PetscInt nleft;
+  PetscInt n = 0;
   char **names, near[SB_OPTION_NAME_MAX];
   const char **list;
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
   PetscCall(PetscMalloc1(nleft, &list));
+
   // unread names of the same instance that are not valid options
   for (PetscInt i = 0; i < nleft; i++) {
     const char *key;
 
-    if (strncasecmp(names[i], r->name + 1, before)) continue;
+    if (strncasecmp(names[i], r->name + 1, before))
+      continue;
     key = names[i] + before;
     if (before ? !SbOptionFind(&r->scope, key)
                : !class_of(key) && !looks_like_petsc(key) && !SbOptionFind(&SbRunScope, key))
@@ -263,15 +301,16 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
   SbSuggestNames(r->name + 1, n, list, sizeof(near), near);
   PetscCall(PetscFree(list));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
-  PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple; did you mean %s?",
-             near, r->name);
+  PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s is not an option of supple; did you mean %s?", near, r->name);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s", r->name, row->help,
           row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "", row->unit);
 }
 
 PetscErrorCode SbOptionsCheck(void)
 {
-  PetscInt nleft, nbad = 0;
+  PetscInt nleft;
+  PetscInt nbad = 0;
   char **names, first[1024] = "", more[64] = "", (*text)[1024];
   Verdict *verdict;
 
@@ -280,24 +319,31 @@ PetscErrorCode SbOptionsCheck(void)
   PetscCall(PetscMalloc2(nleft, &verdict, nleft, &text));
   for (PetscInt i = 0; i < nleft; i++) {
     PetscCall(find_verdict(names[i], sizeof(*text), text[i], &verdict[i]));
-    if (verdict[i] == WRONG && !nbad++) PetscCall(PetscStrncpy(first, text[i], sizeof(first)));
+    if (verdict[i] == WRONG && !nbad++)
+      PetscCall(PetscStrncpy(first, text[i], sizeof(first)));
   }
-  /* if there is no error: warnings of valid unused options; those of one excluded instance in one line */
+
+  /* if there is no error: warnings of valid unused options; those of one excluded instance in one
+     line */
   for (PetscInt i = 0; i < nleft && !nbad; i++) {
     PetscInt others = 0;
 
     if (verdict[i] == UNUSED)
       PetscCall(SbWarning(PETSC_COMM_WORLD, "-%s is unused in this run: %s", names[i], text[i]));
-    if (verdict[i] != LEFT_OUT) continue;
+    if (verdict[i] != LEFT_OUT)
+      continue;
     for (PetscInt j = i + 1; j < nleft; j++) {
-      if (verdict[j] != LEFT_OUT || strcmp(text[i], text[j])) continue;
+      if (verdict[j] != LEFT_OUT || strcmp(text[i], text[j]))
+        continue;
       verdict[j] = NOT_OURS;
       others++;
     }
-    if (others) PetscCall(PetscSNPrintf(more, sizeof(more), " and %" PetscInt_FMT " more of it are", others));
-    PetscCall(SbWarning(PETSC_COMM_WORLD,
-                        "-%s%s unused in this run: the scenario file names the %s, this run does not",
-                        names[i], others ? more : " is", text[i]));
+    if (others)
+      PetscCall(PetscSNPrintf(more, sizeof(more), " and %" PetscInt_FMT " more of it are", others));
+    PetscCall(
+      SbWarning(PETSC_COMM_WORLD,
+                "-%s%s unused in this run: the scenario file names the %s, this run does not",
+                names[i], others ? more : " is", text[i]));
   }
   PetscCall(PetscFree2(verdict, text));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
@@ -321,8 +367,9 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
     if (!users ||
-        SbHasPrefix(names[i], "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
-                              "nox objects_dump options_left options_view saw_options x_virtual") ||
+        SbHasPrefix(names[i],
+                    "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
+                    "nox objects_dump options_left options_view saw_options x_virtual") ||
         class_of(names[i]) || SbOptionFind(&SbRunScope, names[i]))
       continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",

@@ -1,9 +1,9 @@
 /*
   option_read.c - conversion of option texts to checked values.
 
-  A number must be the whole text; it is compared with the interval of its row, "[a, b)", whose ends may be
-  inf. NaN is in no interval. The error message has the option, value, interval, unit and help text; advice
-  about an excluded end belongs to the help text of the row.
+  A number must be the whole text; it is compared with the interval of its row, "[a, b)", whose ends
+  may be inf. NaN is in no interval. The error message has the option, value, interval, unit and
+  help text; advice about an excluded end belongs to the help text of the row.
 */
 #include <ctype.h>
 #include "formula.h"
@@ -14,10 +14,13 @@ static PetscBool copy_trimmed(const char *begin, const char *end, size_t size, c
 {
   size_t n;
 
-  while (begin < end && isspace((unsigned char)*begin)) begin++;
-  while (end > begin && isspace((unsigned char)end[-1])) end--;
+  while (begin < end && isspace((unsigned char)*begin))
+    begin++;
+  while (end > begin && isspace((unsigned char)end[-1]))
+    end--;
   n = (size_t)(end - begin);
-  if (n >= size) return PETSC_FALSE;
+  if (n >= size)
+    return PETSC_FALSE;
   memcpy(text, begin, n);
   text[n] = 0;
   return PETSC_TRUE;
@@ -28,9 +31,12 @@ static PetscInt count_pieces(const char *text, char separator)
 {
   PetscInt n = 1;
 
-  while (isspace((unsigned char)*text)) text++;
-  if (!*text) return 0;
-  for (; *text; text++) n += *text == separator;
+  while (isspace((unsigned char)*text))
+    text++;
+  if (!*text)
+    return 0;
+  for (; *text; text++)
+    n += *text == separator;
   return n;
 }
 
@@ -40,7 +46,8 @@ static PetscBool next_piece(const char **text, char separator, size_t size, char
   const char *end = strchr(*text, separator);
   PetscBool fits;
 
-  if (!end) end = *text + strlen(*text);
+  if (!end)
+    end = *text + strlen(*text);
   fits = copy_trimmed(*text, end, size, piece);
   *text = *end ? end + 1 : end;
   return fits;
@@ -58,22 +65,26 @@ static PetscBool parse_real(const char *text, PetscReal *value)
 static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 {
   PetscBool in;
-  const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
+  const char *unit = r->row->unit;
+  const char *blank = unit[0] ? " " : "";
   char open, close;
   double lo, hi;
 
   PetscFunctionBeginUser;
-  /* whether x is in "[a, b)"; an empty range has all numbers but NaN; an invalid one is an internal error */
+
+  /* whether x is in "[a, b)"; an empty range has all numbers but NaN; an invalid one is an internal
+     error */
   in = (PetscBool)(x == x);
   if (r->row->range[0]) {
-    PetscCheck(sscanf(r->row->range, "%c%lf,%lf%c", &open, &lo, &hi, &close) == 4 && strchr("([", open) &&
-                 strchr(")]", close),
-               PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table",
-               r->row->range);
+    PetscCheck(sscanf(r->row->range, "%c%lf,%lf%c", &open, &lo, &hi, &close) == 4 &&
+                 strchr("([", open) && strchr(")]", close),
+               PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Unreadable range '%s' in a row of the option table", r->row->range);
     in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
   }
-  PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank,
-             unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
+  PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name,
+             r->text, blank, unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit,
+             r->row->help);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,17 +102,20 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   PetscCall(SbOptionNeed(scope, key, &row));
   PetscCall(SbOptionFindValue(scope, key, &where, &value, &given));
   PetscCall(SbOptionFindRecord(&where, row, &r));
-  PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
-             r->name, (int)row->kind, (int)kind);
+  PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "Option %s has kind %d, asked for as %d", r->name, (int)row->kind, (int)kind);
   r->given = given;
   range = (PetscBool)(row->range[0] == '(' || row->range[0] == '[');
-  SbFormat(sizeof(r->want), r->want, "%s%s%s%s", range || row->unit[0] ? " in " : "", range ? row->range : "",
-           range && row->unit[0] ? " " : "", row->unit);
-  if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
-  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value%s: %s%s", r->name, r->want,
-             row->help,
-             row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
-  if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
+  SbFormat(sizeof(r->want), r->want, "%s%s%s%s", range || row->unit[0] ? " in " : "",
+           range ? row->range : "", range && row->unit[0] ? " " : "", row->unit);
+  if (r->given && !value && row->kind == SB_OPTION_BOOL)
+    value = "true";
+  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value%s: %s%s",
+             r->name, r->want, row->help,
+             row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option"
+                                            : "");
+  if (!r->given && !row->preset)
+    PetscCall(SbOptionMissing(r));
   PetscCall(PetscFree(r->text));
   PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
   *record = r;
@@ -116,14 +130,17 @@ static PetscBool is_absent(const SbOptionRecord *r)
 
 PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value)
 {
-  static const char *const words[] = {"false", "true", "no", "yes", "off", "on", "0", "1", "n", "y"};
+  static const char *const words[] = {"false", "true", "no", "yes", "off",
+                                      "on",    "0",    "1",  "n",   "y"};
   const SbOptionRecord *r;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_BOOL, &r));
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(words); i++) {
-    if (strcasecmp(r->text, words[i])) continue;
+    if (strcasecmp(r->text, words[i]))
+      continue;
     *value = i % 2 ? PETSC_TRUE : PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -139,14 +156,15 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_INT, &r));
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
   n = strtoll(r->text, &end, 10);
-  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not an integer%s: %s",
-             r->name, r->text, r->want, r->row->help);
+  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s is not an integer%s: %s", r->name, r->text, r->want, r->row->help);
   PetscCall(check_range(r, (PetscReal)n));
   PetscCheck(n >= PETSC_MIN_INT && n <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT, r->name,
-             r->text, PETSC_MAX_INT);
+             "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT,
+             r->name, r->text, PETSC_MAX_INT);
   *value = (PetscInt)n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,9 +176,10 @@ PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *va
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_REAL, &r));
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a number%s: %s", r->name,
-             r->text, r->want, r->row->help);
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s is not a number%s: %s", r->name, r->text, r->want, r->row->help);
   PetscCall(check_range(r, x));
   *value = x;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,19 +193,22 @@ PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal va
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_REALS, &r));
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
   n = count_pieces(r->text, ',');
   PetscCheck(n == r->row->count, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s has %" PetscInt_FMT " number%s, needs %" PetscInt_FMT "%s with commas between them: %s",
+             "%s %s has %" PetscInt_FMT " number%s, needs %" PetscInt_FMT
+             "%s with commas between them: %s",
              r->name, r->text, n, n == 1 ? "" : "s", r->row->count, r->want, r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
     char piece[64];
     PetscReal x;
 
-    PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x), PETSC_COMM_SELF,
-               PETSC_ERR_USER, "%s %s: entry %" PetscInt_FMT " is not a number%s: %s", r->name, r->text,
-               i + 1, r->want, r->row->help);
+    PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x),
+               PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s %s: entry %" PetscInt_FMT " is not a number%s: %s", r->name, r->text, i + 1,
+               r->want, r->row->help);
     PetscCall(check_range(r, x));
     value[i] = x;
   }
@@ -199,12 +221,14 @@ PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_STRING, &r));
-  PetscCheck(copy_trimmed(r->text, r->text + strlen(r->text), size, value), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s is longer than %d characters: %s", r->name, (int)size - 1, r->row->help);
+  PetscCheck(copy_trimmed(r->text, r->text + strlen(r->text), size, value), PETSC_COMM_SELF,
+             PETSC_ERR_USER, "%s is longer than %d characters: %s", r->name, (int)size - 1,
+             r->row->help);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX])
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
+                             char (**names)[SB_NAME_MAX])
 {
   const SbOptionRecord *r;
   const char *text;
@@ -217,11 +241,12 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
   for (PetscInt i = 0; i < *n; i++) {
     char *name = (*names)[i];
 
-    if (next_piece(&text, ',', SB_NAME_MAX, name) && name[0]) continue;
+    if (next_piece(&text, ',', SB_NAME_MAX, name) && name[0])
+      continue;
     PetscCall(PetscFree(*names));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
-            "%s %s: name %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text,
-            i + 1, SB_NAME_MAX - 1, r->row->help);
+            "%s %s: name %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name,
+            r->text, i + 1, SB_NAME_MAX - 1, r->row->help);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -230,19 +255,22 @@ PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, void *choic
 {
   const SbOptionRecord *r;
   char **words, near[2 * SB_NAME_MAX];
-  int n, found = -1;
+  int n;
+  int found = -1;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_CHOICE, &r));
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrToArray(r->row->range, '|', &n, &words));
   for (int i = 0; i < n; i++)
-    if (!strcmp(words[i], r->text)) found = i;
+    if (!strcmp(words[i], r->text))
+      found = i;
   SbSuggestNames(r->text, n, (const char *const *)words, sizeof(near), near);
   PetscCall(PetscStrToArrayDestroy(n, words));
-  PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name,
-             r->text, r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "",
-             r->row->help);
+  PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s",
+             r->name, r->text, r->row->range, near[0] ? " (did you mean " : "", near,
+             near[0] ? "?)" : "", r->row->help);
   *(int *)choice = found;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -266,33 +294,39 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_FORMULA, &r));
   count = r->row->count;
-  for (PetscInt i = 0; i < count; i++) formulas[i] = NULL;
-  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < count; i++)
+    formulas[i] = NULL;
+  if (is_absent(r))
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (!strcmp(r->text, "live") && !strcmp(scope->klass, "effect")) {
     PetscCall(SbLiveCreate(r->name, r->row, formulas));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // formulas are separated by semicolons or by commas outside parentheses; replace those by semicolons
+
+  // formulas are separated by semicolons or by commas outside parentheses; replace those by
+  // semicolons
   if (count > 1 && !strchr(r->text, ';')) {
     int depth = 0;
 
     for (char *c = r->text; *c; c++) {
       depth += (*c == '(') - (*c == ')');
-      if (*c == ',' && !depth) *c = ';';
+      if (*c == ',' && !depth)
+        *c = ';';
     }
   }
   n = count_pieces(r->text, ';');
   PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n,
-             n == 1 ? "" : "s", count, count == 1 ? "" : " with semicolons or commas between them",
-             r->row->help);
+             "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name,
+             r->text, n, n == 1 ? "" : "s", count,
+             count == 1 ? "" : " with semicolons or commas between them", r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
     char piece[PETSC_MAX_PATH_LEN];
 
-    PetscCheck(next_piece(&text, ';', sizeof(piece), piece) && piece[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text,
-               i + 1, (int)sizeof(piece) - 1, r->row->help);
+    PetscCheck(next_piece(&text, ';', sizeof(piece), piece) && piece[0], PETSC_COMM_SELF,
+               PETSC_ERR_USER,
+               "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s",
+               r->name, r->text, i + 1, (int)sizeof(piece) - 1, r->row->help);
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, piece, r->name, &formulas[i]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -310,15 +344,24 @@ PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionNeed(scope, key, &row));
-  if (row->kind == SB_OPTION_BOOL) PetscCall(SbOptionBool(scope, key, &b));
-  if (row->kind == SB_OPTION_INT) PetscCall(SbOptionInt(scope, key, &n));
-  if (row->kind == SB_OPTION_REAL) PetscCall(SbOptionReal(scope, key, x));
-  if (row->kind == SB_OPTION_REALS) PetscCall(SbOptionReals(scope, key, x));
-  if (row->kind == SB_OPTION_STRING) PetscCall(SbOptionString(scope, key, sizeof(text), text));
-  if (row->kind == SB_OPTION_NAMES) PetscCall(SbOptionNames(scope, key, &n, &names));
-  if (row->kind == SB_OPTION_CHOICE) PetscCall(SbOptionChoice(scope, key, &choice));
-  if (row->kind == SB_OPTION_FORMULA) PetscCall(SbOptionFormulas(scope, key, f));
+  if (row->kind == SB_OPTION_BOOL)
+    PetscCall(SbOptionBool(scope, key, &b));
+  if (row->kind == SB_OPTION_INT)
+    PetscCall(SbOptionInt(scope, key, &n));
+  if (row->kind == SB_OPTION_REAL)
+    PetscCall(SbOptionReal(scope, key, x));
+  if (row->kind == SB_OPTION_REALS)
+    PetscCall(SbOptionReals(scope, key, x));
+  if (row->kind == SB_OPTION_STRING)
+    PetscCall(SbOptionString(scope, key, sizeof(text), text));
+  if (row->kind == SB_OPTION_NAMES)
+    PetscCall(SbOptionNames(scope, key, &n, &names));
+  if (row->kind == SB_OPTION_CHOICE)
+    PetscCall(SbOptionChoice(scope, key, &choice));
+  if (row->kind == SB_OPTION_FORMULA)
+    PetscCall(SbOptionFormulas(scope, key, f));
   PetscCall(PetscFree(names));
-  for (int i = 0; i < SB_OPTION_COUNT_MAX; i++) PetscCall(SbFormulaDestroy(&f[i]));
+  for (int i = 0; i < SB_OPTION_COUNT_MAX; i++)
+    PetscCall(SbFormulaDestroy(&f[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,11 @@
 /*
   option_view.c - writes the complete scenario as an option file that can be run.
 
-  Every value read so far, as the user's or the default text, without loss of digits; then the user's options
-  for PETSc. PETSc's file format cuts a line at '#', removes quotes around a value and has no escapes: a value
-  with a blank is quoted; one that begins with a minus sign and a letter is preceded by a blank, as names
-  begin so. A value with '#' or a quote can only be given on the command line, and the file says so.
+  Every value read so far, as the user's or the default text, without loss of digits; then the
+  user's options for PETSc. PETSc's file format cuts a line at '#', removes quotes around a value
+  and has no escapes: a value with a blank is quoted; one that begins with a minus sign and a letter
+  is preceded by a blank, as names begin so. A value with '#' or a quote can only be given on the
+  command line, and the file says so.
 */
 #include <ctype.h>
 #include <errno.h>
@@ -22,12 +23,14 @@ static PetscErrorCode print_value(PetscViewer viewer, const char *value, int wid
   char text[PETSC_MAX_PATH_LEN + 4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s%s%s%s", quote, name_like ? " " : "", value, quote));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), "%s%s%s%s", quote, name_like ? " " : "", value, quote));
   PetscCall(PetscViewerASCIIPrintf(viewer, " %-*s", width, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, PetscBool with_presets)
+static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r,
+                                   PetscBool with_presets)
 {
   const SbOption *row = r->row;
   const char *mark = strpbrk(r->text, "#\"")
@@ -38,9 +41,10 @@ static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, 
   PetscFunctionBeginUser;
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s%s", mark, r->name));
   PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - (int)strlen(r->name))));
-  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%s%s%s%s%s%s\n", r->given ? "" : "default; ", row->help,
-                                   row->unit[0] ? ", " : "", row->unit, row->range[0] ? ", " : "",
-                                   row->range[0] == '[' || row->range[0] == '(' ? "in " : "", row->range));
+  PetscCall(
+    PetscViewerASCIIPrintf(viewer, " # %s%s%s%s%s%s%s\n", r->given ? "" : "default; ", row->help,
+                           row->unit[0] ? ", " : "", row->unit, row->range[0] ? ", " : "",
+                           row->range[0] == '[' || row->range[0] == '(' ? "in " : "", row->range));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,7 +57,8 @@ static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
 PetscErrorCode SbOptionsView(PetscViewer viewer)
 {
   const PetscBool with_presets = (PetscBool)(SbTheOptions.nrecord < LINES_MAX);
-  const SbOptionRecord *records = SbTheOptions.record, *end = records + SbTheOptions.nrecord;
+  const SbOptionRecord *records = SbTheOptions.record;
+  const SbOptionRecord *end = records + SbTheOptions.nrecord;
   char folder[PETSC_MAX_PATH_LEN];
   PetscInt n = SbTheOptions.nuser;
   SbOptionUser *users = SbTheOptions.user;
@@ -61,14 +66,15 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
 
   PetscFunctionBeginUser;
   PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
-  PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "# The complete scenario, written by supple %s; it runs again with\n"
-                                   "#   supple THIS_FILE\n"
-                                   "# from this folder, where relative file names begin: %s\n",
-                                   SB_VERSION, folder));
+  PetscCall(
+    PetscViewerASCIIPrintf(viewer,
+                           "# The complete scenario, written by supple %s; it runs again with\n"
+                           "#   supple THIS_FILE\n"
+                           "# from this folder, where relative file names begin: %s\n",
+                           SB_VERSION, folder));
   if (!with_presets)
-    PetscCall(
-      PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
 
   /* program-wide records in the order of the manual, independent of the order of reading */
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
@@ -76,33 +82,44 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
     for (const SbOptionRecord *r = records; r < end; r++)
       if (!r->scope.klass[0] && r->row == SbTheOptions.row[i].row)
         PetscCall(print_record(viewer, r, with_presets));
+
   /* all records of one instance under one headline */
   for (const SbOptionRecord *first = records; first < end; first++) {
     PetscBool seen = (PetscBool)!first->scope.klass[0];
 
-    for (const SbOptionRecord *r = records; r < first && !seen; r++) seen = same_instance(first, r);
-    if (seen) continue;
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
+    for (const SbOptionRecord *r = records; r < first && !seen; r++)
+      seen = same_instance(first, r);
+    if (seen)
+      continue;
+    PetscCall(
+      PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
     for (const SbOptionRecord *r = first; r < end; r++)
-      if (same_instance(r, first)) PetscCall(print_record(viewer, r, with_presets));
+      if (same_instance(r, first))
+        PetscCall(print_record(viewer, r, with_presets));
   }
+
   /* the user's options of PETSc */
-  if (!SbTheOptions.remembered) PetscCall(SbOptionUsersGet(&n, &users));
+  if (!SbTheOptions.remembered)
+    PetscCall(SbOptionUsersGet(&n, &users));
   for (PetscInt i = 0; i < n; i++) {
     const char *value = users[i].value;
     PetscBool ours = PETSC_FALSE;
 
     for (const SbOptionRecord *r = records; r < end && !ours; r++)
       ours = (PetscBool)!strcasecmp(r->name + 1, users[i].name);
-    if (ours) continue;
-    if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
+    if (ours)
+      continue;
+    if (!any)
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
     any = PETSC_TRUE;
-    PetscCall(
-      PetscViewerASCIIPrintf(viewer, "%s-%s", value && strpbrk(value, "#\"") ? "# " : "", users[i].name));
-    if (value) PetscCall(print_value(viewer, value, 0));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s-%s", value && strpbrk(value, "#\"") ? "# " : "",
+                                     users[i].name));
+    if (value)
+      PetscCall(print_value(viewer, value, 0));
     PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
   }
-  if (!SbTheOptions.remembered) PetscCall(SbOptionUsersFree(&n, &users));
+  if (!SbTheOptions.remembered)
+    PetscCall(SbOptionUsersFree(&n, &users));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,6 +133,7 @@ PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer
     PetscCall(PetscViewerASCIIOpen(comm, "stdout", viewer));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   /* only rank 0 opens the file; a failure is broadcast, to avoid a deadlock */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
@@ -127,7 +145,8 @@ PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer
       error = errno;
   }
   PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s: %s", file, strerror(error));
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s: %s", file,
+             strerror(error));
   PetscCall(PetscViewerASCIIOpen(comm, file, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,13 +1,14 @@
 /*
-  quadratic_map.c - P2 tet with ten nodes: basis, map, quadrature rules with positive weights on tet and
-  facets.
+  quadratic_map.c - P2 tet with ten nodes: basis, map, quadrature rules with positive weights on tet
+  and facets.
 
-  A tet with curved edges is x = sum_a phi_a(l) x_a. Its derivatives at the barycentric coordinates l are
-  those of the P1 tet with the corners x_i' = (4 l_i - 1) x_i + sum_j 4 l_j x_ij, which thus has the gradients
-  and the volume element (volume times weight) at that point. A constant stress is in equilibrium if the rule
-  integrates grad phi_a det dx/dl, a polynomial of degree 3, exactly; the mean of grad phi_a det F det dx/dl
-  and the mass matrix of linear fields require degree 5: 14 points with positive weights (Walkington 2000),
-  which leave no zero-energy modes and no massless modes.
+  A tet with curved edges is x = sum_a phi_a(l) x_a. Its derivatives at the barycentric coordinates
+  l are those of the P1 tet with the corners x_i' = (4 l_i - 1) x_i + sum_j 4 l_j x_ij, which thus
+  has the gradients and the volume element (volume times weight) at that point. A constant stress is
+  in equilibrium if the rule integrates grad phi_a det dx/dl, a polynomial of degree 3, exactly; the
+  mean of grad phi_a det F det dx/dl and the mass matrix of linear fields require degree 5: 14
+  points with positive weights (Walkington 2000), which leave no zero-energy modes and no massless
+  modes.
 */
 #include "sbquadratic.h"
 
@@ -50,15 +51,20 @@ const SbPointRule SbRuleFacet = {7,
 
 void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
 {
-  for (int a = 0; a < 4; a++) phi[a] = L[a] * (2 * L[a] - 1);
-  for (int e = 0; e < 6; e++) phi[4 + e] = 4 * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
+  for (int a = 0; a < 4; a++)
+    phi[a] = L[a] * (2 * L[a] - 1);
+  for (int e = 0; e < 6; e++)
+    phi[4 + e] = 4 * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
 }
 
-void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3], PetscReal corner[4][3])
+void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3],
+                        PetscReal corner[4][3])
 {
-  for (int k = 0; k < 12; k++) corner[k / 3][k % 3] = (4 * L[k / 3] - 1) * x[k / 3][k % 3];
+  for (int k = 0; k < 12; k++)
+    corner[k / 3][k % 3] = (4 * L[k / 3] - 1) * x[k / 3][k % 3];
   for (int k = 0; k < 18; k++) {
-    const int i = SbTetEdge[k / 3][0], j = SbTetEdge[k / 3][1];
+    const int i = SbTetEdge[k / 3][0];
+    const int j = SbTetEdge[k / 3][1];
 
     corner[i][k % 3] += 4 * L[j] * x[4 + k / 3][k % 3];
     corner[j][k % 3] += 4 * L[i] * x[4 + k / 3][k % 3];

@@ -1,8 +1,9 @@
 /*
   suggest_name.c - names similar to a misspelt one.
 
-  Distance between words: optimal string alignment (Levenshtein's distance, in which a transposition of
-  neighbours is one edit; Damerau, Communications of the ACM 7, 1964). Case-insensitive, as in PETSc.
+  Distance between words: optimal string alignment (Levenshtein's distance, in which a transposition
+  of neighbours is one edit; Damerau, Communications of the ACM 7, 1964). Case-insensitive, as in
+  PETSc.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -11,11 +12,15 @@
 static PetscInt edit_distance(const char *a, const char *b)
 {
   PetscInt row[3][SB_OPTION_NAME_MAX + 1];
-  const size_t na = PetscMin(strlen(a), SB_OPTION_NAME_MAX), nb = PetscMin(strlen(b), SB_OPTION_NAME_MAX);
+  const size_t na = PetscMin(strlen(a), SB_OPTION_NAME_MAX);
+  const size_t nb = PetscMin(strlen(b), SB_OPTION_NAME_MAX);
 
-  for (size_t j = 0; j <= nb; j++) row[0][j] = (PetscInt)j;
+  for (size_t j = 0; j <= nb; j++)
+    row[0][j] = (PetscInt)j;
   for (size_t i = 1; i <= na; i++) {
-    PetscInt *now = row[i % 3], *before = row[(i + 2) % 3], *older = row[(i + 1) % 3];
+    PetscInt *now = row[i % 3];
+    PetscInt *before = row[(i + 2) % 3];
+    PetscInt *older = row[(i + 1) % 3];
 
     now[0] = (PetscInt)i;
     for (size_t j = 1; j <= nb; j++) {
@@ -29,33 +34,43 @@ static PetscInt edit_distance(const char *a, const char *b)
   return row[na % 3][nb];
 }
 
-void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
+void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+                    char text[])
 {
   const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* largest edit distance of a similar name */
-  PetscInt best = farthest + 1, nbest = 0;
+  PetscInt best = farthest + 1;
+  PetscInt nbest = 0;
 
   text[0] = 0;
   for (PetscInt i = 0; i < n; i++)
-    if (names[i]) best = PetscMin(best, edit_distance(word, names[i]));
-  if (best > farthest) return;
+    if (names[i])
+      best = PetscMin(best, edit_distance(word, names[i]));
+  if (best > farthest)
+    return;
   for (PetscInt i = 0; i < n && nbest < 3; i++) {
     PetscBool again = PETSC_FALSE;
 
-    if (!names[i] || edit_distance(word, names[i]) != best) continue;
-    for (PetscInt j = 0; j < i && !again; j++) again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
-    if (again) continue;
+    if (!names[i] || edit_distance(word, names[i]) != best)
+      continue;
+    for (PetscInt j = 0; j < i && !again; j++)
+      again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
+    if (again)
+      continue;
     SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
   }
 }
 
-void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
+void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
+                   char text[])
 {
   char near[256];
 
   text[0] = 0;
-  for (PetscInt i = 0; i < n; i++) SbAppend(size, text, "%s%s", i ? ", " : "", names[i]);
+  for (PetscInt i = 0; i < n; i++)
+    SbAppend(size, text, "%s%s", i ? ", " : "", names[i]);
   SbSuggestNames(word, n, names, sizeof(near), near);
-  if (near[0]) SbAppend(size, text, "; did you mean %s?", near);
+  if (near[0])
+    SbAppend(size, text, "; did you mean %s?", near);
 }
 
 static int compare_texts(const void *a, const void *b)
@@ -70,7 +85,8 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &names, &n));
-  while (n && !names[n - 1]) n--; /* PETSc 3.18 counts the terminating NULL */
+  while (n && !names[n - 1])
+    n--; /* PETSc 3.18 counts the terminating NULL */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
   SbSuggestName(word, n, names, size, text);
   PetscCall(PetscFree(names));
@@ -83,7 +99,8 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings)
 
   for (const char *p = beginnings; *p; p += n + strspn(p + n, " ")) {
     n = strcspn(p, " ");
-    if (!strncasecmp(word, p, n)) return PETSC_TRUE;
+    if (!strncasecmp(word, p, n))
+      return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }

@@ -33,10 +33,13 @@ int SbParseNumbers(const char *text, int most, PetscReal p[])
     char *end;
     const double value = strtod(text, &end);
 
-    if (end == text || n == most || !isfinite(value)) return -1;
+    if (end == text || n == most || !isfinite(value))
+      return -1;
     p[n++] = (PetscReal)value;
-    if (!*end) return n;
-    if (*end != ',') return -1;
+    if (!*end)
+      return n;
+    if (*end != ',')
+      return -1;
     text = end + 1;
   }
 }

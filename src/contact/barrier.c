@@ -1,17 +1,18 @@
 /*
   barrier.c - the barrier potential of a contact pair and its derivatives.
 
-  The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential contact",
-  ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
+  The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential
+  contact", ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
 
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),
     b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
-  Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is multiplied
-  by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5); vertex-triangle pairs
-  supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a| |b| ((d + r)^2 - r^2), with the
-  radius r of an obstacle: crossing edges have their ends farther apart than the gap d, so vertex-triangle
-  pairs are inactive; without it gaps fell to 1e-9 m, with tiny Newton steps (docs/reports/contact.md).
+  Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is
+  multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5);
+  vertex-triangle pairs supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a|
+  |b| ((d + r)^2 - r^2), with the radius r of an obstacle: crossing edges have their ends farther
+  apart than the gap d, so vertex-triangle pairs are inactive; without it gaps fell to 1e-9 m, with
+  tiny Newton steps (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
 
@@ -23,7 +24,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   const PetscReal s = d / w;
 
   b[0] = b[1] = b[2] = 0.;
-  if (s >= 1.) return;
+  if (s >= 1.)
+    return;
   if (s <= 0.) {
     b[0] = PETSC_INFINITY;
     return;
@@ -33,19 +35,24 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   b[2] = k * area / w * (-2. * PetscLogReal(s) - 2. * (s - 1.) / s - (s * s - 1.) / (s * s));
 }
 
-/* The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f =
-   (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1. */
+/* The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its
+   derivatives: f = (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1. */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
-  const PetscReal square = d * (d + 2. * r), near = NEAR * PetscSqrtReal(rest) * square,
-                  slope = 2. * (d + r) / square, e = PetscMin(MOLLIFIED * rest, near), y = c / e;
+  const PetscReal square = d * (d + 2. * r);
+  const PetscReal near = NEAR * PetscSqrtReal(rest) * square;
+  const PetscReal slope = 2. * (d + r) / square;
+  const PetscReal e = PetscMin(MOLLIFIED * rest, near);
+  const PetscReal y = c / e;
 
-  if (y >= 1.) return;
+  if (y >= 1.)
+    return;
   f[0] = (2. - y) * y;
   f[1] = f[3] = f[4] = 0.;
   f[2] = 2. * (1. - y) / e;
   f[5] = -2. / (e * e);
-  if (e < near) return;
+  if (e < near)
+    return;
   f[1] = -2. * y * (1. - y) * slope;
   f[3] = y * (4. * (1. - y) * (slope * slope - 1. / square) - 2. * y * slope * slope);
   f[4] = -2. * (1. - 2. * y) * slope / e;
@@ -55,7 +62,8 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
                    PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
 {
-  PetscReal b[3], at[12], across[12], C[144], f[6] = {1.};
+  PetscReal b[3], at[12], across[12], C[144];
+  PetscReal f[6] = {1.};
 
   SbBarrier(gap, width, pressure, pair->area, b);
   for (int k = 0; k < 12; k++) {
@@ -73,7 +81,8 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
           H[12 * i + j] -= b[1] / (m->radius - gap) * ((i == j) - g->n[i] * g->n[j]);
       }
     }
-    for (int k = 0; k < 12; k++) gradient[k] *= b[1];
+    for (int k = 0; k < 12; k++)
+      gradient[k] *= b[1];
     return;
   }
 
@@ -81,25 +90,31 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
   if (pair->kind == SB_PAIR_EDGE_EDGE) {
     PetscReal rest = 1.;
 
-    for (int k = 0; k < 4; k += 2) rest *= SbDistance2(m->X + 3 * pair->v[k], m->X + 3 * pair->v[k + 1]);
+    for (int k = 0; k < 4; k += 2)
+      rest *= SbDistance2(m->X + 3 * pair->v[k], m->X + 3 * pair->v[k + 1]);
     mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, g->d - gap, f);
   }
   *energy = f[0] * b[0];
 
-  /* E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd) of E(d, c), or its positive part */
+  /* E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd) of E(d, c), or its positive
+     part */
   if (H) {
-    const PetscReal factor[2] = {f[0] * b[2] + 2. * f[1] * b[1] + f[3] * b[0], f[0] * b[1] + f[1] * b[0]};
+    const PetscReal factor[2] = {f[0] * b[2] + 2. * f[1] * b[1] + f[3] * b[0],
+                                 f[0] * b[1] + f[1] * b[0]};
 
     SbDistanceHessian(at, g, factor, (PetscBool)(clamp && f[0] == 1.), H);
     if (f[0] < 1.) {
       for (int i = 0; i < 12; i++) {
         for (int j = 0; j < 12; j++)
-          H[12 * i + j] += b[0] * (f[5] * across[i] * across[j] + f[2] * C[12 * i + j]) +
-                           (f[2] * b[1] + f[4] * b[0]) * (across[i] * gradient[j] + gradient[i] * across[j]);
+          H[12 * i + j] +=
+            b[0] * (f[5] * across[i] * across[j] + f[2] * C[12 * i + j]) +
+            (f[2] * b[1] + f[4] * b[0]) * (across[i] * gradient[j] + gradient[i] * across[j]);
       }
-      if (clamp) SbSymmetricProjectPSD(12, H);
+      if (clamp)
+        SbSymmetricProjectPSD(12, H);
     }
   }
   for (int k = 0; k < 12; k++)
-    gradient[k] = (f[0] * b[1] + f[1] * b[0]) * gradient[k] + (f[0] < 1. ? f[2] * b[0] * across[k] : 0.);
+    gradient[k] =
+      (f[0] * b[1] + f[1] * b[0]) * gradient[k] + (f[0] < 1. ? f[2] * b[0] * across[k] : 0.);
 }

@@ -1,19 +1,22 @@
 /*
-  contact_blocks.c - the Hessian of contact, summed over pairs of vertices, then assembled at the nodes.
+  contact_blocks.c - the Hessian of contact, summed over pairs of vertices, then assembled at the
+  nodes.
 
-  A vertex of the surface is at x_v = X_v + sum_j w_vj u_j, so the derivative by the nodes is S^T H S with S =
-  (w_vj). H is summed first, in blocks of two vertices: pairs of features share them, and a vertex of CR and
-  DG has some twenty nodes. Then the rows of T = H S, and of S^T T, are formed, each column once.
+  A vertex of the surface is at x_v = X_v + sum_j w_vj u_j, so the derivative by the nodes is S^T H
+  S with S = (w_vj). H is summed first, in blocks of two vertices: pairs of features share them, and
+  a vertex of CR and DG has some twenty nodes. Then the rows of T = H S, and of S^T T, are formed,
+  each column once.
 
-  Sums run in the order of pairs of features and of vertices, which does not depend on the partition.
+  Sums run in the order of pairs of features and of vertices, which does not depend on the
+  partition.
 */
 #include "sbbarrier.h"
 
 /* Slot of the vertex pair in the hash table: where it is, or the free one where it belongs. */
 static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt w)
 {
-  PetscInt at =
-    (PetscInt)((0x9e3779b97f4a7c15ULL * (((uint64_t)v << 32) ^ (uint64_t)w)) >> 32) & (b->nslot - 1);
+  PetscInt at = (PetscInt)((0x9e3779b97f4a7c15ULL * (((uint64_t)v << 32) ^ (uint64_t)w)) >> 32) &
+                (b->nslot - 1);
 
   while (b->slot[at] >= 0 && (b->block[b->slot[at]].v[0] != v || b->block[b->slot[at]].v[1] != w))
     at = (at + 1) & (b->nslot - 1);
@@ -23,18 +26,22 @@ static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt 
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, const PetscReal H[],
                                   PetscInt ld)
 {
-  const PetscInt low = PetscMin(v, w), high = PetscMax(v, w);
+  const PetscInt low = PetscMin(v, w);
+  const PetscInt high = PetscMax(v, w);
   PetscReal *to;
   PetscInt at;
 
   PetscFunctionBeginUser;
+
   /* room for one more, the table at most half full */
   if (b->n == b->size) {
     PetscCall(SbReserve(b->n + 1, sizeof(*b->block), &b->size, &b->block));
     b->nslot = 2 * b->size;
     PetscCall(PetscRealloc((size_t)b->nslot * sizeof(*b->slot), &b->slot));
-    for (PetscInt k = 0; k < b->nslot; k++) b->slot[k] = -1;
-    for (PetscInt k = 0; k < b->n; k++) b->slot[find_slot(b, b->block[k].v[0], b->block[k].v[1])] = k;
+    for (PetscInt k = 0; k < b->nslot; k++)
+      b->slot[k] = -1;
+    for (PetscInt k = 0; k < b->n; k++)
+      b->slot[find_slot(b, b->block[k].v[0], b->block[k].v[1])] = k;
   }
   at = find_slot(b, low, high);
   if (b->slot[at] < 0) {
@@ -43,7 +50,8 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, co
   }
   to = b->block[b->slot[at]].H;
   for (int p = 0; p < 3; p++)
-    for (int q = 0; q < 3; q++) to[3 * p + q] += v <= w ? H[ld * p + q] : H[ld * q + p];
+    for (int q = 0; q < 3; q++)
+      to[3 * p + q] += v <= w ? H[ld * p + q] : H[ld * q + p];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,18 +59,23 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlo
 {
   const SbSpace s = m->space;
   const PetscInt nv = m->nbody_vertex;
-  PetscInt *row_of, *first, *entry, *begin, *holder, *at, *start, *key, *vertex, n = 0, size = 0;
+  PetscInt *row_of, *first, *entry, *begin, *holder, *at, *start, *key, *vertex;
+  PetscInt n = 0;
+  PetscInt size = 0;
   struct {
     PetscInt column;
     PetscReal H[9];
   } *T = NULL;
 
   PetscFunctionBeginUser;
-  if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!b->n)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* blocks by their rows, of vertices that have nodes here: twice the number, odd for the transpose */
+  /* blocks by their rows, of vertices that have nodes here: twice the number, odd for the
+     transpose */
   PetscCall(PetscCalloc1(s->Nnode, &at));
-  PetscCall(PetscMalloc4(2 * b->n, &row_of, nv + 1, &start, m->start[nv], &key, m->start[nv], &vertex));
+  PetscCall(
+    PetscMalloc4(2 * b->n, &row_of, nv + 1, &start, m->start[nv], &key, m->start[nv], &vertex));
   for (PetscInt k = 0; k < 2 * b->n; k++) {
     const PetscInt *v = b->block[k / 2].v;
 
@@ -81,11 +94,13 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlo
       for (PetscInt j = m->start[w]; j < m->start[w + 1]; j++) {
         const PetscInt g = m->gnode[j];
 
-        if (m->fixed[j] == 7) continue;
+        if (m->fixed[j] == 7)
+          continue;
         if (at[g] < start[v] || at[g] >= n || T[at[g]].column != g) {
           at[g] = n;
           T[n].column = g;
-          for (int e = 0; e < 9; e++) T[n].H[e] = 0.;
+          for (int e = 0; e < 9; e++)
+            T[n].H[e] = 0.;
           n++;
         }
         for (int e = 0; e < 9; e++)
@@ -112,9 +127,11 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlo
 
     for (PetscInt h = begin[i]; h < begin[i + 1]; h++)
       most += start[vertex[holder[h]] + 1] - start[vertex[holder[h]]];
-    if (most) PetscCall(SbReserve(to->n + most, sizeof(*to->block), &to->size, &to->block));
+    if (most)
+      PetscCall(SbReserve(to->n + most, sizeof(*to->block), &to->size, &to->block));
     for (PetscInt h = begin[i]; h < begin[i + 1]; h++) {
-      const PetscInt j = holder[h], v = vertex[j];
+      const PetscInt j = holder[h];
+      const PetscInt v = vertex[j];
 
       for (PetscInt k = start[v]; k < start[v + 1]; k++) {
         const PetscInt g = T[k].column;
@@ -125,7 +142,8 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlo
           to->block[to->n++] = (SbBlock){.v = {i, g}};
         }
         sum = to->block[at[g]].H;
-        for (int e = 0; e < 9; e++) sum[e] += (m->fixed[j] >> (e / 3) & 1 ? 0. : m->weight[j]) * T[k].H[e];
+        for (int e = 0; e < 9; e++)
+          sum[e] += (m->fixed[j] >> (e / 3) & 1 ? 0. : m->weight[j]) * T[k].H[e];
       }
     }
   }
@@ -137,6 +155,7 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlo
   PetscCall(PetscFree(first));
   PetscCall(PetscFree(entry));
   b->n = 0;
-  for (PetscInt k = 0; k < b->nslot; k++) b->slot[k] = -1;
+  for (PetscInt k = 0; k < b->nslot; k++)
+    b->slot[k] = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,7 +6,8 @@
 #include "sbtriangles.h"
 
 /* Area of a triangle of the vertices v; n[3], its normal, twice as long. */
-static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscInt v[3], PetscReal n[3])
+static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscInt v[3],
+                                              PetscReal n[3])
 {
   PetscReal a[3], b[3];
 
@@ -16,13 +17,21 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
 
-typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
+typedef enum {
+  PLANE,
+  SPHERE,
+  BOX,
+  CAPSULE,
+  CYLINDER,
+  BOWL,
+  MESH
+} Shape;
 struct _p_SbObstacle {
   Shape shape;
   PetscReal p[7];                      /* its numbers */
   char option[3 * SB_NAME_MAX], *file; /* full name of it; mesh: its path */
-  /* at rest, of a mesh after SbObstacleSetUp(); without triangles one vertex (sphere) or an edge of two
-     (capsule), with a radius */
+  /* at rest, of a mesh after SbObstacleSetUp(); without triangles one vertex (sphere) or an edge of
+     two (capsule), with a radius */
   SbTriangles surface;
   SbSignedDistance distance; /* mesh: of the surface */
 };

@@ -1,10 +1,10 @@
 /*
   obstacle.c - rigid obstacles by their signed distance.
 
-  Each shape is a rounded primitive, a core with a radius: distance = |x - nearest point of the core| - r, the
-  core being a point (sphere), a segment (capsule), a solid box or a solid cylinder (r = 0; inside them the
-  nearest side counts). A bowl is a sphere inverted. What a closed mesh encloses is in
-  src/geometry/signed_distance.c.
+  Each shape is a rounded primitive, a core with a radius: distance = |x - nearest point of the
+  core| - r, the core being a point (sphere), a segment (capsule), a solid box or a solid cylinder
+  (r = 0; inside them the nearest side counts). A bowl is a sphere inverted. What a closed mesh
+  encloses is in src/geometry/signed_distance.c.
 */
 #include "contact_mesh.h"
 
@@ -29,7 +29,8 @@ static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal 
 {
   const PetscReal length = PetscSqrtReal(SbDot3(v, v));
 
-  for (int i = 0; i < 3; i++) n[i] = length > 0 ? v[i] / length : other[i];
+  for (int i = 0; i < 3; i++)
+    n[i] = length > 0 ? v[i] / length : other[i];
   return length;
 }
 
@@ -50,25 +51,31 @@ static const char *normalise(SbObstacle o)
 
   switch (o->shape) {
   case PLANE:
-    if (length <= 0) return "the normal 0,0,0 has no direction";
-    for (int i = 0; i < 4; i++) o->p[i] /= length;
+    if (length <= 0)
+      return "the normal 0,0,0 has no direction";
+    for (int i = 0; i < 4; i++)
+      o->p[i] /= length;
     return NULL;
   case SPHERE:
   case BOWL:
     return o->p[3] > 0 ? NULL : "the radius must be positive";
   case BOX:
     for (int i = 0; i < 3; i++)
-      if (o->p[i] >= o->p[3 + i]) return "the first corner must be the lower one in x, y and z";
+      if (o->p[i] >= o->p[3 + i])
+        return "the first corner must be the lower one in x, y and z";
     return NULL;
   default:
-    if (o->p[6] <= 0) return "the radius must be positive";
+    if (o->p[6] <= 0)
+      return "the radius must be positive";
     for (int i = 0; i < 3; i++)
-      if (o->p[i] != o->p[3 + i]) return NULL;
+      if (o->p[i] != o->p[3 + i])
+        return NULL;
     return "its two ends are one point";
   }
 }
 
-/* Vertices and triangles of a shape: a plane has a point and the tip of its normal, a sphere the centre. */
+/* Vertices and triangles of a shape: a plane has a point and the tip of its normal, a sphere the
+   centre. */
 static PetscErrorCode make_surface(SbObstacle o)
 {
   static const PetscInt box[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
@@ -83,14 +90,17 @@ static PetscErrorCode make_surface(SbObstacle o)
   PetscCall(PetscMalloc1(3 * s->nvert, &s->x));
   PetscCall(PetscMalloc1(3 * s->ntri, &s->tri));
   for (PetscInt k = 0; k < 3 * s->nvert && o->shape != CYLINDER; k++) {
-    const PetscInt v = k / 3, i = k % 3;
+    const PetscInt v = k / 3;
+    const PetscInt i = k % 3;
 
     s->x[k] = o->shape == BOX     ? p[3 * ((v >> i) & 1) + i]
               : o->shape == PLANE ? (p[3] + (PetscReal)v) * p[i]
                                   : p[k];
   }
-  if (o->shape == BOX) PetscCall(PetscArraycpy(s->tri, box, 36));
-  if (o->shape != CYLINDER) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->shape == BOX)
+    PetscCall(PetscArraycpy(s->tri, box, 36));
+  if (o->shape != CYLINDER)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* a closed cylinder: fans at both ends, a band between them; its vertices lie on it */
   SbSubtract(p + 3, p, a);
@@ -103,7 +113,8 @@ static PetscErrorCode make_surface(SbObstacle o)
     s->x[k] = p[3 * (k / (3 * SIDES)) + k % 3] +
               p[6] * (PetscCosReal(angle) * e[k % 3] + PetscSinReal(angle) * f[k % 3]);
   }
-  for (int i = 0; i < 6; i++) s->x[6 * SIDES + i] = p[i];
+  for (int i = 0; i < 6; i++)
+    s->x[6 * SIDES + i] = p[i];
   for (PetscInt k = 0; k < SIDES; k++) {
     const PetscInt l = (k + 1) % SIDES;
     const PetscInt t[12] = {k, l, SIDES + l,     k,         SIDES + l, SIDES + k, 2 * SIDES,
@@ -116,7 +127,8 @@ static PetscErrorCode make_surface(SbObstacle o)
 
 PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle)
 {
-  const char *colon = strchr(text, ':'), *problem;
+  const char *colon = strchr(text, ':');
+  const char *problem;
   SbObstacle o;
   size_t k = 0;
 
@@ -124,10 +136,11 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   while (k < PETSC_STATIC_ARRAY_LENGTH(shapes) &&
          (!colon || strncmp(shapes[k].form, text, (size_t)(colon - text) + 1)))
     k++;
-  PetscCheck(k < PETSC_STATIC_ARRAY_LENGTH(shapes), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:..., "
-             "mesh:FILE",
-             option, text);
+  PetscCheck(
+    k < PETSC_STATIC_ARRAY_LENGTH(shapes), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:..., "
+    "mesh:FILE",
+    option, text);
   PetscCall(PetscNew(&o));
   *obstacle = o;
   o->shape = (Shape)k;
@@ -138,8 +151,8 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
     PetscCall(PetscStrallocpy(colon + 1, &o->file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCheck(SbParseNumbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s %s: write %s, lengths in m", option, text, shapes[k].form);
+  PetscCheck(SbParseNumbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF,
+             PETSC_ERR_USER_INPUT, "%s %s: write %s, lengths in m", option, text, shapes[k].form);
   problem = normalise(o);
   PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: %s", option, text, problem);
   PetscCall(make_surface(o));
@@ -153,22 +166,26 @@ PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, PetscReal scale, con
   PetscReal length = 0.;
 
   PetscFunctionBeginUser;
-  if (o->shape != MESH) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->shape != MESH)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbTrianglesRead(comm, o->option, o->file, scale, at, t));
   PetscCall(SbSignedDistanceCreate(t->nvert, t->x, t->ntri, t->tri, t->across, &o->distance));
-  SbAppend(size, note, "%s%s: %" PetscInt_FMT " triangles around %.4g m^3%s", note[0] ? "; " : "", o->file,
-           t->ntri, (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
-  for (PetscInt i = 0; i < 3 * t->nvert; i++) length = PetscMax(length, t->x[i] - t->x[i % 3]);
+  SbAppend(size, note, "%s%s: %" PetscInt_FMT " triangles around %.4g m^3%s", note[0] ? "; " : "",
+           o->file, t->ntri, (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
+  for (PetscInt i = 0; i < 3 * t->nvert; i++)
+    length = PetscMax(length, t->x[i] - t->x[i % 3]);
   if (length > LARGE && scale == 1.)
-    PetscCall(SbWarning(comm, "%s: %s is more than %.3g m long: if the file is in mm, give %s_scale 0.001",
-                        o->option, o->file, (double)length, o->option));
+    PetscCall(
+      SbWarning(comm, "%s: %s is more than %.3g m long: if the file is in mm, give %s_scale 0.001",
+                o->option, o->file, (double)length, o->option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
 {
   PetscFunctionBeginUser;
-  if (!*obstacle) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*obstacle)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*obstacle)->file));
   PetscCall(SbSignedDistanceDestroy(&(*obstacle)->distance));
   PetscCall(SbTrianglesDestroy(&(*obstacle)->surface));
@@ -178,26 +195,32 @@ PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
 
 static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal n[3])
 {
-  PetscReal v[3], depth = PETSC_MAX_REAL;
+  PetscReal v[3];
+  PetscReal depth = PETSC_MAX_REAL;
   PetscBool inside = PETSC_TRUE;
 
   for (int i = 0; i < 3; i++) {
     v[i] = x[i] < p[i] ? x[i] - p[i] : x[i] > p[3 + i] ? x[i] - p[3 + i] : 0;
-    if (v[i] != 0) inside = PETSC_FALSE;
+    if (v[i] != 0)
+      inside = PETSC_FALSE;
   }
-  if (!inside) return unit(v, v, n);
+  if (!inside)
+    return unit(v, v, n);
   for (int side = 0; side < 6; side++) {
     const int i = side % 3;
     const PetscReal d = side < 3 ? x[i] - p[i] : p[3 + i] - x[i];
 
-    if (d >= depth) continue;
+    if (d >= depth)
+      continue;
     depth = d;
-    for (int k = 0; k < 3; k++) n[k] = k == i ? (side < 3 ? -1 : 1) : 0;
+    for (int k = 0; k < 3; k++)
+      n[k] = k == i ? (side < 3 ? -1 : 1) : 0;
   }
   return -depth;
 }
 
-/* Coordinate s along the axis (m from the first end), distance, unit vectors along and away from it. */
+/* Coordinate s along the axis (m from the first end), distance, unit vectors along and away from
+   it. */
 static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s, PetscReal *length,
                        PetscReal a[3], PetscReal away[3])
 {
@@ -207,7 +230,8 @@ static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s,
   *length = unit(axis, axis, a);
   SbSubtract(x, p, v);
   *s = SbDot3(v, a);
-  for (int i = 0; i < 3; i++) v[i] -= *s * a[i];
+  for (int i = 0; i < 3; i++)
+    v[i] -= *s * a[i];
   across(a, other);
   return unit(v, other, away);
 }
@@ -216,39 +240,47 @@ static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], Petsc
 {
   PetscReal s, length, a[3], away[3];
   const PetscReal radial = axial(p, x, &s, &length, a, away) - p[6];
-  const PetscReal end = PetscMax(-s, s - length), sign = s > 0.5 * length ? 1 : -1;
+  const PetscReal end = PetscMax(-s, s - length);
+  const PetscReal sign = s > 0.5 * length ? 1 : -1;
 
   if (radial > 0 && end > 0) {
     PetscReal v[3];
 
-    for (int i = 0; i < 3; i++) v[i] = radial * away[i] + end * sign * a[i];
+    for (int i = 0; i < 3; i++)
+      v[i] = radial * away[i] + end * sign * a[i];
     return unit(v, v, n);
   }
-  for (int i = 0; i < 3; i++) n[i] = radial > end ? away[i] : sign * a[i];
+  for (int i = 0; i < 3; i++)
+    n[i] = radial > end ? away[i] : sign * a[i];
   return PetscMax(radial, end);
 }
 
 PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
 {
   const PetscReal *p = o->p;
-  PetscReal v[3], a[3], other[3] = {0, 0, 1}, s, length;
+  PetscReal v[3], a[3];
+  PetscReal other[3] = {0, 0, 1};
+  PetscReal s, length;
 
   SbSubtract(x, p, v);
   switch (o->shape) {
   case PLANE:
-    for (int i = 0; i < 3; i++) n[i] = p[i];
+    for (int i = 0; i < 3; i++)
+      n[i] = p[i];
     return SbDot3(p, x) - p[3];
   case SPHERE:
     return unit(v, other, n) - p[3];
   case BOWL:
     length = unit(v, other, n);
-    for (int i = 0; i < 3; i++) n[i] = -n[i];
+    for (int i = 0; i < 3; i++)
+      n[i] = -n[i];
     return p[3] - length;
   case BOX:
     return from_box(p, x, n);
   case CAPSULE:
     (void)axial(p, x, &s, &length, a, other);
-    for (int i = 0; i < 3; i++) v[i] -= PetscMax(0, PetscMin(s, length)) * a[i];
+    for (int i = 0; i < 3; i++)
+      v[i] -= PetscMax(0, PetscMin(s, length)) * a[i];
     return unit(v, other, n) - p[6];
   case MESH:
     return SbSignedDistanceEvaluate(o->distance, x, n);
@@ -260,37 +292,47 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
 void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
                SbPose *pose)
 {
-  const PetscReal half = PetscSinReal(angle / 2), s = PetscSinReal(angle), v = 2 * half * half;
+  const PetscReal half = PetscSinReal(angle / 2);
+  const PetscReal s = PetscSinReal(angle);
+  const PetscReal v = 2 * half * half;
   const PetscReal K[9] = {0, -axis[2], axis[1], axis[2], 0, -axis[0], -axis[1], axis[0], 0};
   PetscReal K2[9];
 
   SbMatMul(K, K, K2);
-  *pose = (SbPose){
-    .c = {c[0], c[1], c[2]}, .d = {d[0], d[1], d[2]}, .axis = {axis[0], axis[1], axis[2]}, .angle = angle};
-  for (int k = 0; k < 9; k++) pose->R[k] = (k % 4 == 0) + s * K[k] + v * K2[k];
+  *pose = (SbPose){.c = {c[0], c[1], c[2]},
+                   .d = {d[0], d[1], d[2]},
+                   .axis = {axis[0], axis[1], axis[2]},
+                   .angle = angle};
+  for (int k = 0; k < 9; k++)
+    pose->R[k] = (k % 4 == 0) + s * K[k] + v * K2[k];
 }
 
-void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3], PetscReal way[3])
+void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
+               PetscReal way[3])
 {
   PetscReal arm[3];
 
-  for (int i = 0; i < 3; i++) arm[i] = x[i] - at->c[i] - at->d[i];
+  for (int i = 0; i < 3; i++)
+    arm[i] = x[i] - at->c[i] - at->d[i];
   SbCross(at->axis, arm, way);
-  for (int i = 0; i < 3; i++) way[i] = (to->angle - from->angle) * way[i] + to->d[i] - from->d[i];
+  for (int i = 0; i < 3; i++)
+    way[i] = (to->angle - from->angle) * way[i] + to->d[i] - from->d[i];
 }
 
 void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3])
 {
   const PetscReal r[3] = {X[0] - pose->c[0], X[1] - pose->c[1], X[2] - pose->c[2]};
 
-  for (int i = 0; i < 3; i++) x[i] = pose->c[i] + SbDot3(pose->R + 3 * i, r) + pose->d[i];
+  for (int i = 0; i < 3; i++)
+    x[i] = pose->c[i] + SbDot3(pose->R + 3 * i, r) + pose->d[i];
 }
 
 void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3])
 {
   PetscReal r[3];
 
-  for (int i = 0; i < 3; i++) r[i] = x[i] - pose->c[i] - pose->d[i];
+  for (int i = 0; i < 3; i++)
+    r[i] = x[i] - pose->c[i] - pose->d[i];
   for (int i = 0; i < 3; i++)
     X[i] = pose->c[i] + pose->R[i] * r[0] + pose->R[3 + i] * r[1] + pose->R[6 + i] * r[2];
 }

@@ -1,34 +1,39 @@
 /*
-  overlap.c - intersections of surfaces, which verify contact, too; penetrations: where, how deep, and the
-  separation direction. It shares nothing with the search for pairs but the tree of boxes.
+  overlap.c - intersections of surfaces, which verify contact, too; penetrations: where, how deep,
+  and the separation direction. It shares nothing with the search for pairs but the tree of boxes.
 
-  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the
-  three sides in the same sense: signs of volumes of tets. A volume within rounding, also that of the
-  coordinates, counts as no intersection: bodies in contact do not intersect.
+  An edge goes through a triangle where its ends are on different sides of the plane and the line
+  passes the three sides in the same sense: signs of volumes of tets. A volume within rounding, also
+  that of the coordinates, counts as no intersection: bodies in contact do not intersect.
 
-  Between triangulated surfaces, an edge that intersects a triangle shows which of its ends is inside, and
-  the normal there. From these vertices separation direction and depth are propagated along edges that
-  intersect nothing, so that neighbours separate to the same side (Heidelberger, Teschner, Keiser, Mueller
-  and Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004). Of an
-  edge that enters and leaves a body only the midpoint of the inner part counts as inside. The depth is the
-  distance to the surface along the direction.
+  Between triangulated surfaces, an edge that intersects a triangle shows which of its ends is
+  inside, and the normal there. From these vertices separation direction and depth are propagated
+  along edges that intersect nothing, so that neighbours separate to the same side (Heidelberger,
+  Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
+  collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the
+  inner part counts as inside. The depth is the distance to the surface along the direction.
 
-  For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all of it.
+  For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all
+  of it.
 */
 #include "contact_mesh.h"
 #include "sbgeometry.h"
 
 #define CANCEL 1e-3 /* relative length below which a sum of directions counts as zero */
 #define TINY 1e-12  /* of the bodies' size: a vertex nearer to a surface counts as on it */
-#define AGAINST 0.1 /* |cosine| beyond which separation direction and own outward normal agree or oppose */
-#define JITTER 1e-7 /* of that size: perturbation of vertices, so that none lies on a triangle or an edge */
+#define AGAINST \
+  0.1 /* |cosine| beyond which separation direction and own outward normal agree or oppose */
+#define JITTER \
+  1e-7 /* of that size: perturbation of vertices, so that none lies on a triangle or an edge */
 #define ROUNDING 64 /* rounding of a volume, in machine epsilons of its products */
 #define FAR 4.      /* ray length over depth; beyond it the closest point of the surface is taken */
 
 /* Sign of the volume of a tet, 0 within rounding. */
 static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, const PetscReal *d)
 {
-  PetscReal p[3], q[3], r[3], n[3], volume, size = 0., far = 0.;
+  PetscReal p[3], q[3], r[3], n[3], volume;
+  PetscReal size = 0.;
+  PetscReal far = 0.;
 
   SbSubtract(b, a, p);
   SbSubtract(c, a, q);
@@ -39,37 +44,51 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
   SbCross(p, q, n);
   volume = SbDot3(n, r);
   for (int i = 0; i < 3; i++)
-    size += (PetscAbsReal(p[(i + 1) % 3] * q[(i + 2) % 3]) + PetscAbsReal(p[(i + 2) % 3] * q[(i + 1) % 3])) *
+    size += (PetscAbsReal(p[(i + 1) % 3] * q[(i + 2) % 3]) +
+             PetscAbsReal(p[(i + 2) % 3] * q[(i + 1) % 3])) *
             (PetscAbsReal(r[i]) + far);
-  if (PetscAbsReal(volume) <= ROUNDING * PETSC_MACHINE_EPSILON * size) return 0;
+  if (PetscAbsReal(volume) <= ROUNDING * PETSC_MACHINE_EPSILON * size)
+    return 0;
   return volume > 0. ? 1 : -1;
 }
 
 /* Whether an edge intersects a triangle. */
 static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edge, PetscInt t)
 {
-  const PetscInt *e = m->edge + 2 * edge, *v = m->triangle + 3 * t;
-  const PetscReal *a = x + 3 * e[0], *b = x + 3 * e[1], *p = x + 3 * v[0], *q = x + 3 * v[1],
-                  *r = x + 3 * v[2];
+  const PetscInt *e = m->edge + 2 * edge;
+  const PetscInt *v = m->triangle + 3 * t;
+  const PetscReal *a = x + 3 * e[0];
+  const PetscReal *b = x + 3 * e[1];
+  const PetscReal *p = x + 3 * v[0];
+  const PetscReal *q = x + 3 * v[1];
+  const PetscReal *r = x + 3 * v[2];
   int around;
 
   /* with an obstacle, contact between bodies belongs to another effect */
-  if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return PETSC_FALSE;
-  if (m->part[e[0]] == m->part[v[0]] && (!m->self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
+  if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex)
+    return PETSC_FALSE;
+  if (m->part[e[0]] == m->part[v[0]] && (!m->self || e[0] >= m->nbody_vertex))
+    return PETSC_FALSE;
   for (int k = 0; k < 6; k++)
-    if (e[k / 3] == v[k % 3]) return PETSC_FALSE;
+    if (e[k / 3] == v[k % 3])
+      return PETSC_FALSE;
   if (m->driven[e[0]] && m->driven[e[1]] && m->driven[v[0]] && m->driven[v[1]] && m->driven[v[2]])
     return PETSC_FALSE;
-  if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0) return PETSC_FALSE;
+  if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0)
+    return PETSC_FALSE;
   around = side_of(a, b, p, q);
   return (PetscBool)(around && side_of(a, b, q, r) == around && side_of(a, b, r, p) == around);
 }
 
-/* Edges that intersect triangles of another body, or of the same one (m->self): hit[n][2], edge and triangle,
-   ascending, of all ranks on each; the caller frees it. Collective. */
-static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], PetscInt *n, PetscInt **hits)
+/* Edges that intersect triangles of another body, or of the same one (m->self): hit[n][2], edge and
+   triangle, ascending, of all ranks on each; the caller frees it. Collective. */
+static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], PetscInt *n,
+                                     PetscInt **hits)
 {
-  PetscInt nmine = 0, size = 0, *mine = NULL, hit;
+  PetscInt nmine = 0;
+  PetscInt size = 0;
+  PetscInt *mine = NULL;
+  PetscInt hit;
   SbBoxNearest query;
   SbBoxTree tree;
 
@@ -79,9 +98,11 @@ static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], Petsc
     PetscReal around[6];
 
     SbBoxClear(around);
-    for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
+    for (int k = 0; k < 2; k++)
+      SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
     for (SbBoxNearestBegin(&tree, around, 0, &query); SbBoxNearestNext(&query, &hit);) {
-      if (!goes_through(m, x, e, hit)) continue;
+      if (!goes_through(m, x, e, hit))
+        continue;
       PetscCall(SbReserve(nmine + 2, sizeof(*mine), &size, &mine));
       mine[nmine++] = e;
       mine[nmine++] = hit;
@@ -110,29 +131,33 @@ typedef struct {
   uint8_t *through;       /* [nedge] goes through a triangle */
 } Ways;
 
-/* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own outward
-   normal points that way. Returns whether it did. */
+/* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own
+   outward normal points that way. Returns whether it did. */
 static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3],
                          PetscReal d)
 {
-  if ((w->layer[v] && w->in[v] != part) || SbDot3(w->normal + 3 * v, n) > AGAINST) return PETSC_FALSE;
+  if ((w->layer[v] && w->in[v] != part) || SbDot3(w->normal + 3 * v, n) > AGAINST)
+    return PETSC_FALSE;
   w->in[v] = part;
-  for (int i = 0; i < 3; i++) w->way[3 * v + i] += weight * n[i];
+  for (int i = 0; i < 3; i++)
+    w->way[3 * v + i] += weight * n[i];
   w->depth[v] += weight * d;
   w->sum[v] += weight;
   return PETSC_TRUE;
 }
 
-/* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle; signed
-   distance of the edge's first end, m. */
-static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t, PetscReal n[3],
-                        PetscReal *first)
+/* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle;
+   signed distance of the edge's first end, m. */
+static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t,
+                        PetscReal n[3], PetscReal *first)
 {
-  const PetscInt *v = m->triangle + 3 * t, *ends = m->edge + 2 * e;
+  const PetscInt *v = m->triangle + 3 * t;
+  const PetscInt *ends = m->edge + 2 * e;
   const PetscReal length = 2. * SbContactTriangleArea(x, v, n);
   PetscReal p[3], side[2];
 
-  for (int i = 0; i < 3; i++) n[i] /= length;
+  for (int i = 0; i < 3; i++)
+    n[i] /= length;
   for (int k = 0; k < 2; k++) {
     SbSubtract(x + 3 * ends[k], x + 3 * v[0], p);
     side[k] = SbDot3(n, p);
@@ -143,28 +168,36 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 
 /* Adds a point at p with its other side, the triangle of the penetrated body that the ray along the
    separation direction leaves through, if there is any. */
-static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
-                                 PetscReal depth, const PetscReal p[3], SbPenetration *point,
-                                 SbContactOverlap *o)
+static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree,
+                                 PetscInt part, PetscReal depth, const PetscReal p[3],
+                                 SbPenetration *point, SbContactOverlap *o)
 {
-  PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
-  PetscInt t, exit = -1;
+  PetscReal box[6], goal[3];
+  PetscReal nearest = PETSC_MAX_REAL;
+  PetscReal best[3] = {0};
+  PetscInt t;
+  PetscInt exit = -1;
   SbBoxNearest query;
 
   PetscFunctionBeginUser;
   SbBoxClear(box);
   SbBoxAdd(box, p);
-  for (int i = 0; i < 3; i++) goal[i] = p[i] + FAR * depth * point->normal[i];
+  for (int i = 0; i < 3; i++)
+    goal[i] = p[i] + FAR * depth * point->normal[i];
   SbBoxAdd(box, goal);
   for (SbBoxNearestBegin(tree, box, 0, &query); SbBoxNearestNext(&query, &t);) {
     const PetscInt *v = m->triangle + 3 * t;
     const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
     PetscReal weight[3], length;
-    PetscBool out, own = PETSC_FALSE;
+    PetscBool out;
+    PetscBool own = PETSC_FALSE;
 
-    if (m->part[v[0]] != part) continue;
-    for (int k = 0; k < 6; k++) own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
-    if (own || !SbRayTriangle(p, point->normal, at, &length, weight, &out) || !out || length >= nearest)
+    if (m->part[v[0]] != part)
+      continue;
+    for (int k = 0; k < 6; k++)
+      own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
+    if (own || !SbRayTriangle(p, point->normal, at, &length, weight, &out) || !out ||
+        length >= nearest)
       continue;
     nearest = length;
     exit = t;
@@ -176,7 +209,8 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
     PetscReal way[3];
     SbBoxNearest near;
 
-    for (int i = 0; i < 3; i++) goal[i] = p[i] + depth * point->normal[i];
+    for (int i = 0; i < 3; i++)
+      goal[i] = p[i] + depth * point->normal[i];
     SbBoxClear(box);
     SbBoxAdd(box, goal);
     for (SbBoxNearestBegin(tree, box, PETSC_MAX_REAL, &near); SbBoxNearestNext(&near, &t);) {
@@ -185,35 +219,45 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
       PetscReal weight[3], d2;
       PetscBool own = PETSC_FALSE;
 
-      if (m->part[v[0]] != part) continue;
-      for (int k = 0; k < 6; k++) own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
-      if (own) continue;
+      if (m->part[v[0]] != part)
+        continue;
+      for (int k = 0; k < 6; k++)
+        own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
+      if (own)
+        continue;
       (void)SbTriangleClosestPoint(goal, at, weight, &d2);
-      if (d2 >= near.limit2) continue;
+      if (d2 >= near.limit2)
+        continue;
       near.limit2 = d2;
       exit = t;
       PetscCall(PetscArraycpy(best, weight, 3));
     }
-    if (exit < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    if (exit < 0)
+      PetscFunctionReturn(PETSC_SUCCESS);
     for (int i = 0; i < 3; i++) { /* directly towards it */
       way[i] = -p[i];
-      for (int k = 0; k < 3; k++) way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
+      for (int k = 0; k < 3; k++)
+        way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
     }
     if (SbNormalise(way) <= TINY * m->size || SbDot3(way, point->normal) <= 0.)
       PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(PetscArraycpy(point->normal, way, 3));
   }
   point->depth = 0.;
-  if (point->v[0] >= m->nbody_vertex) point->area = 0.; /* of the obstacle: the body's area counts */
+  if (point->v[0] >= m->nbody_vertex)
+    point->area = 0.; /* of the obstacle: the body's area counts */
   for (int k = 0; k < 3; k++) {
     const PetscInt v = m->triangle[3 * exit + k];
 
-    if (point->v[0] >= m->nbody_vertex) point->area += m->area[v] / 3.;
-    for (int i = 0; i < 3; i++) point->depth += best[k] * point->normal[i] * (x[3 * v + i] - p[i]);
+    if (point->v[0] >= m->nbody_vertex)
+      point->area += m->area[v] / 3.;
+    for (int i = 0; i < 3; i++)
+      point->depth += best[k] * point->normal[i] * (x[3 * v + i] - p[i]);
     point->v[point->n] = v;
     point->weight[point->n++] = -best[k];
   }
-  if (point->depth <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (point->depth <= 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbReserve(o->n + 1, sizeof(*point), &o->size, &o->point));
   o->point[o->n++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -221,17 +265,20 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
 
 void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
 {
-  for (PetscInt k = 0; k < 3 * m->nvertex; k++) normal[k] = 0.;
+  for (PetscInt k = 0; k < 3 * m->nvertex; k++)
+    normal[k] = 0.;
   for (PetscInt t = 0; t < m->ntriangle; t++) {
     const PetscInt *v = m->triangle + 3 * t;
     PetscReal n[3];
 
     (void)SbContactTriangleArea(x, v, n);
-    for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
+    for (int k = 0; k < 9; k++)
+      normal[3 * v[k / 3] + k % 3] += n[k % 3];
   }
 }
 
-/* Propagates directions from the n vertices of list[], layer by layer along edges that intersect nothing. */
+/* Propagates directions from the n vertices of list[], layer by layer along edges that intersect
+   nothing. */
 static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 {
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
@@ -240,18 +287,22 @@ static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
       PetscReal *way = w->way + 3 * list[k];
       const PetscReal length = PetscSqrtReal(SbDot3(way, way));
 
-      for (int i = 0; i < 3; i++) way[i] = length > CANCEL * w->sum[list[k]] ? way[i] / length : 0.;
+      for (int i = 0; i < 3; i++)
+        way[i] = length > CANCEL * w->sum[list[k]] ? way[i] / length : 0.;
       w->depth[list[k]] /= w->sum[list[k]];
     }
     for (PetscInt k = first; k < last; k++) {
       const PetscInt v = list[k];
 
       for (PetscInt j = w->start[v]; j < w->start[v + 1]; j++) {
-        const PetscInt *e = m->edge + 2 * w->edge[j], to = e[0] == v ? e[1] : e[0];
+        const PetscInt *e = m->edge + 2 * w->edge[j];
+        const PetscInt to = e[0] == v ? e[1] : e[0];
         PetscReal r[3];
 
-        if (w->through[w->edge[j]] || (w->layer[to] && w->layer[to] <= layer)) continue;
-        for (int i = 0; i < 3; i++) r[i] = w->x[3 * v + i] - w->x[3 * to + i];
+        if (w->through[w->edge[j]] || (w->layer[to] && w->layer[to] <= layer))
+          continue;
+        for (int i = 0; i < 3; i++)
+          r[i] = w->x[3 * v + i] - w->x[3 * to + i];
         if (!suggest(w, to, w->in[v], 1. / SbDot3(r, r), w->way + 3 * v,
                      SbDot3(r, w->way + 3 * v) + w->depth[v]) ||
             w->layer[to])
@@ -264,17 +315,19 @@ static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 }
 
 /* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
-static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
-                                  SbContactOverlap *o)
+static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n,
+                                  const PetscInt hit[], SbContactOverlap *o)
 {
   Ways w = {.x = x};
-  PetscInt *list, nlist = 0, nleading = 0;
+  PetscInt *list;
+  PetscInt nlist = 0;
+  PetscInt nleading = 0;
   uint8_t *paired;
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc7(m->nvertex, &w.in, m->nvertex, &list, 3 * m->nvertex, &w.way, m->nvertex, &w.depth,
-                         m->nvertex, &w.sum, m->nvertex, &w.layer, m->nedge, &w.through));
+  PetscCall(PetscCalloc7(m->nvertex, &w.in, m->nvertex, &list, 3 * m->nvertex, &w.way, m->nvertex,
+                         &w.depth, m->nvertex, &w.sum, m->nvertex, &w.layer, m->nedge, &w.through));
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
   SbContactMeshNormals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) {
@@ -282,11 +335,14 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     w.in[v] = -1;
   }
   PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w.start, &w.edge));
-  for (PetscInt k = 0; k < 2 * m->nedge; k++) w.edge[k] /= 2;
+  for (PetscInt k = 0; k < 2 * m->nedge; k++)
+    w.edge[k] /= 2;
   PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
 
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt e = hit[2 * i], part = m->part[m->triangle[3 * hit[2 * i + 1]]], *ends = m->edge + 2 * e;
+    const PetscInt e = hit[2 * i];
+    const PetscInt part = m->part[m->triangle[3 * hit[2 * i + 1]]];
+    const PetscInt *ends = m->edge + 2 * e;
     PetscReal normal[3], other[3], first, p[3];
     const PetscReal s = pierce(m, x, e, hit[2 * i + 1], normal, &first);
     PetscInt j = i + 1;
@@ -297,13 +353,18 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
 
       o->near[v] = PetscMax(o->near[v], SB_OVERLAP_INTERSECTED);
     }
-    if (paired[i]) continue;
+    if (paired[i])
+      continue;
 
     /* it leaves the same body again: the midpoint between both intersections is inside */
-    while (j < n && hit[2 * j] == e && (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part)) j++;
+    while (j < n && hit[2 * j] == e &&
+           (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part))
+      j++;
     if (j < n && hit[2 * j] == e) {
-      PetscReal unused, chord = 0.;
-      const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused), at = 0.5 * (s + s2);
+      PetscReal unused;
+      PetscReal chord = 0.;
+      const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused);
+      const PetscReal at = 0.5 * (s + s2);
       SbPenetration point = {
         .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
 
@@ -313,7 +374,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
         p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
         chord += PetscSqr((s2 - s) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
       }
-      if (SbNormalise(point.normal) <= CANCEL) continue;
+      if (SbNormalise(point.normal) <= CANCEL)
+        continue;
       PetscCall(add_inside(m, x, &tree, part, PetscSqrtReal(chord), p, &point, o));
     } else { /* or one of its ends is inside */
       const PetscInt v = ends[first < 0. ? 0 : 1];
@@ -334,7 +396,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   for (PetscInt v = 0; v < m->nvertex; v++) {
     SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
 
-    if (!w.layer[v] || SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
+    if (!w.layer[v] || SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.)
+      continue;
     PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
     PetscCall(add_inside(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, o));
   }
@@ -342,12 +405,15 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   /* vertices joined to an inside one by an edge that intersects nothing are inside, too */
   nlist = 0;
   for (PetscInt v = 0; v < m->nvertex; v++)
-    if (o->near[v] == SB_OVERLAP_INSIDE) list[nlist++] = v;
+    if (o->near[v] == SB_OVERLAP_INSIDE)
+      list[nlist++] = v;
   for (PetscInt k = 0; k < nlist; k++) {
     for (PetscInt j = w.start[list[k]]; j < w.start[list[k] + 1]; j++) {
-      const PetscInt *e = m->edge + 2 * w.edge[j], to = e[0] == list[k] ? e[1] : e[0];
+      const PetscInt *e = m->edge + 2 * w.edge[j];
+      const PetscInt to = e[0] == list[k] ? e[1] : e[0];
 
-      if (w.through[w.edge[j]] || o->near[to] == SB_OVERLAP_INSIDE) continue;
+      if (w.through[w.edge[j]] || o->near[to] == SB_OVERLAP_INSIDE)
+        continue;
       o->near[to] = SB_OVERLAP_INSIDE;
       list[nlist++] = to;
     }
@@ -359,10 +425,13 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscReal normal[3] = {0.};
 
     for (PetscInt k = 0; k < p.n && p.weight[k] > 0.; k++)
-      for (int j = 0; j < 3; j++) normal[j] += p.weight[k] * w.normal[3 * p.v[k] + j];
-    if (SbDot3(normal, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(normal, normal))) o->point[nleading++] = p;
+      for (int j = 0; j < 3; j++)
+        normal[j] += p.weight[k] * w.normal[3 * p.v[k] + j];
+    if (SbDot3(normal, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(normal, normal)))
+      o->point[nleading++] = p;
   }
-  if (nleading) o->n = nleading;
+  if (nleading)
+    o->n = nleading;
 
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree7(w.in, list, w.way, w.depth, w.sum, w.layer, w.through));
@@ -383,17 +452,21 @@ static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbC
   const PetscReal sign = pair->v[0] >= m->nbody_vertex ? -1. : 1.;
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 4; k++) driven = (PetscBool)(driven && m->driven[pair->v[k]]);
-  if (gap >= 0. || driven || SbDot3(d.n, d.n) == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 4; k++)
+    driven = (PetscBool)(driven && m->driven[pair->v[k]]);
+  if (gap >= 0. || driven || SbDot3(d.n, d.n) == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int pass = 0; pass < 2; pass++) { /* the body's vertices first */
     for (int k = 0; k < 4; k++) {
-      if (d.weight[k] == 0. || (pair->v[k] < m->nbody_vertex) != !pass) continue;
+      if (d.weight[k] == 0. || (pair->v[k] < m->nbody_vertex) != !pass)
+        continue;
       o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
       point.v[point.n] = pair->v[k];
       point.weight[point.n++] = sign * d.weight[k];
     }
   }
-  for (int k = 0; k < 3; k++) point.normal[k] = sign * d.n[k];
+  for (int k = 0; k < 3; k++)
+    point.normal[k] = sign * d.n[k];
   point.depth = -gap;
   PetscCall(SbReserve(o->n + 1, sizeof(point), &o->size, &o->point));
   o->point[o->n++] = point;
@@ -406,11 +479,13 @@ static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContac
 
   PetscFunctionBeginUser;
   for (PetscInt v = 0; v < first && m->side != SB_SIDE_NONE; v++) {
-    const SbContactPair pair = {.side = PETSC_TRUE, .v = {v, first, m->nvertex - 1, v}, .area = m->area[v]};
+    const SbContactPair pair = {
+      .side = PETSC_TRUE, .v = {v, first, m->nvertex - 1, v}, .area = m->area[v]};
 
     PetscCall(add_behind(m, x, &pair, o));
   }
-  if (m->side != SB_SIDE_NONE || m->radius <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->side != SB_SIDE_NONE || m->radius <= 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt t = 0; t < m->nbody_triangle; t++) {
     const PetscInt *v = m->triangle + 3 * t;
 
@@ -439,11 +514,13 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscB
 
   PetscFunctionBeginUser;
   o->n = 0;
-  if (!o->near) PetscCall(PetscMalloc1(m->nvertex, &o->near));
+  if (!o->near)
+    PetscCall(PetscMalloc1(m->nvertex, &o->near));
   PetscCall(PetscArrayzero(o->near, m->nvertex));
   PetscCall(find_crossings(m, x, &n, &hit));
 
-  /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every run */
+  /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every
+     run */
   if (n || inside) {
     PetscInt nmoved, *other;
     PetscReal *moved;
@@ -463,7 +540,8 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscB
       hit = other;
     } else
       PetscCall(PetscFree(other));
-    if (n) PetscCall(find_inside(m, nmoved ? moved : x, n, hit, o));
+    if (n)
+      PetscCall(find_inside(m, nmoved ? moved : x, n, hit, o));
     PetscCall(PetscFree(moved));
   }
   PetscCall(find_behind(m, x, o));
@@ -479,19 +557,22 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscB
   }
   PetscCall(PetscFree(hit));
   o->deepest = 0.;
-  for (PetscInt i = 0; i < o->n; i++) o->deepest = PetscMax(o->deepest, o->point[i].depth);
+  for (PetscInt i = 0; i < o->n; i++)
+    o->deepest = PetscMax(o->deepest, o->point[i].depth);
 
   /* vertices next to the overlap may enter while it separates */
   for (PetscInt e = 0; e < m->nedge; e++) {
     const PetscInt *v = m->edge + 2 * e;
 
     for (int k = 0; k < 2; k++)
-      if (o->near[v[k]] > SB_OVERLAP_ADJACENT && !o->near[v[1 - k]]) o->near[v[1 - k]] = SB_OVERLAP_ADJACENT;
+      if (o->near[v[k]] > SB_OVERLAP_ADJACENT && !o->near[v[1 - k]])
+        o->near[v[1 - k]] = SB_OVERLAP_ADJACENT;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2], PetscBool *found)
+PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2],
+                                     PetscBool *found)
 {
   const SbMesh mesh = m->space->mesh;
   const PetscInt nbody = mesh->nbody;
@@ -503,29 +584,36 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
   PetscCall(PetscCalloc3(nbody, &speaks, 3 * nbody, &point, nbody * nbody, &winding));
 
   /* the middle of a tet of each body, of the lowest rank that has one */
-  for (PetscInt b = 0; b < nbody; b++) speaks[b] = PETSC_MPI_INT_MAX;
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) speaks[mesh->cell_body[c]] = m->space->rank;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, speaks, (PetscMPIInt)nbody, MPI_INT, MPI_MIN, m->space->comm));
+  for (PetscInt b = 0; b < nbody; b++)
+    speaks[b] = PETSC_MPI_INT_MAX;
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++)
+    speaks[mesh->cell_body[c]] = m->space->rank;
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, speaks, (PetscMPIInt)nbody, MPI_INT, MPI_MIN, m->space->comm));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt b = mesh->cell_body[c];
 
-    if (speaks[b] != m->space->rank) continue;
+    if (speaks[b] != m->space->rank)
+      continue;
     speaks[b] = PETSC_MPI_INT_MAX;
     for (int k = 0; k < 12; k++)
       point[3 * b + k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * c + k / 3] + k % 3];
   }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, point, (PetscMPIInt)(3 * nbody), MPIU_REAL, MPI_SUM, m->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, point, (PetscMPIInt)(3 * nbody), MPIU_REAL, MPI_SUM,
+                             m->space->comm));
 
   /* winding number of each surface about it */
   for (PetscInt t = 0; t < m->nbody_triangle; t++) {
-    const PetscInt *v = m->triangle + 3 * t, to = m->part[v[0]];
+    const PetscInt *v = m->triangle + 3 * t;
+    const PetscInt to = m->part[v[0]];
 
     for (PetscInt b = 0; b < nbody; b++)
-      if (b != to) winding[nbody * b + to] += SbTriangleSolidAngle(x, v, point + 3 * b) / (4. * PETSC_PI);
+      if (b != to)
+        winding[nbody * b + to] += SbTriangleSolidAngle(x, v, point + 3 * b) / (4. * PETSC_PI);
   }
   for (PetscInt k = 0; k < nbody * nbody && !*found; k++) {
-    if (PetscAbsReal(winding[k]) < 0.5) continue;
+    if (PetscAbsReal(winding[k]) < 0.5)
+      continue;
     *found = PETSC_TRUE;
     body[0] = k / nbody;
     body[1] = k % nbody;

@@ -1,50 +1,59 @@
 /*
-  barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass through each other.
+  barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass through
+  each other.
 
-  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an energy that
-  is infinite at contact. It is part of the potential that Newton's method minimises (src/time/newton.c), and
-  every iteration is limited by continuous collision detection (src/contact/contact_pairs.c). So an accepted
-  state can be reached from the one before it without surfaces passing through each other.
+  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an
+  energy that is infinite at contact. It is part of the potential that Newton's method minimises
+  (src/time/newton.c), and every iteration is limited by continuous collision detection
+  (src/contact/contact_pairs.c). So an accepted state can be reached from the one before it without
+  surfaces passing through each other.
 
-  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the fraction
-  that is completed. Newton's method raises it to one as fast as the surfaces allow.
+  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the
+  fraction that is completed. Newton's method raises it to one as fast as the surfaces allow.
 
-  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of the step
-  (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of
-  the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt times a small speed:
+  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of
+  the step (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, section 4): the energy
+  mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt
+  times a small speed:
 
     f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
 
-  In a static run, or with friction_solves, the step is solved again with the normal forces and closest points
-  of the last solution until friction changes by less than a tolerance (barrier_forces.c), and reported.
+  In a static run, or with friction_solves, the step is solved again with the normal forces and
+  closest points of the last solution until friction changes by less than a tolerance
+  (barrier_forces.c), and reported.
 
-  Initial contact. Bodies that touch when a run begins are moved apart rigidly (src/model/potential.c), by the
-  width or, in a static run, half of it; where that fails, by their vertices. Bodies that intersect are
-  separated by penalty springs (barrier_springs.c).
+  Initial contact. Bodies that touch when a run begins are moved apart rigidly
+  (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their
+  vertices. Bodies that intersect are separated by penalty springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
-#define WIDTH 1e-3       /* default w over the size of the smallest body */
-#define WIDTH_CUBE 3e-3  /* largest default w over the cube root of its volume */
-#define PRESSURE 0.1     /* of Young's modulus of the softer side */
-#define SLIP 1e-4        /* sticking speed over the speed of a step (src/model/potential.c) */
-#define SLIP_LEAST 1e-7  /* least sticking slip e of a time step over the size of the smallest body */
+#define WIDTH 1e-3      /* default w over the size of the smallest body */
+#define WIDTH_CUBE 3e-3 /* largest default w over the cube root of its volume */
+#define PRESSURE 0.1    /* of Young's modulus of the softer side */
+#define SLIP 1e-4       /* sticking speed over the speed of a step (src/model/potential.c) */
+#define SLIP_LEAST \
+  1e-7 /* least sticking slip e of a time step over the size of the smallest body */
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
 #define LAGS 100         /* largest number of lagged-friction iterations of a load step */
-#define STUCK 5 /* successive solutions whose lag stays above FALLS times the least: it does not converge */
+#define STUCK \
+  5 /* successive solutions whose lag stays above FALLS times the least: it does not converge */
 #define FALLS 0.9
-#define MUCH 0.5    /* lag over mu N above which a time step is solved once more, as where contact begins */
+#define MUCH \
+  0.5 /* lag over mu N above which a time step is solved once more, as where contact begins */
 #define PARTINGS 20 /* solves of a load step that separate overlaps */
 #define HALF 0.5    /* fraction of the prescribed separation below which springs get stiffer */
 #define APART 0.5   /* initial gap over w where bodies cannot move apart by w, and in static runs */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
-#define WIDTH_LEAST 1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
-#define PAIRS 200        /* most pairs of bodies with columns */
-#define TWO 4            /* columns of two bodies */
-#define ONE 2            /* and of one with itself, whose net force is zero */
+#define WIDTH_LEAST \
+  1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
+#define PAIRS 200 /* most pairs of bodies with columns */
+#define TWO 4     /* columns of two bodies */
+#define ONE 2     /* and of one with itself, whose net force is zero */
 
-/* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of e. */
+/* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of
+   e. */
 static PetscErrorCode find_bodies(SbEffect e, SbMesh mesh)
 {
   static const char *const two_names[TWO] = {"force_x", "force_y", "force_z", "contacts"};
@@ -57,27 +66,34 @@ static PetscErrorCode find_bodies(SbEffect e, SbMesh mesh)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
-  for (PetscInt i = 0; i < mesh->nbody; i++) p->slot[i] = -1;
-  for (PetscInt v = 0; v < p->mesh->nbody_vertex; v++) p->slot[p->mesh->part[v]] = 0;
   for (PetscInt i = 0; i < mesh->nbody; i++)
-    if (p->slot[i] == 0) p->slot[i] = p->nsurface++;
-  PetscCheck(p->nsurface > 1 || self, mesh->comm, PETSC_ERR_USER_INPUT,
-             "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
-             "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
-             e->name, e->name, e->name, e->name);
-  if (!p->contact.pairs) PetscFunctionReturn(PETSC_SUCCESS);
+    p->slot[i] = -1;
+  for (PetscInt v = 0; v < p->mesh->nbody_vertex; v++)
+    p->slot[p->mesh->part[v]] = 0;
+  for (PetscInt i = 0; i < mesh->nbody; i++)
+    if (p->slot[i] == 0)
+      p->slot[i] = p->nsurface++;
+  PetscCheck(
+    p->nsurface > 1 || self, mesh->comm, PETSC_ERR_USER_INPUT,
+    "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
+    "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
+    e->name, e->name, e->name, e->name);
+  if (!p->contact.pairs)
+    PetscFunctionReturn(PETSC_SUCCESS);
   npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
-  PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
-             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
-             "-output_contacts yes",
-             e->name, p->nsurface, e->name, npair, PAIRS);
+  PetscCheck(
+    npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
+    " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
+    "-output_contacts yes",
+    e->name, p->nsurface, e->name, npair, PAIRS);
   PetscCall(PetscMalloc3(n + TWO * (PetscInt)npair, &p->column, TWO * npair, &p->text,
                          p->nsurface * p->nsurface, &p->place));
   PetscCall(PetscArraycpy(p->column, e->column, n));
   for (PetscInt a = 0; a < mesh->nbody; a++) {
     for (PetscInt b = a; b < mesh->nbody; b++) {
-      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
+      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self))
+        continue;
       p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
       for (int k = 0; k < (a == b ? ONE : TWO); k++, n++) {
         char *name = p->text[n - fixed];
@@ -85,10 +101,10 @@ static PetscErrorCode find_bodies(SbEffect e, SbMesh mesh)
         SbFormat(sizeof(p->text[0]), name, "%s_%s_%s", mesh->body[a].name, mesh->body[b].name,
                  (a == b ? one_names : two_names)[k]);
         for (PetscInt i = 0; i < n; i++)
-          PetscCheck(
-            strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-            "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
-            e->name, e->name, name);
+          PetscCheck(strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+                     "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body "
+                     "another name",
+                     e->name, e->name, name);
         p->column[n] = name;
       }
     }
@@ -108,35 +124,38 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
   PetscFunctionBeginUser;
   if (b->contact.obstacle)
-    PetscCall(SbObstacleSetUp(b->contact.obstacle, s->comm, b->contact.scale, b->contact.at, sizeof(e->note),
-                              e->note));
+    PetscCall(SbObstacleSetUp(b->contact.obstacle, s->comm, b->contact.scale, b->contact.at,
+                              sizeof(e->note), e->note));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
   PetscCall(SbContactMeshCreate(s, n, facet, b->contact.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
   nmove = 3 * b->mesh->nvertex;
   nobstacle = nmove - 3 * b->mesh->nbody_vertex;
   s->coupled = PETSC_TRUE;
-  if (!b->contact.obstacle) PetscCall(find_bodies(e, s->mesh));
+  if (!b->contact.obstacle)
+    PetscCall(find_bodies(e, s->mesh));
 
   /* width and pressure of each body */
-  for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
+  for (PetscInt i = 0; i < nbody; i++)
+    cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
   PetscCall(PetscMalloc7(3 * nbody + 3, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
                          3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
   b->k = b->w + nbody + 1;
   b->mass = b->k + nbody + 1;
   b->w[nbody] = b->k[nbody] = b->mass[nbody] = e->width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
-    b->w[i] = b->width > 0.
-                ? b->width
-                : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube), 0.5 * b->mesh->shortest);
+    b->w[i] = b->width > 0. ? b->width
+                            : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube),
+                                       0.5 * b->mesh->shortest);
     e->width = PetscMin(e->width, b->w[i]);
     b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
-  PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
-             "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
-             "most half of that",
-             e->name, (double)b->width, (double)b->mesh->shortest);
+  PetscCheck(
+    b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
+    "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
+    "most half of that",
+    e->name, (double)b->width, (double)b->mesh->shortest);
   b->mesh->self = b->contact.self;
   PetscCall(SbContactPairsCreate(b->mesh, b->w[0], &b->pairs));
   b->least = PETSC_MAX_REAL;
@@ -149,7 +168,8 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
   const SbContactMesh m = b->mesh;
 
-  if (!b->contact.obstacle) return;
+  if (!b->contact.obstacle)
+    return;
   SbContactPose(&b->contact, t, &b->pose[0]);
   SbContactPose(&b->contact, t + dt, &b->pose[1]);
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
@@ -158,28 +178,36 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
   }
 }
 
-/* The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where
-   surfaces face each other. n: from the second side to the first; false: none. */
-static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[], PetscReal n[3])
+/* The separation direction of a pair at distance zero: the normal of the triangle, or of both
+   edges, where surfaces face each other. n: from the second side to the first; false: none. */
+static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[],
+                        PetscReal n[3])
 {
   const PetscReal *x[4];
-  PetscReal p[3], q[3], length, outward[2] = {0., 0.};
+  PetscReal p[3], q[3], length;
+  PetscReal outward[2] = {0., 0.};
   const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
 
-  for (int k = 0; k < 4; k++) x[k] = b->x + 3 * pair->v[k];
+  for (int k = 0; k < 4; k++)
+    x[k] = b->x + 3 * pair->v[k];
   SbSubtract(x[edges ? 1 : 2], x[edges ? 0 : 1], p);
   SbSubtract(x[3], x[edges ? 2 : 1], q);
   SbCross(p, q, n);
   length = PetscSqrtReal(SbDot3(n, n));
-  if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q))) return PETSC_FALSE;
-  for (int k = 0; k < 4; k++) outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]);
-  if (edges && outward[1] < 0.) length = -length;
-  for (int i = 0; i < 3; i++) n[i] /= length;
+  if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q)))
+    return PETSC_FALSE;
+  for (int k = 0; k < 4; k++)
+    outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]);
+  if (edges && outward[1] < 0.)
+    length = -length;
+  for (int i = 0; i < 3; i++)
+    n[i] /= length;
   return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
 }
 
-static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, const PetscReal u[],
-                                       PetscBool *first, SbInitialContacts *list)
+static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt,
+                                       const PetscReal u[], PetscBool *first,
+                                       SbInitialContacts *list)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
@@ -187,7 +215,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscReal *normal;
 
   PetscFunctionBeginUser;
-  if (b->begun || t != 0.) PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
+  if (b->begun || t != 0.)
+    PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   *first = PETSC_TRUE;
   find_path(b, t, dt);
   PetscCall(SbContactMeshMarkDriven(m));
@@ -199,16 +228,23 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PetscInt one = m->part[pair->v[0]], two = m->part[pair->v[SbContactPairSplit(pair)]];
-    SbInitialContact touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * of_pair(b, b->w, pair)};
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    SbInitialContact touch = {.body = {one, two},
+                              .to = (e->dynamic ? 1. : APART) * of_pair(b, b->w, pair)};
     SbDistance d;
 
-    if (one == two || !counts(b, pair)) continue;
-    if (SbContactPairSweptApart(m, pair, b->x, b->x, NEARBY * touch.to)) continue;
+    if (one == two || !counts(b, pair))
+      continue;
+    if (SbContactPairSweptApart(m, pair, b->x, b->x, NEARBY * touch.to))
+      continue;
     touch.gap = SbContactPairGap(m, pair, b->x, &d);
-    if (touch.gap > NEARBY * touch.to) continue;
-    for (int k = 0; k < 3; k++) touch.n[k] = d.n[k];
-    if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n)) continue;
+    if (touch.gap > NEARBY * touch.to)
+      continue;
+    for (int k = 0; k < 3; k++)
+      touch.n[k] = d.n[k];
+    if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n))
+      continue;
     PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
     list->touch[list->n++] = touch;
   }
@@ -217,8 +253,9 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local
-   displacements, changed. Every rank treats its own pairs; displacements of vertices are summed over all. */
+/* Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u:
+   local displacements, changed. Every rank treats its own pairs; displacements of vertices are
+   summed over all. */
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
@@ -239,40 +276,51 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->w, pair);
-      PetscReal gap, sum = 0.;
+      PetscReal gap;
+      PetscReal sum = 0.;
       SbDistance d;
 
-      if (!counts(b, pair)) continue;
+      if (!counts(b, pair))
+        continue;
       gap = SbContactPairGap(m, pair, b->x, &d);
-      if (gap >= 0.9 * goal) continue;
+      if (gap >= 0.9 * goal)
+        continue;
       if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
           d.n[k] = 0.;
-          for (int v = SbContactPairSplit(pair); v < 4; v++) d.n[k] += normal[3 * pair->v[v] + k];
+          for (int v = SbContactPairSplit(pair); v < 4; v++)
+            d.n[k] += normal[3 * pair->v[v] + k];
         }
-        if (SbNormalise(d.n) <= 0.) continue;
+        if (SbNormalise(d.n) <= 0.)
+          continue;
       }
       for (int k = 0; k < 4; k++)
-        if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);
-      if (sum <= 0.) continue;
+        if (!m->driven[pair->v[k]])
+          sum += PetscSqr(d.weight[k]);
+      if (sum <= 0.)
+        continue;
       n++;
       for (int k = 0; k < 4; k++) {
         const PetscInt v = pair->v[k];
 
-        if (m->driven[v] || d.weight[k] == 0.) continue;
-        for (int j = 0; j < 3; j++) push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
+        if (m->driven[v] || d.weight[k] == 0.)
+          continue;
+        for (int j = 0; j < 3; j++)
+          push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
         push[4 * v + 3]++;
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
-    if (!n) break;
+    if (!n)
+      break;
     *moved = PETSC_TRUE;
-    PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL, MPI_SUM, s->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL,
+                               MPI_SUM, s->comm));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
         for (int i = 0; i < 3 && m->node[j] >= 0; i++)
-          if (!(m->fixed[j] >> i & 1)) u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
+          if (!(m->fixed[j] >> i & 1))
+            u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
     }
   }
   PetscCall(PetscFree2(push, normal));
@@ -280,8 +328,9 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of the barrier at the current positions, J, and the work of its forces there on the obstacle along
-   the path of this step, J; this rank's. They rotate with the obstacle: moment times angle. */
+/* Energy of the barrier at the current positions, J, and the work of its forces there on the
+   obstacle along the path of this step, J; this rank's. They rotate with the obstacle: moment times
+   angle. */
 static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 {
   PetscReal sum = 0.;
@@ -291,12 +340,14 @@ static PetscReal gap_energy(const Barrier *b, PetscReal *along)
     Term t;
 
     SbBarrierTerm(b, i, &t);
-    if (!t.counts) continue;
+    if (!t.counts)
+      continue;
     sum += t.energy;
     for (int k = 0; b->contact.obstacle && k < 4; k++) {
       PetscReal way[3];
 
-      if (t.v[k] < b->mesh->nbody_vertex) continue;
+      if (t.v[k] < b->mesh->nbody_vertex)
+        continue;
       SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[b->now > 0.], b->x + 3 * t.v[k], way);
       *along += SbDot3(t.gradient + 3 * k, way);
     }
@@ -309,50 +360,60 @@ static void set_scale(SbEffect e, PetscReal scale)
 {
   Barrier *b = (Barrier *)e->data;
 
-  for (PetscInt i = 0; i < b->mesh->space->mesh->nbody; i++) b->w[i] *= scale / b->scale;
+  for (PetscInt i = 0; i < b->mesh->space->mesh->nbody; i++)
+    b->w[i] *= scale / b->scale;
   e->width *= scale / b->scale;
   b->scale = scale;
   b->known = PETSC_FALSE;
 }
 
-static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscReal growth, PetscBool *changed)
+static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscReal growth,
+                                          PetscBool *changed)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal far = b->mesh->size, least;
+  PetscReal far = b->mesh->size;
+  PetscReal least;
 
   PetscFunctionBeginUser;
-  if (b->width > 0. || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->width > 0. || b->overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
   b->wider = factor > 1. ? factor : 0.;
   b->growth = growth;
-  if (factor > 1.) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++) far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
+  if (factor > 1.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++)
+    far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
   least = WIDTH_LEAST * far / e->width;
-  if (least >= 1.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (least >= 1.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   set_scale(e, PetscMax(factor, least) * b->scale);
   *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal speed,
-                                    PetscReal u0[])
+static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt,
+                                    PetscReal speed, PetscReal u0[])
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal least = PETSC_MAX_REAL, energy[2], unused;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscReal energy[2], unused;
   PetscBool moved;
 
   PetscFunctionBeginUser;
   find_path(b, t, dt);
   e->progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
-  if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
+  if (!b->begun)
+    PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbBarrierPlace(b, u0, 0., b->x));
     PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
   }
   if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, &moved));
-    if (moved) PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
+    if (moved)
+      PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
   PetscCall(SbBarrierUpdate(b, u0));
@@ -364,12 +425,14 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     PetscCall(SbBarrierUpdate(b, u0));
     energy[1] = gap_energy(b, &unused);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
-    if (energy[1] - energy[0] > b->growth) set_scale(e, old);
+    if (energy[1] - energy[0] > b->growth)
+      set_scale(e, old);
     b->wider = 0.;
     PetscCall(SbBarrierUpdate(b, u0));
   }
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
-  for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
+  for (PetscInt i = 0; i < b->nactive; i++)
+    least = PetscMin(least, b->active[i].gap);
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
   b->energy = gap_energy(b, &b->obstacle_power);
@@ -384,7 +447,8 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve: friction takes the normal forces and directions of the solution, while its lag is large. */
+/* After a solve: friction takes the normal forces and directions of the solution, while its lag is
+   large. */
 static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool solved,
                                   PetscBool *again)
 {
@@ -392,10 +456,13 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   PetscBool last, more;
 
   PetscFunctionBeginUser;
-  if (b->contact.friction.mu <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->contact.friction.mu <= 0. && (e->dynamic || !b->overlapping))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->dynamic && !b->lags && !solved)
+    PetscFunctionReturn(PETSC_SUCCESS);
   last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
-  if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (last && (b->lags || e->dynamic))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, u));
 
   /* in a static run overlaps are separated within the step */
@@ -410,24 +477,25 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
     b->nstuck = 0;
   } else
     b->nstuck += solved;
-  more =
-    (PetscBool)(!last && b->nstuck < STUCK && b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
+  more = (PetscBool)(!last && b->nstuck < STUCK &&
+                     b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
   if (!e->dynamic && !more && b->lag > b->lag_tolerance && !b->stuck_said) {
     b->stuck_said = PETSC_TRUE;
-    PetscCall(
-      SbWarning(s->comm,
-                "effect %s: friction does not settle, from solve to solve its forces change by %.2g of "
-                "Coulomb's limit; try more -static_steps, or motion (-time euler_implicit)",
-                e->name, (double)b->lag));
+    PetscCall(SbWarning(
+      s->comm,
+      "effect %s: friction does not settle, from solve to solve its forces change by %.2g of "
+      "Coulomb's limit; try more -static_steps, or motion (-time euler_implicit)",
+      e->name, (double)b->lag));
   }
-  if (!more) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!more)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbBarrierSwapFriction(b);
   *again = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], const PetscReal u1[],
-                                   PetscReal *part, PetscInt *nactive)
+static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[],
+                                   const PetscReal u1[], PetscReal *part, PetscInt *nactive)
 {
   Barrier *b = (Barrier *)e->data;
 
@@ -445,10 +513,13 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal power, gained = 0., asked = 0.;
+  PetscReal power;
+  PetscReal gained = 0.;
+  PetscReal asked = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
+
   /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
   e->work = b->energy + 0.5 * b->obstacle_power;
   b->energy = gap_energy(b, &power);
@@ -456,12 +527,15 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   for (PetscInt i = 0; i < b->friction.n; i++) {
     const FrictionPair *pair = &b->friction.pair[i];
     PetscReal u[3];
-    const PetscReal slip = SbBarrierSlip(b, pair, u), force = pair->force * SbBarrierSlope(b, slip);
+    const PetscReal slip = SbBarrierSlip(b, pair, u);
+    const PetscReal force = pair->force * SbBarrierSlope(b, slip);
 
-    if (!counts(b, &pair->on.pair)) continue;
+    if (!counts(b, &pair->on.pair))
+      continue;
     b->friction_loss += force * PetscSqr(slip);
     for (int k = 0; k < 12; k++) {
-      const PetscInt v = pair->on.pair.v[k / 3], c = 3 * v + k % 3;
+      const PetscInt v = pair->on.pair.v[k / 3];
+      const PetscInt c = 3 * v + k % 3;
 
       if (v < m->nbody_vertex)
         e->work -= force * u[k % 3] * pair->on.at.weight[k / 3] * (b->x[c] - b->start[c]);
@@ -472,35 +546,51 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->at.v[0]]) e->work += SbBarrierSpring(b, spring, push) * way;
-    if (i >= b->nspring - b->nbounce) continue;
+    if (m->own[spring->at.v[0]])
+      e->work += SbBarrierSpring(b, spring, push) * way;
+    if (i >= b->nspring - b->nbounce)
+      continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
   b->work += e->work;
   b->parted = PETSC_FALSE;
-  if (asked > 0.) b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
+  if (asked > 0.)
+    b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
 
-  if (b->contact.friction.mu > 0.) PetscCall(SbBarrierLag(b));
+  if (b->contact.friction.mu > 0.)
+    PetscCall(SbBarrierLag(b));
   b->most_lag = PetscMax(b->most_lag, b->lag);
 
-  for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
+  for (PetscInt i = 0; i < b->nactive; i++)
+    b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
-  if (!b->verify || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!b->verify || b->overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbContactOverlapFind(b->mesh, b->x, PETSC_FALSE, &b->overlap));
   PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
-             "The effect %s: at t = %g s %" PetscInt_FMT " edges go through triangles, one at (%g, %g, %g) m",
+             "The effect %s: at t = %g s %" PetscInt_FMT
+             " edges go through triangles, one at (%g, %g, %g) m",
              e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
              (double)b->overlap.place[1], (double)b->overlap.place[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss so far. */
-static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                      PetscReal values[])
+/* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss
+   so far. */
+static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stage,
+                                      const PetscReal r[], PetscReal values[])
 {
   /* of bodies, and of an obstacle */
-  enum { CONTACTS, PENETRATION, GAP, ENERGY, LOSS, LAG, UNGUARDED };
+  enum {
+    CONTACTS,
+    PENETRATION,
+    GAP,
+    ENERGY,
+    LOSS,
+    LAG,
+    UNGUARDED
+  };
   static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
   Barrier *b = (Barrier *)e->data;
   const int *at = places[b->contact.obstacle != NULL];
@@ -510,64 +600,85 @@ static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stag
   PetscFunctionBeginUser;
   (void)r;
   PetscCall(PetscArrayzero(values, e->ncolumn));
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!b->begun)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
-  for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
+  for (PetscInt i = 0; i < b->nactive; i++)
+    least = PetscMin(least, b->active[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
-  if (b->contact.obstacle) SbContactPose(&b->contact, stage->t, &pose);
+  if (b->contact.obstacle)
+    SbContactPose(&b->contact, stage->t, &pose);
   for (PetscInt i = 0; i < nterm(b); i++) {
-    PetscReal force[3] = {0.}, *columns;
+    PetscReal force[3] = {0.};
+    PetscReal *columns;
     PetscInt one, two;
     Term t;
 
     SbBarrierTerm(b, i, &t);
-    if (!t.counts) continue;
+    if (!t.counts)
+      continue;
     values[at[CONTACTS]] += i < b->nactive || t.force > 0.;
-    if (i < b->nactive) values[at[ENERGY]] += t.energy;
+    if (i < b->nactive)
+      values[at[ENERGY]] += t.energy;
 
     /* force and torque of the obstacle on the bodies */
     for (PetscInt k = 0; b->contact.obstacle && k < t.n; k++) {
       PetscReal arm[3], moment[3];
 
-      if (t.v[k] >= b->mesh->nbody_vertex) continue;
-      for (int j = 0; j < 3; j++) arm[j] = b->x[3 * t.v[k] + j] - b->contact.path.point[j] - pose.d[j];
+      if (t.v[k] >= b->mesh->nbody_vertex)
+        continue;
+      for (int j = 0; j < 3; j++)
+        arm[j] = b->x[3 * t.v[k] + j] - b->contact.path.point[j] - pose.d[j];
       SbCross(arm, t.gradient + 3 * k, moment);
       for (int j = 0; j < 3; j++) {
         values[j] -= t.gradient[3 * k + j];
         values[3 + j] -= moment[j];
       }
     }
-    if (b->contact.obstacle) continue;
+    if (b->contact.obstacle)
+      continue;
 
     /* forces between two bodies, or of one on itself, and their columns */
-    for (int k = 0; k < 3 * t.nfirst; k++) force[k % 3] -= t.gradient[k];
+    for (int k = 0; k < 3 * t.nfirst; k++)
+      force[k % 3] -= t.gradient[k];
     values[3] += t.force;
-    if (i >= b->nactive && i < b->nactive + b->friction.n) values[4] += PetscSqrtReal(SbDot3(force, force));
-    if (!b->column) continue;
+    if (i >= b->nactive && i < b->nactive + b->friction.n)
+      values[4] += PetscSqrtReal(SbDot3(force, force));
+    if (!b->column)
+      continue;
     one = b->mesh->part[t.v[0]];
     two = b->mesh->part[t.v[t.n - 1]];
-    columns = values + b->place[b->nsurface * b->slot[PetscMin(one, two)] + b->slot[PetscMax(one, two)]];
+    columns =
+      values + b->place[b->nsurface * b->slot[PetscMin(one, two)] + b->slot[PetscMax(one, two)]];
     columns[one == two ? 1 : 3] += t.force > 0.;
-    if (one == two) columns[0] += t.force;
-    for (int k = 0; k < 3 && one != two; k++) columns[k] += one > two ? force[k] : -force[k];
+    if (one == two)
+      columns[0] += t.force;
+    for (int k = 0; k < 3 && one != two; k++)
+      columns[k] += one > two ? force[k] : -force[k];
   }
-  if (!b->contact.obstacle) values[5] = b->work;
+  if (!b->contact.obstacle)
+    values[5] = b->work;
   values[at[LOSS]] = b->friction_loss;
-  if (s->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->rank)
+    PetscFunctionReturn(PETSC_SUCCESS);
   values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
   values[at[LAG]] = b->lag;
   values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
   for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
-    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].at.depth + b->spring[i].start -
-                                                                  SbBarrierSpringPlace(b, &b->spring[i]));
+    values[at[PENETRATION]] =
+      PetscMax(values[at[PENETRATION]],
+               b->spring[i].at.depth + b->spring[i].start - SbBarrierSpringPlace(b, &b->spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contact point of a term: its place on the body, the force there; the gap is left to the caller. */
+/* The contact point of a term: its place on the body, the force there; the gap is left to the
+   caller. */
 static SbContactPoint point_of(const Barrier *b, const Term *t)
 {
-  const PetscInt *part = b->mesh->part, nbody = b->mesh->space->mesh->nbody, first = part[t->v[0]],
-                 second = part[t->v[t->nfirst]];
+  const PetscInt *part = b->mesh->part;
+  const PetscInt nbody = b->mesh->space->mesh->nbody;
+  const PetscInt first = part[t->v[0]];
+  const PetscInt second = part[t->v[t->nfirst]];
   const PetscBool turned = (PetscBool)(first == nbody);
   SbContactPoint p = {
     .id = {t->v[0], t->v[1], t->v[2]},
@@ -589,7 +700,8 @@ static SbContactPoint point_of(const Barrier *b, const Term *t)
   return p;
 }
 
-static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage, SbContactPoints *list)
+static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage,
+                                     SbContactPoints *list)
 {
   Barrier *b = (Barrier *)e->data;
   PetscBool *told;
@@ -605,14 +717,16 @@ static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage
     Term t;
 
     SbBarrierTerm(b, i, &t);
-    if (told[i] || !t.counts) continue;
+    if (told[i] || !t.counts)
+      continue;
     p = point_of(b, &t);
     if (spring >= 0) { /* separates an overlap, or rebounds */
       p.id[0] = -1 - spring;
       p.id[1] = t.v[0];
       p.id[2] = t.v[t.n - 1];
       p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
-      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
+      if (spring < b->nspring - b->nbounce)
+        p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
     } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
       p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].on.pair, b->x, &d);
     else
@@ -620,12 +734,15 @@ static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage
 
     /* friction there */
     for (PetscInt k = b->nactive; i < b->nactive && k < b->nactive + b->friction.n; k++) {
-      const SbContactPair *pair = &b->active[i].pair, *with = &b->friction.pair[k - b->nactive].on.pair;
+      const SbContactPair *pair = &b->active[i].pair;
+      const SbContactPair *with = &b->friction.pair[k - b->nactive].on.pair;
 
-      if (memcmp(pair, with, offsetof(SbContactPair, area))) continue; /* not the same features */
+      if (memcmp(pair, with, offsetof(SbContactPair, area)))
+        continue; /* not the same features */
       SbBarrierTerm(b, k, &t);
       other = point_of(b, &t);
-      for (int j = 0; j < 3; j++) p.force[j] += other.force[j];
+      for (int j = 0; j < 3; j++)
+        p.force[j] += other.force[j];
       told[k] = PETSC_TRUE;
       break;
     }
@@ -651,11 +768,13 @@ static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, P
     for (int k = 0; k < 4; k++) {
       const PetscInt v = vertex[k];
 
-      if (v >= m->nbody_vertex || a->at.weight[k] == 0.) continue;
+      if (v >= m->nbody_vertex || a->at.weight[k] == 0.)
+        continue;
       for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
         const PetscInt node = m->node[j];
 
-        if (node < 0 || node >= s->nnode_owned || a->gap >= gap[node]) continue;
+        if (node < 0 || node >= s->nnode_owned || a->gap >= gap[node])
+          continue;
         gap[node] = a->gap;
         for (int i3 = 0; i3 < 3; i3++)
           normal[3 * node + i3] = (a->at.weight[k] > 0. ? 1. : -1.) * a->at.n[i3];
@@ -673,9 +792,11 @@ static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char t
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 3, MPIU_REAL, MPI_MIN, s->comm));
   SbFormat(size, text, "nothing came nearer than %.3g m", (double)b->w[0]);
-  if (value[2] == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (value[2] == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbFormat(size, text,
-           "%.0f pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, shortest safe part of an "
+           "%.0f pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, shortest safe "
+           "part of an "
            "iteration %.2g",
            -(double)value[2], (double)value[0], (double)b->w[0], (double)value[1]);
   if (b->contact.friction.mu > 0.)
@@ -684,7 +805,8 @@ static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size, char text[])
+static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size,
+                                      char text[])
 {
   const Barrier *b = (const Barrier *)e->data;
   const PetscReal *x = b->x;
@@ -696,20 +818,24 @@ static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, siz
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < b->nactive; i++)
-    if (!least || b->active[i].gap < least->gap) least = &b->active[i];
+    if (!least || b->active[i].gap < least->gap)
+      least = &b->active[i];
   mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
   mine.rank = s->rank;
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
-  if (first.gap >= *gap) PetscFunctionReturn(PETSC_SUCCESS);
+  if (first.gap >= *gap)
+    PetscFunctionReturn(PETSC_SUCCESS);
   *gap = first.gap;
   if (s->rank == first.rank) {
     const SbContactPair *pair = &least->pair;
-    const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
+    const PetscInt part[2] = {b->mesh->part[pair->v[0]],
+                              b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
     const char *name[2];
 
     for (int k = 0; k < 2; k++)
       name[k] = part[k] < s->mesh->nbody ? s->mesh->body[part[k]].name : "the obstacle";
-    PetscCall(PetscSNPrintf(text, size, "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m",
+    PetscCall(PetscSNPrintf(text, size,
+                            "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m",
                             e->name, name[0], name[1], first.gap, (double)x[3 * pair->v[0]],
                             (double)x[3 * pair->v[0] + 1], (double)x[3 * pair->v[0] + 2]));
   }
@@ -721,7 +847,8 @@ static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, siz
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-  const PetscReal state[4] = {b->work, b->friction_loss, s->rank ? 0. : b->stiffer, s->rank ? 0. : b->scale};
+  const PetscReal state[4] = {b->work, b->friction_loss, s->rank ? 0. : b->stiffer,
+                              s->rank ? 0. : b->scale};
 
   PetscFunctionBeginUser;
   *n = 1;
@@ -730,8 +857,8 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[], PetscInt n,
-                                   const PetscReal records[])
+static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[],
+                                   PetscInt n, const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
   PetscReal sum[4] = {0.};
@@ -739,11 +866,13 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
-  for (PetscInt k = 0; k < 4 * n; k++) sum[k % 4] += records[k];
+  for (PetscInt k = 0; k < 4 * n; k++)
+    sum[k % 4] += records[k];
   b->work = s->rank ? 0. : sum[0];
   b->friction_loss = s->rank ? 0. : sum[1];
   b->stiffer = sum[2];
-  if (sum[3] > 0. && b->width == 0.) set_scale(e, sum[3]);
+  if (sum[3] > 0. && b->width == 0.)
+    set_scale(e, sum[3]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -771,14 +900,12 @@ static PetscErrorCode destroy_barrier(SbEffect e)
 
 PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
 {
-  static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",       "torque_x",
-                                         "torque_y", "torque_z", "contacts",      "penetration",
-                                         "gap",      "energy",   "friction_loss", "friction_lag",
-                                         "unguarded"},
-                           *const bodies[] = {
-                             "contacts",       "penetration",  "penetration_mean", "normal_force",
-                             "friction_force", "work",         "friction_loss",    "gap",
-                             "energy",         "friction_lag", "unguarded"};
+  static const char *const obstacle[] = {
+    "force_x",     "force_y", "force_z", "torque_x",      "torque_y",     "torque_z", "contacts",
+    "penetration", "gap",     "energy",  "friction_loss", "friction_lag", "unguarded"};
+  static const char *const bodies[] = {
+    "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
+    "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
@@ -814,6 +941,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   e->springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->nstate = 4;
   e->column = b->contact.obstacle ? obstacle : bodies;
-  e->ncolumn = b->contact.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
+  e->ncolumn =
+    b->contact.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

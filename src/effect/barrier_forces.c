@@ -1,16 +1,18 @@
 /*
-  barrier_forces.c - the pairs of the response `barrier` at an iterate, their energy and its derivatives, and
-  those of friction, described in barrier.c; lagged friction.
+  barrier_forces.c - the pairs of the response `barrier` at an iterate, their energy and its
+  derivatives, and those of friction, described in barrier.c; lagged friction.
 
-  Normal forces and slip directions of friction are those of an earlier state y: the start of the step, or the
-  solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is sum |F(x; x) - F(x; y)|
-  over the nodes, relative to the sum of mu N over the pairs: the change of normal forces, closest points and
-  slip directions. Fixed-point iterations, one solve each, end when it is small (Li et al. 2020, section 5.7).
-  They converge if a change of friction changes normal forces by less than itself.
+  Normal forces and slip directions of friction are those of an earlier state y: the start of the
+  step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is
+  sum |F(x; x) - F(x; y)| over the nodes, relative to the sum of mu N over the pairs: the change of
+  normal forces, closest points and slip directions. Fixed-point iterations, one solve each, end
+  when it is small (Li et al. 2020, section 5.7). They converge if a change of friction changes
+  normal forces by less than itself.
 */
 #include "barrier_impl.h"
 
-PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress, PetscReal x[])
+PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
+                              PetscReal x[])
 {
   const PetscInt first = 3 * b->mesh->nbody_vertex;
 
@@ -24,13 +26,17 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
 
 static int compare_active(const void *x, const void *y, void *unused)
 {
-  const SbContactPair *p = &((const Active *)x)->pair, *q = &((const Active *)y)->pair;
+  const SbContactPair *p = &((const Active *)x)->pair;
+  const SbContactPair *q = &((const Active *)y)->pair;
 
   (void)unused;
-  if (p->side != q->side) return p->side ? 1 : -1;
-  if (p->kind != q->kind) return p->kind < q->kind ? -1 : 1;
+  if (p->side != q->side)
+    return p->side ? 1 : -1;
+  if (p->kind != q->kind)
+    return p->kind < q->kind ? -1 : 1;
   for (int k = 0; k < 4; k++)
-    if (p->v[k] != q->v[k]) return p->v[k] < q->v[k] ? -1 : 1;
+    if (p->v[k] != q->v[k])
+      return p->v[k] < q->v[k] ? -1 : 1;
   return 0;
 }
 
@@ -40,11 +46,13 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscBool same;
 
   PetscFunctionBeginUser;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
+  if (!b->begun)
+    PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
   PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
   same = (PetscBool)(b->known && same && b->now == b->effect->progress);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
-  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  if (same)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(b->u, u, n));
   b->now = b->effect->progress;
   b->known = PETSC_TRUE;
@@ -55,9 +63,11 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
     const SbContactPair *pair = &b->pairs->pair[i];
     Active a;
 
-    if (SbContactPairSweptApart(b->mesh, pair, b->x, b->x, b->w[0])) continue;
+    if (SbContactPairSweptApart(b->mesh, pair, b->x, b->x, b->w[0]))
+      continue;
     a.gap = SbContactPairGap(b->mesh, pair, b->x, &a.at);
-    if (a.gap >= of_pair(b, b->w, pair)) continue;
+    if (a.gap >= of_pair(b, b->w, pair))
+      continue;
     a.pair = *pair;
     PetscCall(SbReserve(b->nactive + 1, sizeof(*b->active), &b->size, &b->active));
     b->active[b->nactive++] = a;
@@ -78,18 +88,21 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
               (b->x[3 * friction->on.pair.v[k] + i] - b->start[3 * friction->on.pair.v[k] + i]);
     normal += u[i] * friction->on.at.n[i];
   }
-  for (int i = 0; i < 3; i++) u[i] -= normal * friction->on.at.n[i];
+  for (int i = 0; i < 3; i++)
+    u[i] -= normal * friction->on.at.n[i];
   return PetscSqrtReal(SbDot3(u, u));
 }
 
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
-static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
+static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *energy,
+                              PetscReal gradient[12])
 {
   const SbContactPair *pair = &a->pair;
-  PetscReal force = 0., w2 = 0.;
+  PetscReal force = 0.;
+  PetscReal w2 = 0.;
 
-  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair), energy,
-                gradient, PETSC_FALSE, NULL);
+  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
+                energy, gradient, PETSC_FALSE, NULL);
   for (int k = 0; k < 4; k++) {
     force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
     w2 += PetscSqr(a->at.weight[k]);
@@ -106,16 +119,20 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt v = vertex[k];
 
-    if (v >= m->nbody_vertex) continue;
+    if (v >= m->nbody_vertex)
+      continue;
     for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
-      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned) continue;
-      for (int i = 0; i < 3; i++) f[3 * m->node[j] + i] += sign * m->weight[j] * gradient[3 * k + i];
+      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned)
+        continue;
+      for (int i = 0; i < 3; i++)
+        f[3 * m->node[j] + i] += sign * m->weight[j] * gradient[3 * k + i];
     }
   }
 }
 
-/* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order:
-   (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not matter here. */
+/* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to
+   first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not
+   matter here. */
 PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
                                          PetscReal *bound)
 {
@@ -131,8 +148,10 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
     const PetscReal force = normal_force(b, a, &energy, gradient);
 
     SbBarrier(a->gap, of_pair(b, b->w, pair), of_pair(b, b->k, pair), pair->area, d);
-    if (d[0] <= 0.) continue;
-    if (counts(b, pair)) *bound += 0.5 * force * a->gap;
+    if (d[0] <= 0.)
+      continue;
+    if (counts(b, pair))
+      *bound += 0.5 * force * a->gap;
     for (int k = 0; k < 12; k++)
       gradient[k] = energy / d[0] * d[2] * a->gap * a->at.weight[k / 3] * a->at.n[k % 3];
     spread(b, pair->side ? 1 : 4, pair->v, 1., gradient, f);
@@ -158,17 +177,20 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
       t->force = normal_force(b, a, &t->energy, t->gradient);
     else {
       PetscReal u[3];
-      const PetscReal y = SbBarrierSlip(b, &b->friction.pair[k], u), w = b->slip,
-                      N = b->friction.pair[k].force;
+      const PetscReal y = SbBarrierSlip(b, &b->friction.pair[k], u);
+      const PetscReal w = b->slip;
+      const PetscReal N = b->friction.pair[k].force;
 
-      for (int c = 0; c < 12; c++) t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
+      for (int c = 0; c < 12; c++)
+        t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
       t->energy = N * (y < w ? y * y / w - y * y * y / (3. * w * w) + w / 3. : y);
     }
   } else {
     const Spring *spring = &b->spring[k - b->friction.n];
 
     t->n = spring->at.n;
-    for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++) continue;
+    for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++)
+      continue;
     t->v = spring->at.v;
     t->weight = spring->at.weight;
     t->normal = spring->at.normal;
@@ -178,7 +200,8 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
   }
 }
 
-/* f += sign times the gradient of all energies at the current positions, N; returns this rank's sum, J. */
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's
+   sum, J. */
 static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0.;
@@ -188,7 +211,8 @@ static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
 
     SbBarrierTerm(b, i, &t);
     spread(b, t.n, t.v, sign, t.gradient, f);
-    if (t.counts) sum += t.energy;
+    if (t.counts)
+      sum += t.energy;
   }
   return sum;
 }
@@ -204,8 +228,8 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
-                                         PetscReal f[])
+PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
+                                         PetscReal *energy, PetscReal f[])
 {
   Barrier *b = (Barrier *)e->data;
 
@@ -219,34 +243,39 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
     PetscReal slip[3];
 
     (void)SbBarrierSlip(b, &b->friction.pair[i], slip);
-    if (SbDot3(slip, b->friction.pair[i].slip) < 0.) b->friction.pair[i].turns = PETSC_TRUE;
+    if (SbDot3(slip, b->friction.pair[i].slip) < 0.)
+      b->friction.pair[i].turns = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the blocks of a Hessian by n vertices where one of both has nodes here; H[144], or with `weight` H[9]
-   with respect to the weighted sum of positions. */
-static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[], const PetscReal weight[],
-                                 const PetscReal H[])
+/* Adds the blocks of a Hessian by n vertices where one of both has nodes here; H[144], or with
+   `weight` H[9] with respect to the weighted sum of positions. */
+static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[],
+                                 const PetscReal weight[], const PetscReal H[])
 {
   const SbContactMesh m = b->mesh;
 
   PetscFunctionBeginUser;
   for (PetscInt p = 0; p < n; p++) {
     for (PetscInt q = p; q < n; q++) {
-      const PetscInt v = vertex[p], w = vertex[q];
+      const PetscInt v = vertex[p];
+      const PetscInt w = vertex[q];
       PetscReal block[9];
 
-      if (v >= m->nbody_vertex || w >= m->nbody_vertex || !(m->mine[v] | m->mine[w])) continue;
-      for (int k = 0; weight && k < 9; k++) block[k] = weight[p] * weight[q] * H[k];
-      PetscCall(SbContactBlocksAdd(&b->blocks, v, w, weight ? block : H + 36 * p + 3 * q, weight ? 3 : 12));
+      if (v >= m->nbody_vertex || w >= m->nbody_vertex || !(m->mine[v] | m->mine[w]))
+        continue;
+      for (int k = 0; weight && k < 9; k++)
+        block[k] = weight[p] * weight[q] * H[k];
+      PetscCall(
+        SbContactBlocksAdd(&b->blocks, v, w, weight ? block : H + 36 * p + 3 * q, weight ? 3 : 12));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
-                                       SbBlocks *blocks, PetscReal r[])
+PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
+                                       SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
 {
   Barrier *b = (Barrier *)e->data;
   PetscReal energy, gradient[12], H[144];
@@ -258,39 +287,46 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     const Active *a = &b->active[i];
     const SbContactPair *pair = &a->pair;
 
-    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
-                  &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
+    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair),
+                  of_pair(b, b->k, pair), &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT),
+                  H);
     PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
   }
 
-  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has
-     f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking:
-     a spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it
-     slides. */
+  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from
+     above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is
+     treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full
+     step leaves it beyond e, it slides. */
   for (PetscInt i = 0; i < b->friction.n; i++) {
     FrictionPair *friction = &b->friction.pair[i];
     PetscReal T[9];
-    const PetscReal y = SbBarrierSlip(b, friction, friction->slip), w = b->slip;
-    PetscReal slope = SbBarrierSlope(b, y), curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
+    const PetscReal y = SbBarrierSlip(b, friction, friction->slip);
+    const PetscReal w = b->slip;
+    PetscReal slope = SbBarrierSlope(b, y);
+    PetscReal curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
-    friction->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
-                                   (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
+    friction->sticks =
+      (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
+                  (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
     friction->turns = PETSC_FALSE;
     if (friction->sticks) {
       PetscReal force[12];
 
       for (int k = 0; k < 12; k++)
-        force[k] = friction->force * (1. / w - slope) * friction->on.at.weight[k / 3] * friction->slip[k % 3];
+        force[k] = friction->force * (1. / w - slope) * friction->on.at.weight[k / 3] *
+                   friction->slip[k % 3];
       spread(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, 1., force, r);
       slope = curve = 1. / w;
     } else if (kind == SB_HESSIAN_MAJORIZED)
       curve = slope;
     for (int k = 0; k < 9; k++) {
       T[k] = slope * ((k % 4 ? 0. : 1.) - friction->on.at.n[k / 3] * friction->on.at.n[k % 3]);
-      if (y > 0.) T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
+      if (y > 0.)
+        T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
       T[k] *= friction->force;
     }
-    PetscCall(add_blocks(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, friction->on.at.weight, T));
+    PetscCall(add_blocks(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v,
+                         friction->on.at.weight, T));
   }
 
   /* active springs */
@@ -298,7 +334,8 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     const Spring *spring = &b->spring[i];
     PetscReal T[9];
 
-    if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
+    if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal)
+      continue;
     for (int k = 0; k < 9; k++)
       T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];
     PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
@@ -307,23 +344,32 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacement in the step of the obstacle's contact point by rotation, beyond that of its vertices. */
+/* Displacement in the step of the obstacle's contact point by rotation, beyond that of its
+   vertices. */
 static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
 {
   const SbContactMesh m = b->mesh;
   const PetscInt *v = friction->on.pair.v;
-  const PetscReal *weight = friction->on.at.weight, *n = friction->on.at.n;
-  PetscReal X[3], at[3] = {0}, other[3], sign = 0.;
+  const PetscReal *weight = friction->on.at.weight;
+  const PetscReal *n = friction->on.at.n;
+  PetscReal X[3];
+  PetscReal at[3] = {0};
+  PetscReal other[3];
+  PetscReal sign = 0.;
 
   for (int k = 0; k < 4; k++) {
-    if (v[k] >= m->nbody_vertex || weight[k] == 0.) continue;
+    if (v[k] >= m->nbody_vertex || weight[k] == 0.)
+      continue;
     sign = weight[k] > 0. ? 1. : -1.;
-    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(weight[k]) * b->x[3 * v[k] + i];
+    for (int i = 0; i < 3; i++)
+      at[i] += PetscAbsReal(weight[k]) * b->x[3 * v[k] + i];
   }
-  for (int i = 0; i < 3; i++) at[i] -= sign * friction->on.gap * n[i];
+  for (int i = 0; i < 3; i++)
+    at[i] -= sign * friction->on.gap * n[i];
   SbPoseInvert(&b->pose[end], at, X);
   SbPoseApply(&b->pose[!end], X, other);
-  for (int i = 0; i < 3; i++) friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
+  for (int i = 0; i < 3; i++)
+    friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
   for (int k = 0; k < 4; k++) {
     const PetscInt o = 3 * (v[k] - m->nbody_vertex);
 
@@ -341,7 +387,8 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
     FrictionPair friction = {.on = b->active[i]};
 
     friction.force = b->contact.friction.mu * normal_force(b, &friction.on, &energy, gradient);
-    if (b->contact.obstacle) find_rotation(b, end, &friction);
+    if (b->contact.obstacle)
+      find_rotation(b, end, &friction);
     PetscCall(SbReserve(b->next.n + 1, sizeof(*b->next.pair), &b->next.size, &b->next.pair));
     b->next.pair[b->next.n++] = friction;
   }
@@ -359,7 +406,8 @@ void SbBarrierSwapFriction(Barrier *b)
 PetscErrorCode SbBarrierLag(Barrier *b)
 {
   const SbSpace s = b->mesh->space;
-  PetscReal *f, sum[2] = {0.};
+  PetscReal *f;
+  PetscReal sum[2] = {0.};
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
@@ -370,7 +418,8 @@ PetscErrorCode SbBarrierLag(Barrier *b)
   SbBarrierSwapFriction(b);
   (void)add_gradient(b, -1., f);
   SbBarrierSwapFriction(b);
-  for (PetscInt i = 0; i < s->nnode_owned; i++) sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   for (PetscInt i = 0; i < b->next.n; i++)
     sum[1] += counts(b, &b->next.pair[i].on.pair) ? b->next.pair[i].force : 0.;
   PetscCall(PetscFree(f));

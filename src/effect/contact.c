@@ -1,27 +1,34 @@
 /*
   contact.c - the effect `contact`: its options, and which response a scene gets.
 
-  Without an obstacle: contact between the bodies of the sets, and self-contact on request, by `barrier`. With
-  an obstacle: contact of the surfaces `on` with it, by `barrier` or by responses of nodes (contact_node.c).
+  Without an obstacle: contact between the bodies of the sets, and self-contact on request, by
+  `barrier`. With an obstacle: contact of the surfaces `on` with it, by `barrier` or by responses of
+  nodes (contact_node.c).
 
-  Response `auto` is the same for all effects of a scene, as Newton's method has one potential and one set of
-  constraints: `barrier` with contact between bodies. `projected` is exact, and safe for half-spaces and
-  bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and
-  faces, or be passed within a step: there it is `barrier`, unless the scene needs an option that it lacks.
+  Response `auto` is the same for all effects of a scene, as Newton's method has one potential and
+  one set of constraints: `barrier` with contact between bodies. `projected` is exact, and safe for
+  half-spaces and bowls, where the surface is outside whenever its vertices are. Other obstacles can
+  penetrate edges and faces, or be passed within a step: there it is `barrier`, unless the scene
+  needs an option that it lacks.
 */
 #include "barrier_impl.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
   {"obstacle", SB_OPTION_STRING, 1, "", "", "",
-   "rigid obstacle (m): plane:nx,ny,nz,d (half-space n.x <= d), sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, "
-   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (everything outside the sphere), "
-   "mesh:FILE (inside of a closed surface: .stl, .obj, .off, .msh); without it: contact between bodies"},
+   "rigid obstacle (m): plane:nx,ny,nz,d (half-space n.x <= d), sphere:x,y,z,r, "
+   "box:x0,y0,z0,x1,y1,z1, "
+   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (everything outside "
+   "the sphere), "
+   "mesh:FILE (inside of a closed surface: .stl, .obj, .off, .msh); without it: contact between "
+   "bodies"},
   {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
-  {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: translation, after scaling"},
+  {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
+   "mesh: translation, after scaling"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "path of the obstacle, three formulas of the time t; live: interactive, as the file live.txt says during "
+   "path of the obstacle, three formulas of the time t; live: interactive, as the file live.txt "
+   "says during "
    "the run"},
   {"angle", SB_OPTION_FORMULA, 1, "degrees", "0", "",
    "rotation of the obstacle about the axis, a formula of t"},
@@ -29,47 +36,64 @@ static const SbOption rows[] = {
   {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis; torques are about it"},
   {"self", SB_OPTION_BOOL, 1, "", "false", "", "without an obstacle: self-contact as well"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "static coefficient of friction"},
-  {"response", SB_OPTION_CHOICE, 1, "", "auto", "auto|projected|multiplier|augmented|penalty|barrier",
-   "how contact is enforced. auto: barrier between bodies; with an obstacle projected where it is a "
+  {"response", SB_OPTION_CHOICE, 1, "", "auto",
+   "auto|projected|multiplier|augmented|penalty|barrier",
+   "how contact is enforced. auto: barrier between bodies; with an obstacle projected where it is "
+   "a "
    "half-space or bowl, or where an option needs it, else barrier. projected: active "
-   "set, constraints eliminated by solving in their null space; multiplier: Lagrange multipliers; augmented: "
-   "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; barrier: a "
-   "potential that grows without bound as the gap closes (incremental potential contact), so that surfaces "
+   "set, constraints eliminated by solving in their null space; multiplier: Lagrange multipliers; "
+   "augmented: "
+   "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; "
+   "barrier: a "
+   "potential that grows without bound as the gap closes (incremental potential contact), so that "
+   "surfaces "
    "never pass through each other"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "response barrier: activation distance, the gap below which surfaces repel each other; 0: a thousandth of "
-   "the diagonal of the smallest body, at most 0.003 times the cube root of its volume and half of its "
+   "response barrier: activation distance, the gap below which surfaces repel each other; 0: a "
+   "thousandth of "
+   "the diagonal of the smallest body, at most 0.003 times the cube root of its volume and half of "
+   "its "
    "shortest edge"},
   {"barrier_pressure", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
-   "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the softer "
+   "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the "
+   "softer "
    "body"},
   {"verify", SB_OPTION_BOOL, 1, "", "false", "",
-   "response barrier: after each step, search for edges that intersect triangles; an intersection ends the "
+   "response barrier: after each step, search for edges that intersect triangles; an intersection "
+   "ends the "
    "run"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
-   "response barrier: largest number of lagged-friction iterations of a step, each with the normal forces "
-   "and slip directions at the end of the one before; 0: one, or two if friction changes by more than half, "
+   "response barrier: largest number of lagged-friction iterations of a step, each with the normal "
+   "forces "
+   "and slip directions at the end of the one before; 0: one, or two if friction changes by more "
+   "than half, "
    "in static runs 100"},
   {"friction_tolerance", SB_OPTION_REAL, 1, "", "1e-3", "(0, inf)",
-   "response barrier: tolerance of lagged friction, its change in an iteration relative to Coulomb's limit"},
+   "response barrier: tolerance of lagged friction, its change in an iteration relative to "
+   "Coulomb's limit"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "kinetic coefficient of friction; negative: equal to the static one; not with barrier"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
-   "penalty, augmented and friction: factor on the stiffness min(lambda + 2 mu, 11 mu) area / height of the "
+   "penalty, augmented and friction: factor on the stiffness min(lambda + 2 mu, 11 mu) area / "
+   "height of the "
    "tet behind the surface"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
-   "coefficient of restitution, the ratio of normal relative velocities after and before impact; needs -time "
-   "euler_implicit, and steps in which elastic waves cross the body; projected, multiplier and barrier"},
+   "coefficient of restitution, the ratio of normal relative velocities after and before impact; "
+   "needs -time "
+   "euler_implicit, and steps in which elastic waves cross the body; projected, multiplier and "
+   "barrier"},
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "yes: a step in which contact begins is cut at the first time of impact; not with barrier"},
   {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
-   "penetration that is there at the start is resolved gradually: number of steps in which its depth falls "
+   "penetration that is there at the start is resolved gradually: number of steps in which its "
+   "depth falls "
    "to 1/e; 1, and in static runs: at once"},
   {"pairs", SB_OPTION_BOOL, 1, "", "false", "",
-   "between bodies: columns in history.csv for each pair of bodies: force of the first on the second, number "
+   "between bodies: columns in history.csv for each pair of bodies: force of the first on the "
+   "second, number "
    "of contacts"},
 };
 
@@ -98,10 +122,12 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 
     SbScopeSet(&scope, "effect", "", name);
     PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
-    if (strcmp(text[0] ? text : name, "contact")) continue;
+    if (strcmp(text[0] ? text : name, "contact"))
+      continue;
     SbScopeSet(&scope, "effect", "contact", name);
     PetscCall(SbOptionChoice(&scope, "response", &choice));
-    if (choice != AUTO) other = (SbResponse)choice;
+    if (choice != AUTO)
+      other = (SbResponse)choice;
     PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
     bodies = (PetscBool)(bodies || !text[0]);
     vertices = (PetscBool)(vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
@@ -111,14 +137,18 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
       PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
       lacks = (PetscBool)(lacks || given);
     }
-    if (i >= 0) continue;
+    if (i >= 0)
+      continue;
     *response = other;
     PetscCheck(!bodies || other == AUTO || other == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave it out, or "
+               "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
+               "it out, or "
                "give -effect_%s_obstacle",
                e->name, names_of_responses[other], e->name);
-    if (other != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-    if (SbOptionFind(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+    if (other != AUTO)
+      PetscFunctionReturn(PETSC_SUCCESS);
+    if (SbOptionFind(&SbRunScope, "effects"))
+      PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   }
   PetscCall(PetscFree(names));
 
@@ -134,7 +164,8 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
          : lacks         ? "an option that barrier lacks"
          : vertices      ? "half-spaces and bowls only"
                          : "edges and corners may touch";
-  if (other == AUTO) other = !possible || lacks || vertices ? PROJECTED : BARRIER;
+  if (other == AUTO)
+    other = !possible || lacks || vertices ? PROJECTED : BARRIER;
   *response = bodies || other == BARRIER ? BARRIER : PROJECTED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,7 +183,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscFunctionBeginUser;
   e->ops = SbContactNodeOps;
   PetscCall(choose(e, &c->response, &why));
-  if (why) SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
+  if (why)
+    SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
 
   /* the obstacle and its path; without one: options of contact between bodies */
   PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
@@ -168,10 +200,10 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   } else {
     for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
       PetscCall(SbOptionGiven(scope, exact_only[k], &given));
-      PetscCheck(
-        !given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-        "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
-        e->name, exact_only[k]);
+      PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+                 "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
+                 "leave it out",
+                 e->name, exact_only[k]);
     }
     PetscCall(SbOptionBool(scope, "self", &c->self));
     PetscCall(SbOptionBool(scope, "pairs", &c->pairs));
@@ -188,7 +220,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   }
 
   PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
-  if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
+  if (c->friction.mu_kinetic < 0)
+    c->friction.mu_kinetic = c->friction.mu;
   PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
              "start and stop in turn",
@@ -196,16 +229,18 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionSecond(scope, "time_of_impact", &c->cut));
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "damping", &c->damping));
-  PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
-             e->name, (double)c->damping, e->name);
+  PetscCheck(
+    c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
+    e->name, (double)c->damping, e->name);
   PetscCheck(!e->euler || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier", e->name,
-             (double)c->bounce.e, e->name);
-  PetscCheck(!e->euler || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
-             "that ends at the impact has no rebound; leave one of them out",
+             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier",
              e->name, (double)c->bounce.e, e->name);
+  PetscCheck(
+    !e->euler || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
+    "that ends at the impact has no rebound; leave one of them out",
+    e->name, (double)c->bounce.e, e->name);
 
   e->nstate = SB_CONTACT_STATE;
   e->by_node = PETSC_TRUE;
@@ -213,8 +248,10 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
   e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
-  if (!c->cut) e->ops.time_of_impact = NULL;
-  if (!e->euler) e->ops.restitution = NULL;
+  if (!c->cut)
+    e->ops.time_of_impact = NULL;
+  if (!e->euler)
+    e->ops.restitution = NULL;
   c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
   if (c->held) {
     e->ops.force = NULL; /* forces come from the constraints */
@@ -222,7 +259,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   } else {
     e->ops.assemble_constraints = NULL;
     e->linear = PETSC_FALSE;
-    if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
+    if (c->response == PENALTY && !c->cut)
+      e->ops.update_active_set = NULL;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

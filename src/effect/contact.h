@@ -1,27 +1,36 @@
 /*
-  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c, friction.c) and
-  of surfaces (barrier.c).
+  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c,
+  friction.c) and of surfaces (barrier.c).
 */
 #pragma once
 #include "effect_impl.h"
 #include "sbcontact.h"
 
-typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
+typedef enum {
+  AUTO,
+  PROJECTED,
+  MULTIPLIER,
+  AUGMENTED,
+  PENALTY,
+  BARRIER
+} SbResponse;
 
 /* Coefficients of friction of an effect, and convergence in a step. */
 typedef struct {
   PetscReal mu, mu_kinetic;
-  int updates;     /* number of updates within the step */
-  PetscReal error; /* largest error of friction after the last solve, relative to the largest friction */
-  PetscBool said;  /* the warning that friction did not converge was given */
+  int updates; /* number of updates within the step */
+  PetscReal
+    error; /* largest error of friction after the last solve, relative to the largest friction */
+  PetscBool said; /* the warning that friction did not converge was given */
 } SbFriction;
 
-/* Gradual resolution of penetration: its depth falls to 1/e in `separation_steps` whole steps; a shorter step
-   resolves less of it, at the same speed. */
+/* Gradual resolution of penetration: its depth falls to 1/e in `separation_steps` whole steps; a
+   shorter step resolves less of it, at the same speed. */
 typedef struct {
-  PetscReal recovery; /* factor on the depth in a whole step, exp(-1/separation_steps); 0: resolved at once */
-  PetscReal longest;  /* step so far, s */
-  PetscReal left;     /* factor on the depth in this step */
+  PetscReal
+    recovery; /* factor on the depth in a whole step, exp(-1/separation_steps); 0: resolved at once */
+  PetscReal longest; /* step so far, s */
+  PetscReal left;    /* factor on the depth in this step */
 } SbOverlap;
 
 static inline void SbOverlapBegin(SbOverlap *o, PetscReal dt)
@@ -45,11 +54,11 @@ static inline PetscReal SbRestitutionGap(const SbRestitution *r, PetscReal gap0,
 
 /* Friction state of a node. */
 typedef struct {
-  PetscInt slide[2];       /* tangential constraints, -1: none */
-  PetscBool slides;        /* slides in the solve; else it sticks */
-  PetscBool slid;          /* slid in the last step */
-  PetscBool crowded;       /* also constrained by other effects: sticks by springs while in contact */
-  int flips;               /* changes of stick and slip, or reversals, within the step */
+  PetscInt slide[2]; /* tangential constraints, -1: none */
+  PetscBool slides;  /* slides in the solve; else it sticks */
+  PetscBool slid;    /* slid in the last step */
+  PetscBool crowded; /* also constrained by other effects: sticks by springs while in contact */
+  int flips;         /* changes of stick and slip, or reversals, within the step */
   PetscReal tangent[2][3]; /* tangents; the first one is the slip direction */
   PetscReal turning;       /* tangential stiffness normal to the slip direction, N/m */
   PetscReal stretch[3];    /* deflection of sticking springs at the start of the step, m */
@@ -79,26 +88,29 @@ typedef struct {
   Plane other;            /* the second one */
   PetscInt other_along;   /* as along */
   PetscReal other_lambda; /* N */
-  PetscReal rest;     /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
+  PetscReal
+    rest; /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
   PetscReal kept;     /* springs: the same at the end of the last step, m */
   PetscReal gap;      /* after the last solve, beyond `rest`, m */
   PetscReal approach; /* restitution: speed of approach, m/s; 0: no rebound */
   PetscReal stiff;    /* of the spring in this step with its damper, N/m */
   PetscReal before;   /* damper: force from the node's gap at the start of the step, N */
   PetscReal lambda;   /* multiplier of the last solve, N */
-  PetscReal wrong;    /* constraints as springs: force at its position less that of the last solve, N */
+  PetscReal
+    wrong; /* constraints as springs: force at its position less that of the last solve, N */
   SbFrictionState friction;
-  PetscReal start[3];   /* displacement with which it would stick, m */
-  PetscReal now[3];     /* that of the last solve, m */
-  PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
+  PetscReal start[3]; /* displacement with which it would stick, m */
+  PetscReal now[3];   /* that of the last solve, m */
+  PetscReal
+    stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
 } Touch;
 
 typedef struct {
   SbResponse response;    /* not AUTO */
   SbObstacle obstacle;    /* NULL: contact between bodies */
   PetscReal scale, at[3]; /* of the file of a mesh */
-  SbPath path;            /* of the obstacle; torques are about the point of its axis, which moves with it */
-  PetscBool self, pairs;  /* between bodies: self-contact; columns for each pair of bodies */
+  SbPath path; /* of the obstacle; torques are about the point of its axis, which moves with it */
+  PetscBool self, pairs; /* between bodies: self-contact; columns for each pair of bodies */
   SbFriction friction;
   SbOverlap overlap;
   SbRestitution bounce;
@@ -131,9 +143,9 @@ PetscErrorCode SbContactDestroy(SbEffect e);
 extern const SbEffectOps SbContactNodeOps;
 
 /* Friction (friction.c). Not collective. Begin: a step; touches: active at the end of the last
-   one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`
-   (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read: their forces after
-   a solve, N being the normal force. */
+   one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by
+   `depth` (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read:
+   their forces after a solve, N being the normal force. */
 void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
 void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth);
 void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3]);

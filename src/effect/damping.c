@@ -1,10 +1,10 @@
 /*
   damping.c - Rayleigh damping, C = alpha M + beta K, of some bodies or of all.
 
-  A mode of angular frequency w is damped with the ratio zeta = (alpha / w + beta w) / 2: alpha slows the
-  whole motion as in a viscous medium (rigid motion too), beta takes out fast vibration. This effect writes
-  the two numbers into the space at set-up; the forces come with inertia and with the internal
-  force. Two dampings of one body add up.
+  A mode of angular frequency w is damped with the ratio zeta = (alpha / w + beta w) / 2: alpha
+  slows the whole motion as in a viscous medium (rigid motion too), beta takes out fast vibration.
+  This effect writes the two numbers into the space at set-up; the forces come with inertia and with
+  the internal force. Two dampings of one body add up.
 */
 #include "effect_impl.h"
 
@@ -14,8 +14,10 @@ typedef struct {
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "", "", "bodies that are damped; default: all"},
-  {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)", "Rayleigh damping: factor on the mass matrix"},
-  {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)", "Rayleigh damping: factor on the stiffness matrix"},
+  {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)",
+   "Rayleigh damping: factor on the mass matrix"},
+  {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "Rayleigh damping: factor on the stiffness matrix"},
 };
 
 static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
@@ -34,29 +36,34 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
   const SbMesh mesh = space->mesh;
 
   PetscFunctionBeginUser;
+
   /* an error with the nearest names where there is no such body */
   for (PetscInt i = 0; i < e->on.n; i++) {
     PetscInt b = 0;
 
-    while (b < mesh->nbody && strcmp(mesh->body[b].name, e->on.name[i])) b++;
+    while (b < mesh->nbody && strcmp(mesh->body[b].name, e->on.name[i]))
+      b++;
     if (b == mesh->nbody) {
       const char **names;
       char near[512];
 
       PetscCall(PetscMalloc1(mesh->nbody, &names));
-      for (b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
+      for (b = 0; b < mesh->nbody; b++)
+        names[b] = mesh->body[b].name;
       SbSuggestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near);
       PetscCall(PetscFree(names));
       SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
-              "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", e->on.option, e->on.name[i],
-              near[0] ? "; did you mean " : "", near);
+              "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", e->on.option,
+              e->on.name[i], near[0] ? "; did you mean " : "", near);
     }
   }
   for (PetscInt b = 0; b < mesh->nbody; b++) {
     PetscInt i = 0;
 
-    while (i < e->on.n && strcmp(mesh->body[b].name, e->on.name[i])) i++;
-    if (e->on.n && i == e->on.n) continue;
+    while (i < e->on.n && strcmp(mesh->body[b].name, e->on.name[i]))
+      i++;
+    if (e->on.n && i == e->on.n)
+      continue;
     space->alpha[b] += d->alpha;
     space->beta[b] += d->beta;
   }

@@ -1,23 +1,25 @@
 /*
-  deadload.c - the effects `body_force`, a force per rest volume, `traction`, a force per rest area, and
-  `point_force`, shared equally by the vertices of the named sets; of fixed direction (dead loads), given as
-  three formulas of time and, but for vertices, of rest position.
+  deadload.c - the effects `body_force`, a force per rest volume, `traction`, a force per rest area,
+  and `point_force`, shared equally by the vertices of the named sets; of fixed direction (dead
+  loads), given as three formulas of time and, but for vertices, of rest position.
 
-  f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X its map. A
-  total force of a traction is uniform over the rest area of its facets, and adds up with the formulas. Every
-  rank integrates its owned and its ghost cells, so rows of owned nodes are complete without communication.
+  f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X
+  its map. A total force of a traction is uniform over the rest area of its facets, and adds up with
+  the formulas. Every rank integrates its owned and its ghost cells, so rows of owned nodes are
+  complete without communication.
 
-  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic
-  (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud,
-  "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order convergence of linear elements
-  needs degree 2; the rest lowers the constant at no cost, because a steady load is integrated once.
+  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4:
+  SbRuleQuintic (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet
+  (Radon 1948; Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order
+  convergence of linear elements needs degree 2; the rest lowers the constant at no cost, because a
+  steady load is integrated once.
 
-  Point force: the displacement of vertex v is the mean over the cells c around it, weighted by their volumes
-  w_c, and its part of the force goes the same way back: node a of cell c has w_c phi_a(v) / sum w of it. With
-  P1 and P2 that is the force on the node at v; with CR and DG, where phi_a(v) is 1 or -2, total force and
-  moment are those of the force on the vertices, since mean and elements reproduce linear functions. A force
-  on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h); use a
-  traction where the area matters.
+  Point force: the displacement of vertex v is the mean over the cells c around it, weighted by
+  their volumes w_c, and its part of the force goes the same way back: node a of cell c has w_c
+  phi_a(v) / sum w of it. With P1 and P2 that is the force on the node at v; with CR and DG, where
+  phi_a(v) is 1 or -2, total force and moment are those of the force on the vertices, since mean and
+  elements reproduce linear functions. A force on a single vertex has no limit under mesh refinement
+  (the displacement under it grows like 1/h); use a traction where the area matters.
 */
 #include "effect_impl.h"
 #include "sbgeometry.h"
@@ -26,8 +28,10 @@ typedef struct {
   SbFormula density[3];    /* N/m^3 or Pa; of points the total force, N */
   PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
   PetscInt ncorner, nitem; /* 4 for tets, 3 for facets, 1 for a vertex of a cell */
-  PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
-  PetscReal *around; /* [nvert] of points: six times the volume of the tets around, times their number */
+  PetscInt
+    *corner; /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscReal
+    *around; /* [nvert] of points: six times the volume of the tets around, times their number */
   PetscInt n, *node; /* [n] owned nodes of these cells */
   PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
   PetscReal t;       /* s */
@@ -37,7 +41,8 @@ static const SbOption body_force_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "", "", "sets on whose tets the force acts; default: all bodies"},
   {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "",
    "force per reference volume, three formulas of t and the reference position x, y, z"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "",
+   "amplitude: factor on the force, a formula of the time t"},
 };
 
 static const SbOption traction_rows[] = {
@@ -46,13 +51,15 @@ static const SbOption traction_rows[] = {
    "force per reference area, three formulas of t and the reference position x, y, z"},
   {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
    "total force, spread evenly over the reference area of the sets"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the traction, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "",
+   "amplitude: factor on the traction, a formula of the time t"},
 };
 
 static const SbOption point_force_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose vertices share the force equally"},
   {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "",
+   "amplitude: factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
@@ -65,14 +72,15 @@ static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
   if (load->ncorner == 3) {
     PetscCall(SbOptionGiven(scope, "vector", &vector));
     PetscCall(SbOptionGiven(scope, "total", &total));
-    PetscCheck(
-      vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-      "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
-      e->name, e->name, e->name);
+    PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, "
+               "three numbers)",
+               e->name, e->name, e->name);
   }
   PetscCall(SbEffectFormulas(e, scope, load->ncorner == 4 ? "density" : "vector", 3,
                              (PetscBool)(load->ncorner > 1), load->density));
-  if (load->ncorner == 3) PetscCall(SbOptionReals(scope, "total", load->uniform));
+  if (load->ncorner == 3)
+    PetscCall(SbOptionReals(scope, "total", load->uniform));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,34 +93,49 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
   const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : nc == 3 ? &SbRuleFacet : &vertex;
 
   load->t = t;
-  for (PetscInt i = 0; i < 3 * space->nnode; i++) load->value[i] = 0;
+  for (PetscInt i = 0; i < 3 * space->nnode; i++)
+    load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
-    const PetscInt *corner = &load->corner[nc * item], cell = corner[0] / 4;
+    const PetscInt *corner = &load->corner[nc * item];
+    const PetscInt cell = corner[0] / 4;
     const PetscBool curved = (PetscBool)(mesh->cell_set[cell] & SB_CURVED);
     const PetscReal part = /* of a vertex in the cell */
-      nc > 1 ? 1 : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
-    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3] = {{0}}, normal[3];
+      nc > 1
+        ? 1
+        : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
+    PetscReal nodes[SB_CELL_NODES][3], x[4][3];
+    PetscReal e[3][3] = {{0}};
+    PetscReal normal[3];
 
-    if (curved) SbSpaceCellPositions(space, cell, nodes);
-    for (int k = 0; k < 12; k++) x[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
+    if (curved)
+      SbSpaceCellPositions(space, cell, nodes);
+    for (int k = 0; k < 12; k++)
+      x[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
     for (int k = 0; k < rule->n; k++) {
-      PetscReal L[4] = {0}, phi[SB_CELL_NODES], p[3] = {0}, q[3], measure;
+      PetscReal L[4] = {0};
+      PetscReal phi[SB_CELL_NODES];
+      PetscReal p[3] = {0};
+      PetscReal q[3], measure;
       PetscInt n;
 
-      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = rule->L[k][c];
+      for (PetscInt c = 0; c < nc; c++)
+        L[corner[c] % 4] = rule->L[k][c];
       n = SbCellBasis(SbSpaceCellElement(space, cell), L, phi);
       for (PetscInt a = 0; a < 3 * n; a++)
         p[a % 3] += phi[a / 3] * space->node_x[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3];
 
       /* volume or area of the simplex with the derivatives of the map at the point */
-      if (curved) SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
-      for (PetscInt c = 1; c < nc; c++) SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
+      if (curved)
+        SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
+      for (PetscInt c = 1; c < nc; c++)
+        SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
       SbCross(e[0], e[1], normal);
       measure = nc == 4   ? PetscAbsReal(SbDot3(normal, e[2])) / 6
                 : nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2
                           : part;
       for (int i = 0; i < 3; i++)
-        q[i] = measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
+        q[i] =
+          measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
       for (PetscInt a = 0; a < 3 * n; a++)
         load->value[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3] += phi[a / 3] * q[a % 3];
     }
@@ -124,9 +147,12 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
   DeadLoad *load = (DeadLoad *)e->data;
   const SbMesh mesh = space->mesh;
   const PetscInt nc = load->ncorner;
-  PetscBool steady = PETSC_TRUE, *touched;
+  PetscBool steady = PETSC_TRUE;
+  PetscBool *touched;
   PetscReal total = 0; /* area of the facets, or number of the vertices */
-  PetscInt n, size = 0, *items = NULL;
+  PetscInt n;
+  PetscInt size = 0;
+  PetscInt *items = NULL;
   SbFacet *facets = NULL;
 
   PetscFunctionBeginUser;
@@ -136,12 +162,14 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
     PetscCall(SbEffectItems(space, &e->on, nc == 4 ? SB_ON_CELLS : SB_ON_VERTICES, &n, &items));
   if (nc == 1) {
     PetscCall(PetscCalloc1(mesh->nvert, &load->around));
-    for (PetscInt i = 0; i < n; i++) total += items[i] < mesh->nvert_owned;
+    for (PetscInt i = 0; i < n; i++)
+      total += items[i] < mesh->nvert_owned;
     for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
       PetscInt at;
 
       PetscCall(PetscFindInt(mesh->cell[i], n, items, &at));
-      if (at < 0) continue;
+      if (at < 0)
+        continue;
       PetscCall(SbReserve(load->nitem + 1, sizeof(*load->corner), &size, &load->corner));
       load->corner[load->nitem++] = i;
       load->around[mesh->cell[i]] += SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4));
@@ -151,35 +179,44 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
     PetscCall(PetscMalloc1(nc * n, &load->corner));
     for (PetscInt i = 0; i < n; i++) {
       for (PetscInt a = 0; a < nc; a++)
-        load->corner[nc * i + a] = nc == 4 ? 4 * items[i] + a : 4 * facets[i].cell + facets[i].corner[a];
-      if (nc == 3 && facets[i].cell < mesh->ncell_owned) total += facets[i].area;
+        load->corner[nc * i + a] =
+          nc == 4 ? 4 * items[i] + a : 4 * facets[i].cell + facets[i].corner[a];
+      if (nc == 3 && facets[i].cell < mesh->ncell_owned)
+        total += facets[i].area;
     }
   }
   PetscCall(PetscFree(items));
   PetscCall(PetscFree(facets));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3 && nc == 3; i++) load->uniform[i] /= total;
-  for (PetscInt v = 0; v < mesh->nvert && nc == 1; v++) load->around[v] *= total;
+  for (int i = 0; i < 3 && nc == 3; i++)
+    load->uniform[i] /= total;
+  for (PetscInt v = 0; v < mesh->nvert && nc == 1; v++)
+    load->around[v] *= total;
 
   /* the owned nodes of these cells: a load on few costs little in a large mesh */
   PetscCall(PetscCalloc1(space->nnode, &touched));
   for (PetscInt i = 0; i < load->nitem; i++) {
     const PetscInt cell = load->corner[nc * i] / 4;
 
-    for (PetscInt a = 0; a < (SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4); a++)
+    for (PetscInt a = 0; a < (SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4);
+         a++)
       touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
   }
-  for (PetscInt i = 0; i < space->nnode_owned; i++) load->n += touched[i];
+  for (PetscInt i = 0; i < space->nnode_owned; i++)
+    load->n += touched[i];
   PetscCall(PetscMalloc1(load->n, &load->node));
   for (PetscInt i = space->nnode_owned - 1, k = load->n; i >= 0; i--)
-    if (touched[i]) load->node[--k] = i;
+    if (touched[i])
+      load->node[--k] = i;
   PetscCall(PetscFree(touched));
 
   /* a steady load is integrated once */
   PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
-  for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUses(load->density[i], 't'));
-  if (steady) PetscCall(PetscFree(load->corner));
+  for (int i = 0; i < 3; i++)
+    steady = (PetscBool)(steady && !SbFormulaUses(load->density[i], 't'));
+  if (steady)
+    PetscCall(PetscFree(load->corner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,11 +226,13 @@ static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *s
   const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
-  if (load->corner && stage->t != load->t) integrate(load, space, stage->t);
+  if (load->corner && stage->t != load->t)
+    integrate(load, space, stage->t);
   for (PetscInt i = 0; i < load->n; i++) {
     const PetscInt node = 3 * load->node[i];
 
-    for (int c = 0; c < 3; c++) f[node + c] += s * load->value[node + c];
+    for (int c = 0; c < 3; c++)
+      f[node + c] += s * load->value[node + c];
   }
   PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->n));
   PetscFunctionReturn(PETSC_SUCCESS);

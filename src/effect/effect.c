@@ -1,8 +1,8 @@
 /*
   effect.c - the registry of effects, and their creation by name.
 
-  An effect gets the operations of its type and private data of zeros; then it reads its options. Everything
-  that needs the mesh waits for its setup operation.
+  An effect gets the operations of its type and private data of zeros; then it reads its options.
+  Everything that needs the mesh waits for its setup operation.
 */
 #include "effect_impl.h"
 #include "sblog.h"
@@ -15,7 +15,8 @@ const SbOption SbEffectRows[] = {
   {"from", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
    "time from which a load, support or prescribed displacement acts (static: load factor)"},
   {"until", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
-   "time until which the effect acts; a support is released at the end of the step that reaches it"},
+   "time until which the effect acts; a support is released at the end of the step that reaches "
+   "it"},
   {0},
 };
 
@@ -24,11 +25,14 @@ PetscErrorCode SbEffectRegister(const SbEffectType *type)
   PetscInt i = 0;
 
   PetscFunctionBeginUser;
+
   // Repeated registration is allowed: SbOptionsReset() may have removed the options.
-  while (i < ntype && types[i] != type) i++;
+  while (i < ntype && types[i] != type)
+    i++;
   PetscCheck(i < SB_EFFECT_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for effects of type %s",
              type->name);
-  if (i == ntype) types[ntype++] = type;
+  if (i == ntype)
+    types[ntype++] = type;
   PetscCall(SbOptionsRegister("effect", "", PETSC_DECIDE, SbEffectRows));
   PetscCall(SbOptionsRegister("effect", type->name, type->nrow, type->row));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -36,7 +40,8 @@ PetscErrorCode SbEffectRegister(const SbEffectType *type)
 
 PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES])
 {
-  for (PetscInt i = 0; i < ntype; i++) names[i] = types[i]->name;
+  for (PetscInt i = 0; i < ntype; i++)
+    names[i] = types[i]->name;
   return ntype;
 }
 
@@ -51,17 +56,19 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   *effect = NULL;
   SbScopeSet(&scope, "effect", "", name);
   PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
-  if (!type[0]) PetscCall(PetscStrncpy(type, name, sizeof(type)));
+  if (!type[0])
+    PetscCall(PetscStrncpy(type, name, sizeof(type)));
   for (PetscInt i = 0; i < ntype; i++)
-    if (!strcmp(types[i]->name, type)) is = types[i];
+    if (!strcmp(types[i]->name, type))
+      is = types[i];
   if (!is) {
     const char *names[SB_EFFECT_TYPES];
     char all[512];
 
     SbSuggestName(type, SbEffectTypes(names), names, sizeof(all), all);
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-            "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name, type,
-            name, all);
+            "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name,
+            type, name, all);
   }
 
   PetscCall(PetscNew(&e));
@@ -73,7 +80,8 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   e->ops = is->ops;
   e->column = is->column;
   e->ncolumn = is->ncolumn;
-  if (is->size) PetscCall(PetscCalloc(is->size, &e->data));
+  if (is->size)
+    PetscCall(PetscCalloc(is->size, &e->data));
   SbScopeSet(&scope, "effect", type, name);
 
   /* the sets that it acts on, and the factor on a load */
@@ -83,23 +91,25 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
       PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
     } else if (!strcmp(is->row[i].key, "time"))
       PetscCall(SbEffectFormulas(e, &scope, "time", 1, PETSC_FALSE, &e->time));
-  if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
+  if (e->ops.setfromoptions)
+    PetscCall((*e->ops.setfromoptions)(e, &scope));
 
   /* time in which it acts, for loads and supports */
   e->from = PETSC_MIN_REAL;
   e->until = PETSC_MAX_REAL;
   PetscCall(SbOptionReal(&scope, "from", &e->from));
   PetscCall(SbOptionReal(&scope, "until", &e->until));
-  if (e->from == PETSC_MIN_REAL && e->until == PETSC_MAX_REAL) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->from == PETSC_MIN_REAL && e->until == PETSC_MAX_REAL)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(e->from < e->until, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-effect_%s_from %g s is not before -effect_%s_until %g s", name, (double)e->from, name,
-             (double)e->until);
-  PetscCheck(
-    (e->ops.force || e->ops.prescribe) && !e->ops.begin_step && !e->ops.hessian, PETSC_COMM_SELF,
-    PETSC_ERR_USER,
-    "-effect_%s_from and _until are for loads, fixed and prescribed_displacement: effects of type %s "
-    "act all the time",
-    name, type);
+             "-effect_%s_from %g s is not before -effect_%s_until %g s", name, (double)e->from,
+             name, (double)e->until);
+  PetscCheck((e->ops.force || e->ops.prescribe) && !e->ops.begin_step && !e->ops.hessian,
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-effect_%s_from and _until are for loads, fixed and prescribed_displacement: effects "
+             "of type %s "
+             "act all the time",
+             name, type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,9 +132,12 @@ PetscBool SbEffectActsAfter(SbEffect e, PetscReal t)
 PetscErrorCode SbEffectDestroy(SbEffect *effect)
 {
   PetscFunctionBeginUser;
-  if (!*effect) PetscFunctionReturn(PETSC_SUCCESS);
-  if ((*effect)->ops.destroy) PetscCall((*(*effect)->ops.destroy)(*effect));
-  for (PetscInt i = 0; i < (*effect)->nformula; i++) PetscCall(SbFormulaDestroy(&(*effect)->formula[i]));
+  if (!*effect)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if ((*effect)->ops.destroy)
+    PetscCall((*(*effect)->ops.destroy)(*effect));
+  for (PetscInt i = 0; i < (*effect)->nformula; i++)
+    PetscCall(SbFormulaDestroy(&(*effect)->formula[i]));
   PetscCall(PetscFree((*effect)->on.name));
   PetscCall(PetscFree((*effect)->data));
   PetscCall(PetscFree(*effect));
@@ -139,7 +152,8 @@ PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *ke
   PetscCall(SbOptionFormulas(scope, key, e->formula + e->nformula - n));
   for (PetscInt i = 0; i < n; i++) {
     formulas[i] = e->formula[e->nformula - n + i];
-    if (SbFormulaUses(formulas[i], 't')) e->steady = PETSC_FALSE;
+    if (SbFormulaUses(formulas[i], 't'))
+      e->steady = PETSC_FALSE;
     if (SbFormulaUses(formulas[i], 'x') && !position) {
       char option[3 * SB_NAME_MAX];
 

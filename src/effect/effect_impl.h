@@ -4,8 +4,9 @@
 #pragma once
 #include "sbeffect.h"
 
-/* Reads the n formulas of an option; e owns them, and is no longer steady where one uses t. position: whether
-   they may use x, y, z; an error (PETSC_ERR_USER_INPUT) if they do and may not. Not collective. */
+/* Reads the n formulas of an option; e owns them, and is no longer steady where one uses t.
+   position: whether they may use x, y, z; an error (PETSC_ERR_USER_INPUT) if they do and may not.
+   Not collective. */
 PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
                                 PetscBool position, SbFormula formulas[]);
 
@@ -17,17 +18,23 @@ typedef struct {
 PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, SbPath *path);
 
 /*
-  Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the
-  caller releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set;
-  a set that selects nothing of the kind, with what it does select.
+  Items of the named sets on this rank, each once even when it is in several of the sets.
+  Collective; the caller releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on
+  all ranks): no such set; a set that selects nothing of the kind, with what it does select.
 
   SbEffectFacets - boundary facets of owned and ghost cells.
-  SbEffectItems  - cells (all local ones when no set is named), vertices of the mesh, or nodes that can be
-                   constrained; ascending, owned ones first. An error for a body with nodes at faces of which
-                   the sets hold vertices but no face.
+  SbEffectItems  - cells (all local ones when no set is named), vertices of the mesh, or nodes that
+  can be
+                   constrained; ascending, owned ones first. An error for a body with nodes at faces
+                   of which the sets hold vertices but no face.
 */
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
-typedef enum { SB_ON_CELLS, SB_ON_VERTICES, SB_ON_NODES, SB_ON_FACETS } SbOnKind;
+typedef enum {
+  SB_ON_CELLS,
+  SB_ON_VERTICES,
+  SB_ON_NODES,
+  SB_ON_FACETS
+} SbOnKind;
 PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt *n,
                              PetscInt **items);
 
@@ -40,7 +47,8 @@ static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal 
   }
   for (int a = 0; a < 4; a++) {
     phi[a] = 0;
-    for (int c = 0; c < 4; c++) phi[a] += L[c] * e->ops.vertex[c][a];
+    for (int c = 0; c < 4; c++)
+      phi[a] += L[c] * e->ops.vertex[c][a];
   }
   return 4;
 }

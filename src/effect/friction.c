@@ -1,25 +1,31 @@
 /*
-  friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it slides.
+  friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it
+  slides.
 
-  A sticking pair has two exact tangential constraints, or two springs. A sliding pair has its contact force
-  along n - mu d, d the direction of the slip, so that friction uses N of the same solve; a spring normal to d
-  adapts the direction. After a solve a sticking pair with more than mu N slides, and one that slid backwards
-  sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008).
+  A sticking pair has two exact tangential constraints, or two springs. A sliding pair has its
+  contact force along n - mu d, d the direction of the slip, so that friction uses N of the same
+  solve; a spring normal to d adapts the direction. After a solve a sticking pair with more than mu
+  N slides, and one that slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991;
+  Hueeber, Stadler, Wohlmuth 2008).
 
-  The slip is that of the step, as in implicit Euler, plus with springs their deflection at its start.
+  The slip is that of the step, as in implicit Euler, plus with springs their deflection at its
+  start.
 
-  A node in the corner of two obstacles cannot stick to both by exact constraints: they would be redundant.
-  Such a pair sticks by springs while in contact.
+  A node in the corner of two obstacles cannot stick to both by exact constraints: they would be
+  redundant. Such a pair sticks by springs while in contact.
 */
 #include "contact.h"
 
-#define FLIPS 10   /* changes of a pair between stick and slip within a step, after which it has springs */
-#define STIFF 1e-3 /* smallest relative difference of trial force and limit, for the stiffness across */
+#define FLIPS \
+  10 /* changes of a pair between stick and slip within a step, after which it has springs */
+#define STIFF \
+  1e-3 /* smallest relative difference of trial force and limit, for the stiffness across */
 
 void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {
   if (!touches) { /* a point that comes into contact in this step sticks to its initial position */
-    for (int k = 0; k < 3; k++) g->stretch[k] = 0;
+    for (int k = 0; k < 3; k++)
+      g->stretch[k] = 0;
     g->pressing = 0;
     g->slid = g->crowded = PETSC_FALSE;
   }
@@ -33,7 +39,8 @@ static inline PetscBool springs(const Contact *c, const SbFrictionState *g)
   return (PetscBool)(!exact(c) || g->crowded);
 }
 
-/* Whether a pair that alternates has secant springs of the last solve (Kacanov's method), slow but robust. */
+/* Whether a pair that alternates has secant springs of the last solve (Kacanov's method), slow but
+   robust. */
 static inline PetscBool careful(const SbFrictionState *g)
 {
   return (PetscBool)(g->flips > FLIPS);
@@ -49,14 +56,16 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 {
   const PetscReal along = SbDot3(n, v);
 
-  for (int k = 0; k < 3; k++) v[k] -= along * n[k];
+  for (int k = 0; k < 3; k++)
+    v[k] -= along * n[k];
   return PetscSqrtReal(SbDot3(v, v));
 }
 
 /* Tangential slip of the step plus earlier deflection of springs, m; returns its length. */
 static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
-  for (int k = 0; k < 3; k++) s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
+  for (int k = 0; k < 3; k++)
+    s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
   return across(touch->plane.n, s);
 }
 
@@ -65,15 +74,18 @@ static void turn(Touch *touch, const PetscReal v[3])
 {
   const PetscReal *n = touch->plane.n;
   SbFrictionState *g = &touch->friction;
-  PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
+  PetscReal t[3] = {v[0], v[1], v[2]};
+  PetscReal length = across(n, t);
 
   if (length <= 1e-12 * PetscSqrtReal(SbDot3(v, v))) {
     const int k = PetscAbsReal(n[0]) < 0.6 ? 0 : 1;
 
-    for (int i = 0; i < 3; i++) t[i] = i == k;
+    for (int i = 0; i < 3; i++)
+      t[i] = i == k;
     length = across(n, t);
   }
-  for (int i = 0; i < 3; i++) g->tangent[0][i] = t[i] / length;
+  for (int i = 0; i < 3; i++)
+    g->tangent[0][i] = t[i] / length;
   SbCross(n, g->tangent[0], g->tangent[1]);
 }
 
@@ -81,10 +93,12 @@ void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth)
 {
   SbFrictionState *g = &touch->friction;
   PetscReal s[3];
-  const PetscReal length = slip(touch, s), most = coefficient(c, g) * PetscMax(0, depth);
+  const PetscReal length = slip(touch, s);
+  const PetscReal most = coefficient(c, g) * PetscMax(0, depth);
 
   g->slides = (PetscBool)(length > most);
-  if (!g->slides) return;
+  if (!g->slides)
+    return;
   g->turning = touch->k * most / length;
   turn(touch, s);
 }
@@ -94,10 +108,12 @@ void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3]
   const SbFrictionState *g = &touch->friction;
   PetscReal t[3], length, part;
 
-  for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
+  for (int k = 0; k < 3; k++)
+    t[k] = g->tangent[0][k];
   length = across(touch->plane.n, t);
   part = g->slides && !careful(g) && length > 0 ? coefficient(c, g) / length : 0;
-  for (int k = 0; k < 3; k++) push[k] = touch->plane.n[k] - part * t[k];
+  for (int k = 0; k < 3; k++)
+    push[k] = touch->plane.n[k] - part * t[k];
 }
 
 PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch)
@@ -117,12 +133,15 @@ PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch
   }
   for (int q = 0; q < 2; q++) {
     const PetscReal *t = g->tangent[q];
-    SbConstraint row = {.node = touch->node, .value = SbDot3(t, touch->start) - SbDot3(t, g->stretch)};
+    SbConstraint row = {.node = touch->node,
+                        .value = SbDot3(t, touch->start) - SbDot3(t, g->stretch)};
 
-    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = t[k];
+    for (int k = 0; k < 3; k++)
+      row.n[k] = row.push[k] = t[k];
     if (!g->slides && !springs(c, g) && !careful(g)) {
       PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
-      if (g->slide[q] >= 0) continue;
+      if (g->slide[q] >= 0)
+        continue;
       g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
     }
     row.spring = PETSC_TRUE;
@@ -137,55 +156,70 @@ void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N)
   SbFrictionState *g = &touch->friction;
 
   for (int k = 0; k < 3; k++)
-    g->force[k] = g->slides && !careful(g) ? -coefficient(c, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
+    g->force[k] =
+      g->slides && !careful(g) ? -coefficient(c, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
   for (int q = 0; q < 2; q++) {
     const PetscReal force = SbSpaceGetConstraint(space, g->slide[q])->force;
 
-    for (int k = 0; k < 3; k++) g->force[k] += force * g->tangent[q][k];
+    for (int k = 0; k < 3; k++)
+      g->force[k] += force * g->tangent[q][k];
   }
 }
 
-/* The same by springs for a pair that alternates (SbFrictionUpdate()); N is the mean of both solves. */
+/* The same by springs for a pair that alternates (SbFrictionUpdate()); N is the mean of both
+   solves. */
 static PetscReal update_by_secant(const Contact *c, PetscReal before, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
-  const PetscReal mu = coefficient(c, g), most = mu * PetscMax(0, g->pressing);
+  const PetscReal mu = coefficient(c, g);
+  const PetscReal most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
-  const PetscReal length = slip(touch, s), part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
+  const PetscReal length = slip(touch, s);
+  const PetscReal part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
 
-  for (int k = 0; k < 3; k++) wrong[k] = g->force[k] + part * s[k];
+  for (int k = 0; k < 3; k++)
+    wrong[k] = g->force[k] + part * s[k];
   g->slides = (PetscBool)(touch->k * length > most);
   g->pressing = 0.5 * (before + g->pressing);
   g->turning = length > 0 ? PetscMin(touch->k, mu * PetscMax(0, g->pressing) / length) : touch->k;
-  if (g->slides) turn(touch, s);
+  if (g->slides)
+    turn(touch, s);
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-/* Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s
-   and a stiffness k, the trial force is T + k s, or k s with springs. It slides where that is longer than mu
-   N, with T = mu N along it; the derivative of that direction is the stiffness across it. */
+/* Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing
+   the slip s and a stiffness k, the trial force is T + k s, or k s with springs. It slides where
+   that is longer than mu N, with T = mu N along it; the derivative of that direction is the
+   stiffness across it. */
 static PetscReal update(const Contact *c, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
   const PetscReal most = coefficient(c, g) * PetscMax(0, g->pressing);
   const PetscBool slid = g->slides;
-  PetscReal s[3], trial[3], wrong[3] = {0}, size;
+  PetscReal s[3], trial[3];
+  PetscReal wrong[3] = {0};
+  PetscReal size;
 
   slip(touch, s);
-  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(c, g) ? 0 : g->force[k]);
+  for (int k = 0; k < 3; k++)
+    trial[k] = touch->k * s[k] - (springs(c, g) ? 0 : g->force[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
+
   /* slid backwards: sticks */
   g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
   if (g->slides) {
     const PetscReal over = springs(c, g) ? size : PetscMax(size - most, STIFF * size);
 
-    if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size) g->flips++;
-    for (int k = 0; k < 3; k++) wrong[k] = g->force[k] + most / size * trial[k];
+    if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size)
+      g->flips++;
+    for (int k = 0; k < 3; k++)
+      wrong[k] = g->force[k] + most / size * trial[k];
     g->turning = touch->k * most / over;
     turn(touch, trial);
   } else if (slid) {
     g->flips++;
-    for (int k = 0; k < 3; k++) wrong[k] = touch->k * s[k];
+    for (int k = 0; k < 3; k++)
+      wrong[k] = touch->k * s[k];
   }
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
@@ -197,7 +231,8 @@ PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N)
   PetscReal error;
 
   g->pressing = N;
-  if (g->slide[0] < 0) return 0;
+  if (g->slide[0] < 0)
+    return 0;
   error = careful(g) ? update_by_secant(c, before, touch) : update(c, touch);
   if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
     g->flips = 2 * FLIPS;
@@ -211,10 +246,12 @@ void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
   SbFrictionState *g = &touch->friction;
 
   if (!presses) { /* nothing holds it where it was */
-    for (int k = 0; k < 3; k++) g->stretch[k] = g->force[k] = 0;
+    for (int k = 0; k < 3; k++)
+      g->stretch[k] = g->force[k] = 0;
     g->slid = g->crowded = PETSC_FALSE;
     return;
   }
   g->slid = g->slides;
-  for (int k = 0; k < 3; k++) g->stretch[k] = springs(c, g) ? -g->force[k] / touch->k : 0;
+  for (int k = 0; k < 3; k++)
+    g->stretch[k] = springs(c, g) ? -g->force[k] / touch->k : 0;
 }

@@ -1,9 +1,9 @@
 /*
   gravity.c - a uniform acceleration field on all bodies.
 
-  f_a = s(t) m_a g, with the mass matrix of the run, so that a body falls without strain. For linear elements
-  a row of the consistent mass matrix sums to the lumped mass m_a of the node. For P2 it does not: static
-  runs, and those with the consistent mass, have its row sums.
+  f_a = s(t) m_a g, with the mass matrix of the run, so that a body falls without strain. For linear
+  elements a row of the consistent mass matrix sums to the lumped mass m_a of the node. For P2 it
+  does not: static runs, and those with the consistent mass, have its row sums.
 */
 #include "effect_impl.h"
 
@@ -24,12 +24,14 @@ static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *st
 {
   const PetscReal *vector = (const PetscReal *)e->data;
   const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
-  const PetscReal *mass = space->consistent_mass || !e->dynamic ? space->node_share : space->node_mass;
+  const PetscReal *mass =
+    space->consistent_mass || !e->dynamic ? space->node_share : space->node_mass;
   const PetscReal g[3] = {s * vector[0], s * vector[1], s * vector[2]};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < space->nnode_owned; i++)
-    for (int c = 0; c < 3; c++) f[3 * i + c] += mass[i] * g[c];
+    for (int c = 0; c < 3; c++)
+      f[3 * i + c] += mass[i] * g[c];
   PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

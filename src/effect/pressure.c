@@ -1,47 +1,54 @@
 /*
   pressure.c - a pressure on part of the surface, positive in compression.
 
-  The triangle with the derivatives of a facet's map at a point has the corners x0, x1, x2, counter-clockwise
-  seen from outside: those of the facet itself, but of P2, whose facets have six nodes and are curved once
-  they move. With X = x1 - x0, Y = x2 - x0, derivatives along two coordinates, phi_a the basis of the cell,
+  The triangle with the derivatives of a facet's map at a point has the corners x0, x1, x2,
+  counter-clockwise seen from outside: those of the facet itself, but of P2, whose facets have six
+  nodes and are curved once they move. With X = x1 - x0, Y = x2 - x0, derivatives along two
+  coordinates, phi_a the basis of the cell,
 
     f_a = -p int phi_a X x Y,   p = value(t) time(t).
 
-  On a closed surface this is -p dV/dx_a, V the enclosed volume: force and moment vanish, the work is -p dV.
+  On a closed surface this is -p dV/dx_a, V the enclosed volume: force and moment vanish, the work
+  is -p dV.
 
-  Tangent: -df_a/dx_b is not symmetric facet by facet; the matrix gets the symmetric part, with [c]x w = c x w
+  Tangent: -df_a/dx_b is not symmetric facet by facet; the matrix gets the symmetric part, with [c]x
+  w = c x w
 
     p/2 int (phi_a phi_b,Y - phi_b phi_a,Y) [X]x - (phi_a phi_b,X - phi_b phi_a,X) [Y]x.
 
-  On a closed surface, or one whose rim is constrained, the other part cancels and the tangent is the exact
-  derivative (Bufler, "Pressure loaded structures under large deformations", 1984). What is left of it is an
-  integral along the rim R, counter-clockwise,
+  On a closed surface, or one whose rim is constrained, the other part cancels and the tangent is
+  the exact derivative (Bufler, "Pressure loaded structures under large deformations", 1984). What
+  is left of it is an integral along the rim R, counter-clockwise,
 
     -df_a = -p/2 int_R phi_a dx x w.
 
-  Where the rim is free the operator of the linear solver applies it, and the matrix is the preconditioner.
-  Without it Newton's method converges linearly, and not at all for large rotations.
+  Where the rim is free the operator of the linear solver applies it, and the matrix is the
+  preconditioner. Without it Newton's method converges linearly, and not at all for large rotations.
 
-  Integrals are exact: one point for linear elements, a rule of degree 5 for P2 (polynomials of degree 4).
+  Integrals are exact: one point for linear elements, a rule of degree 5 for P2 (polynomials of
+  degree 4).
 
-  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up
-  to zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume
-  inside (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every
-  displacement. On part of the surface small gaps remain, which vanish with mesh refinement. There
-  contributions of facets do not cancel: with CR the force acts at the facet's own node, while X and Y depend
-  on the other three of the cell, so the derivative is far from symmetric. Newton's method with its symmetric
-  part stalls near p = mu. So the operator of the linear solver applies the derivative exactly, facet by
-  facet, and the matrix, without it, is the preconditioner.
+  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not
+  quite add up to zero. Where the pressure acts on the whole surface of such a body, it is taken as
+  -p dV/du of the volume inside (src/fem/body_volume.c): at rest that is the same, and force and
+  moment vanish for every displacement. On part of the surface small gaps remain, which vanish with
+  mesh refinement. There contributions of facets do not cancel: with CR the force acts at the
+  facet's own node, while X and Y depend on the other three of the cell, so the derivative is far
+  from symmetric. Newton's method with its symmetric part stalls near p = mu. So the operator of the
+  linear solver applies the derivative exactly, facet by facet, and the matrix, without it, is the
+  preconditioner.
 
-  With follower = no the pressure acts on the rest area and normal, as small strains have it: no tangent.
+  With follower = no the pressure acts on the rest area and normal, as small strains have it: no
+  tangent.
 */
 #include "effect_impl.h"
 #include "sbgeometry.h"
 
-#define STRAIGHT 1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
+#define STRAIGHT \
+  1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
-/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1: none, it is
-   straight). The surface lies to the left, seen from outside. */
+/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1:
+   none, it is straight). The surface lies to the left, seen from outside. */
 typedef struct {
   PetscInt node[3];
 } RimEdge;
@@ -50,9 +57,10 @@ typedef struct {
   SbFormula value;
   PetscBool follower;
   PetscInt nfacet, nedge;
-  SbFacet *facet;   /* [nfacet] of owned and ghost cells */
-  RimEdge *rim;     /* [nedge] of P1 and P2, with an owned node */
-  PetscBool *whole; /* [nbody] pressure on the whole body, by its volume: its facets are not in the list */
+  SbFacet *facet; /* [nfacet] of owned and ghost cells */
+  RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
+  PetscBool
+    *whole; /* [nbody] pressure on the whole body, by its volume: its facets are not in the list */
 } Pressure;
 
 static const SbOption rows[] = {
@@ -62,7 +70,8 @@ static const SbOption rows[] = {
   {"follower", SB_OPTION_BOOL, 1, "", "true", "",
    "follower load, on the current area and normal; if not, a dead load on those of the reference "
    "configuration"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the pressure, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "",
+   "amplitude: factor on the pressure, a formula of the time t"},
 };
 
 static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
@@ -73,13 +82,15 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectFormulas(e, scope, "value", 1, PETSC_FALSE, &p->value));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
   e->linear = (PetscBool)!p->follower;
-  if (p->follower) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->follower)
+    PetscFunctionReturn(PETSC_SUCCESS);
   e->ops.tangent = NULL;
   e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the matrix. */
+/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the
+   matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
   return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
@@ -88,8 +99,10 @@ static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 /* Side c of a facet of P1 or P2. */
 static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 {
-  const PetscInt a = facet->corner[c], b = facet->corner[(c + 1) % 3];
-  RimEdge e = {{SbSpaceCellNode(space, facet->cell, a), SbSpaceCellNode(space, facet->cell, b), -1}};
+  const PetscInt a = facet->corner[c];
+  const PetscInt b = facet->corner[(c + 1) % 3];
+  RimEdge e = {
+    {SbSpaceCellNode(space, facet->cell, a), SbSpaceCellNode(space, facet->cell, b), -1}};
 
   /* edges of a tet: 01 02 03 12 13 23 */
   if (SbSpaceCellElement(space, facet->cell)->nodes_per[1])
@@ -100,22 +113,27 @@ static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 /* Whether the tangent has a part along the edge, not eliminated by supports. */
 static PetscBool is_free(SbSpace space, const RimEdge *edge)
 {
-  PetscReal e[3], longest = 0;
+  PetscReal e[3];
+  PetscReal longest = 0;
   int components = 0; /* free ones of some node */
 
   for (int i = 0; i < 3; i++) {
     e[i] = space->node_x[3 * edge->node[1] + i] - space->node_x[3 * edge->node[0] + i];
     longest = PetscMax(longest, PetscAbsReal(e[i]));
   }
-  for (int a = 0; a < 3 && edge->node[a] >= 0; a++) components |= ~space->fixed[edge->node[a]];
+  for (int a = 0; a < 3 && edge->node[a] >= 0; a++)
+    components |= ~space->fixed[edge->node[a]];
+
   /* e_k couples the other two components */
   for (int k = 0; k < 3; k++)
-    if (PetscAbsReal(e[k]) > STRAIGHT * longest && components >> (k + 1) % 3 & components >> (k + 2) % 3 & 1)
+    if (PetscAbsReal(e[k]) > STRAIGHT * longest &&
+        components >> (k + 1) % 3 & components >> (k + 2) % 3 & 1)
       return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
-/* The free rim of the facets of P1 and P2: edges that facets go along one way more often than the other. */
+/* The free rim of the facets of P1 and P2: edges that facets go along one way more often than the
+   other. */
 static PetscErrorCode find_rim(Pressure *p, SbSpace space)
 {
   PetscInt n = 0;
@@ -126,7 +144,8 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   for (PetscInt i = 0; i < 3 * p->nfacet; i++) {
     RimEdge e;
 
-    if (apart(space, &p->facet[i / 3])) continue;
+    if (apart(space, &p->facet[i / 3]))
+      continue;
     e = side_of(space, &p->facet[i / 3], i % 3);
     edge[n++] = (SbKey){SbKeyOfPair(e.node[0], e.node[1]), i};
   }
@@ -145,12 +164,15 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
       e[back] = side;
       ways[back]++;
     }
-    if (ways[0] == ways[1]) continue;
+    if (ways[0] == ways[1])
+      continue;
+
     /* all facets of an edge with an owned node are here */
     e[0] = e[ways[1] > ways[0]];
     for (int a = 0; a < 3; a++)
       owned = (PetscBool)(owned || (e[0].node[a] >= 0 && e[0].node[a] < space->nnode_owned));
-    if (owned && is_free(space, &e[0])) p->rim[p->nedge++] = e[0];
+    if (owned && is_free(space, &e[0]))
+      p->rim[p->nedge++] = e[0];
   }
   PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -160,34 +182,43 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
   const SbMesh mesh = space->mesh;
-  PetscInt *count, n = 0;
+  PetscInt *count;
+  PetscInt n = 0;
   PetscBool some;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
   PetscCall(PetscCalloc1(mesh->nbody, &count));
+
   /* bodies with nodes at faces whose every boundary facet is in the list: their facets leave it */
   for (PetscInt k = 0; k < p->nfacet; k++)
     count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
   for (PetscInt b = 0; b < mesh->nbody; b++)
-    p->whole[b] =
-      (PetscBool)(p->follower && !space->element[b]->nodes_per[0] && count[b] == mesh->body[b].nfacet);
+    p->whole[b] = (PetscBool)(p->follower && !space->element[b]->nodes_per[0] &&
+                              count[b] == mesh->body[b].nfacet);
   for (PetscInt k = 0; k < p->nfacet; k++)
-    if (!p->whole[mesh->cell_body[p->facet[k].cell]]) p->facet[n++] = p->facet[k];
+    if (!p->whole[mesh->cell_body[p->facet[k].cell]])
+      p->facet[n++] = p->facet[k];
   p->nfacet = n;
   PetscCall(PetscFree(count));
-  if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0)) PetscCall(find_rim(p, space));
+  if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0))
+    PetscCall(find_rim(p, space));
+
   /* the remainder of bodies with nodes at faces, and free rims */
   some = (PetscBool)(p->nedge > 0);
-  for (PetscInt k = 0; k < p->nfacet && !some; k++) some = apart(space, &p->facet[k]);
+  for (PetscInt k = 0; k < p->nfacet && !some; k++)
+    some = apart(space, &p->facet[k]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  if (!some) e->ops.nonsymmetric = NULL;
+  if (!some)
+    e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of a facet: basis of the cell, and coefficients of its nodes in the corners x0, x1, x2 there. */
+/* A point of a facet: basis of the cell, and coefficients of its nodes in the corners x0, x1, x2
+   there. */
 typedef struct {
   PetscInt n, node[SB_CELL_NODES]; /* nodes of the cell */
   PetscReal weight; /* of the integral, times half, the area of the triangle of the coordinates */
@@ -195,7 +226,8 @@ typedef struct {
   PetscReal along[2][SB_CELL_NODES]; /* derivatives phi,X and phi,Y */
 } FacetPoint;
 
-/* Points of a facet: the last one of SbRuleFacet, its centre, for linear elements, all of them for P2. */
+/* Points of a facet: the last one of SbRuleFacet, its centre, for linear elements, all of them for
+   P2. */
 static inline int first_point(SbSpace space, const SbFacet *facet)
 {
   return SbSpaceCellElement(space, facet->cell)->nodes_per[1] ? 0 : SbRuleFacet.n - 1;
@@ -205,9 +237,11 @@ static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *
 {
   const SbElement e = SbSpaceCellElement(space, facet->cell);
   const PetscInt *v = facet->corner;
-  PetscReal L[4] = {0}, corner[3][SB_CELL_NODES];
+  PetscReal L[4] = {0};
+  PetscReal corner[3][SB_CELL_NODES];
 
-  for (int c = 0; c < 3; c++) L[v[c]] = SbRuleFacet.L[q][c];
+  for (int c = 0; c < 3; c++)
+    L[v[c]] = SbRuleFacet.L[q][c];
   p->n = SbCellBasis(e, L, p->phi);
   p->weight = p->n == 4 ? 0.5 : 0.5 * SbRuleFacet.weight[q];
   for (int a = 0; a < p->n; a++) {
@@ -221,7 +255,8 @@ static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *
         corner[c][a] = 4 * ((SbTetEdge[a - 4][0] == v[c]) * L[SbTetEdge[a - 4][1]] +
                             (SbTetEdge[a - 4][1] == v[c]) * L[SbTetEdge[a - 4][0]]);
     }
-    for (int k = 0; k < 2; k++) p->along[k][a] = corner[k + 1][a] - corner[0][a];
+    for (int k = 0; k < 2; k++)
+      p->along[k][a] = corner[k + 1][a] - corner[0][a];
   }
 }
 
@@ -229,28 +264,33 @@ static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *
 static void add_sides(const FacetPoint *p, const PetscReal w[], PetscReal side[2][3])
 {
   for (int a = 0; w && a < p->n; a++)
-    for (int k = 0; k < 6; k++) side[k / 3][k % 3] += p->along[k / 3][a] * w[3 * p->node[a] + k % 3];
+    for (int k = 0; k < 6; k++)
+      side[k / 3][k % 3] += p->along[k / 3][a] * w[3 * p->node[a] + k % 3];
 }
 
 /* f += factor times the weight and the basis at the point times N. */
 static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3], PetscReal f[])
 {
   for (int a = 0; a < p->n; a++)
-    for (int i = 0; i < 3; i++) f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
+    for (int i = 0; i < 3; i++)
+      f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
+  const PetscReal p =
+    SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b]) PetscCall(SbSpaceAddVolume(space, b, u, -p, f, NULL));
+    if (load->whole[b])
+      PetscCall(SbSpaceAddVolume(space, b, u, -p, f, NULL));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
-      PetscReal side[2][3] = {{0}}, N[3];
+      PetscReal side[2][3] = {{0}};
+      PetscReal N[3];
       FacetPoint at;
 
       facet_point(space, &load->facet[k], q, &at);
@@ -267,18 +307,21 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p =
-    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
+  const PetscReal p = stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) *
+                      SbFormulaEval(e->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
-  if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p == 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b]) PetscCall(SbSpaceAddVolume(space, b, stage->u, p, NULL, A));
+    if (load->whole[b])
+      PetscCall(SbSpaceAddVolume(space, b, stage->u, p, NULL, A));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     PetscReal c[SB_CELL_NODES][SB_CELL_NODES][3] = {{{0}}};
     FacetPoint at;
 
-    if (apart(space, &load->facet[k])) continue;
+    if (apart(space, &load->facet[k]))
+      continue;
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
       PetscReal side[2][3] = {{0}};
 
@@ -287,18 +330,21 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
       add_sides(&at, stage->u, side);
       for (int a = 0; a < at.n; a++) {
         for (int b = 0; b < at.n; b++) {
-          const PetscReal y = at.phi[a] * at.along[1][b] - at.phi[b] * at.along[1][a],
-                          x = at.phi[a] * at.along[0][b] - at.phi[b] * at.along[0][a];
+          const PetscReal y = at.phi[a] * at.along[1][b] - at.phi[b] * at.along[1][a];
+          const PetscReal x = at.phi[a] * at.along[0][b] - at.phi[b] * at.along[0][a];
 
-          for (int i = 0; i < 3; i++) c[a][b][i] += 0.5 * p * at.weight * (y * side[0][i] - x * side[1][i]);
+          for (int i = 0; i < 3; i++)
+            c[a][b][i] += 0.5 * p * at.weight * (y * side[0][i] - x * side[1][i]);
         }
       }
     }
     for (int a = 0; a < at.n; a++) {
       for (int b = 0; b < at.n; b++) {
-        const PetscReal *d = c[a][b], block[9] = {0, -d[2], d[1], d[2], 0, -d[0], -d[1], d[0], 0};
+        const PetscReal *d = c[a][b];
+        const PetscReal block[9] = {0, -d[2], d[1], d[2], 0, -d[0], -d[1], d[0], 0};
 
-        if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+        if (d[0] == 0 && d[1] == 0 && d[2] == 0)
+          continue;
         PetscCall(SbSpaceAddCellBlock(space, A, load->facet[k].cell, a, b, block));
       }
     }
@@ -306,19 +352,25 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of 3 points, exact if curved. */
+/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of 3 points, exact if
+   curved. */
 static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const PetscReal u[],
                     const PetscReal w[], PetscReal y[])
 {
   const PetscInt n = edge->node[2] < 0 ? 2 : 3;
 
   for (int q = -1; q < 2; q++) {
-    const PetscReal s = 0.5 + q * 0.5 * PetscSqrtReal(0.6), weight = factor * (q ? 5. : 8.) / 18.;
-    const PetscReal straight[2] = {1 - s, s},
-                    curved[3] = {(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)},
-                    straight_along[2] = {-1, 1}, curved_along[3] = {4 * s - 3, 4 * s - 1, 4 - 8 * s};
-    const PetscReal *phi = n == 2 ? straight : curved, *along = n == 2 ? straight_along : curved_along;
-    PetscReal dx[3] = {0, 0, 0}, W[3] = {0, 0, 0}, turn[3];
+    const PetscReal s = 0.5 + q * 0.5 * PetscSqrtReal(0.6);
+    const PetscReal weight = factor * (q ? 5. : 8.) / 18.;
+    const PetscReal straight[2] = {1 - s, s};
+    const PetscReal curved[3] = {(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)};
+    const PetscReal straight_along[2] = {-1, 1};
+    const PetscReal curved_along[3] = {4 * s - 3, 4 * s - 1, 4 - 8 * s};
+    const PetscReal *phi = n == 2 ? straight : curved;
+    const PetscReal *along = n == 2 ? straight_along : curved_along;
+    PetscReal dx[3] = {0, 0, 0};
+    PetscReal W[3] = {0, 0, 0};
+    PetscReal turn[3];
 
     for (PetscInt a = 0; a < n; a++) {
       for (int i = 0; i < 3; i++) {
@@ -330,7 +382,8 @@ static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const 
     }
     SbCross(dx, W, turn);
     for (PetscInt a = 0; a < n; a++)
-      for (int i = 0; i < 3; i++) y[3 * edge->node[a] + i] -= weight * phi[a] * turn[i];
+      for (int i = 0; i < 3; i++)
+        y[3 * edge->node[a] + i] -= weight * phi[a] * turn[i];
   }
 }
 
@@ -338,15 +391,18 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
                                            const PetscReal x[], PetscReal y[])
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p =
-    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
+  const PetscReal p = stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) *
+                      SbFormulaEval(e->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    PetscReal side[2][3] = {{0}}, w[2][3] = {{0}}, one[3], two[3];
+    PetscReal side[2][3] = {{0}};
+    PetscReal w[2][3] = {{0}};
+    PetscReal one[3], two[3];
     FacetPoint at;
 
-    if (!apart(space, &load->facet[k])) continue;
+    if (!apart(space, &load->facet[k]))
+      continue;
     facet_point(space, &load->facet[k], SbRuleFacet.n - 1, &at);
     add_sides(&at, space->node_x, side);
     add_sides(&at, stage->u, side);
@@ -356,7 +412,8 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
     add_area(&at, p, one, y);
     add_area(&at, p, two, y);
   }
-  for (PetscInt k = 0; k < load->nedge; k++) add_rim(space, &load->rim[k], 0.5 * p, stage->u, x, y);
+  for (PetscInt k = 0; k < load->nedge; k++)
+    add_rim(space, &load->rim[k], 0.5 * p, stage->u, x, y);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

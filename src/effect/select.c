@@ -1,29 +1,34 @@
 /*
-  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select here.
+  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select
+  here.
 
-  The mesh carries one bit per set on vertices, cells and faces, the space on nodes. An item in several of the
-  named sets acts once: they are tested against the union of the bits, facets taken with their first set.
+  The mesh carries one bit per set on vertices, cells and faces, the space on nodes. An item in
+  several of the named sets acts once: they are tested against the union of the bits, facets taken
+  with their first set.
 
-  Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of
-  such a body holds none of its nodes. Ignoring it would silently drop a constraint, so it is an error.
+  Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an
+  edge of such a body holds none of its nodes. Ignoring it would silently drop a constraint, so it
+  is an error.
 */
 #include "effect_impl.h"
 
-/* Numbers k[on->n] of the named sets, and the union of their bits; an error when one selects nothing. */
-static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt k[SB_SET_MAX],
-                                uint64_t *mask)
+/* Numbers k[on->n] of the named sets, and the union of their bits; an error when one selects
+   nothing. */
+static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, SbOnKind kind,
+                                PetscInt k[SB_SET_MAX], uint64_t *mask)
 {
   const char *const need[] = {"tetrahedra", "vertices", "vertices", "boundary facets"};
   const char *const hint[] = {
-    "take a set that encloses whole tetrahedra, such as a body or a larger box", "take a larger set",
-    "take a larger set",
+    "take a set that encloses whole tetrahedra, such as a body or a larger box",
+    "take a larger set", "take a larger set",
     "take a set that contains whole triangles of the surface, such as a thicker plane or box"};
 
   PetscFunctionBeginUser;
   PetscCheck(on->n || kind == SB_ON_CELLS, space->comm, PETSC_ERR_USER_INPUT,
              "%s: name at least one set, see -sets", on->option);
   PetscCheck(on->n <= SB_SET_MAX, space->comm, PETSC_ERR_USER_INPUT,
-             "%s names %" PetscInt_FMT " sets, at most %d can be used", on->option, on->n, SB_SET_MAX);
+             "%s names %" PetscInt_FMT " sets, at most %d can be used", on->option, on->n,
+             SB_SET_MAX);
   *mask = 0;
   for (PetscInt i = 0; i < on->n; i++) {
     const SbSet *set;
@@ -44,8 +49,10 @@ static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, SbOnKind ki
 
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets)
 {
-  PetscInt k[SB_SET_MAX], size = 0;
-  uint64_t seen = 0, mask;
+  PetscInt k[SB_SET_MAX];
+  PetscInt size = 0;
+  uint64_t seen = 0;
+  uint64_t mask;
 
   PetscFunctionBeginUser;
   *n = 0;
@@ -58,7 +65,8 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
     PetscCall(SbSpaceGetSetFacets(space, k[i], &nmore, &more));
     PetscCall(SbReserve(*n + nmore, sizeof(**facets), &size, facets));
     for (PetscInt j = 0; j < nmore; j++)
-      if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen)) (*facets)[(*n)++] = more[j];
+      if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen))
+        (*facets)[(*n)++] = more[j];
     PetscCall(PetscFree(more));
     seen |= SB_SET_BIT(k[i]);
   }
@@ -70,7 +78,8 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
 {
   const SbMesh mesh = space->mesh;
   PetscInt *count; /* vertices and nodes of each body */
-  PetscInt b = 0, nvert;
+  PetscInt b = 0;
+  PetscInt nvert;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(2 * mesh->nbody, &count));
@@ -78,17 +87,17 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
     count[2 * mesh->vert_body[v]] += !!(mesh->vert_set[v] & mask);
   for (PetscInt i = 0; i < space->nnode_owned; i++)
     count[2 * space->node_body[i] + 1] += !!(space->node_set[i] & mask);
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, space->comm));
-  while (b < mesh->nbody && (!count[2 * b] || count[2 * b + 1])) b++;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM,
+                             space->comm));
+  while (b < mesh->nbody && (!count[2 * b] || count[2 * b + 1]))
+    b++;
   nvert = b < mesh->nbody ? count[2 * b] : 0;
   PetscCall(PetscFree(count));
-  PetscCheck(
-    !nvert, space->comm, PETSC_ERR_USER_INPUT,
-    "%s selects %" PetscInt_FMT
-    " vertices of body %s but none of its triangles, where element %s has its nodes: take a set that "
-    "contains whole triangles, such as a thicker plane or box",
-    on->option, nvert, mesh->body[b].name, space->element[b]->name);
+  PetscCheck(!nvert, space->comm, PETSC_ERR_USER_INPUT,
+             "%s selects %" PetscInt_FMT " vertices of body %s but none of its triangles, where "
+             "element %s has its nodes: take a set that "
+             "contains whole triangles, such as a thicker plane or box",
+             on->option, nvert, mesh->body[b].name, space->element[b]->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,10 +111,12 @@ PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind,
 
   PetscFunctionBeginUser;
   PetscCall(find_sets(space, on, kind, k, &mask));
-  if (kind == SB_ON_NODES && space->faces) PetscCall(check_nodes(space, on, mask));
+  if (kind == SB_ON_NODES && space->faces)
+    PetscCall(check_nodes(space, on, mask));
   *n = 0;
   PetscCall(PetscMalloc1(count[kind], items));
   for (PetscInt i = 0; i < count[kind]; i++)
-    if (!on->n || sets[kind][i] & mask) (*items)[(*n)++] = i;
+    if (!on->n || sets[kind][i] & mask)
+      (*items)[(*n)++] = i;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

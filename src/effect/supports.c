@@ -1,21 +1,24 @@
 /*
-  supports.c - the supports `fixed`, nodes with zero displacement, and `prescribed_displacement`, nodes moved
-  along a given path: a translation, a rotation about an axis, or both; in all directions or in some.
+  supports.c - the supports `fixed`, nodes with zero displacement, and `prescribed_displacement`,
+  nodes moved along a given path: a translation, a rotation about an axis, or both; in all
+  directions or in some.
 
-  With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
-  angle, the prescribed displacement is (Rodrigues 1840)
+  With r = X - c the rest position relative to a point c of the axis, k the unit direction and
+  theta(t) the angle, the prescribed displacement is (Rodrigues 1840)
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  This form has no cancellation at small angles. Reaction: the unbalanced force M a + C v + f_int - f_ext of
-  the prescribed unknowns, which the support exerts on the body: one that hangs at rest is pulled up by +m g.
-  Torque: moment of that force about the axis at rest, taken with the current positions.
+  This form has no cancellation at small angles. Reaction: the unbalanced force M a + C v + f_int -
+  f_ext of the prescribed unknowns, which the support exerts on the body: one that hangs at rest is
+  pulled up by +m g. Torque: moment of that force about the axis at rest, taken with the current
+  positions.
 
-  X is a vertex, or with CR and DG the centroid of a triangle: they are constrained at the triangles of their
-  surface, in the mean; one triangle alone, or two, leave rotations free. A DG face that is prescribed in all
-  directions has a node of its own, to which its cell is tied by a penalty (src/fem/layout.c;
-  -body_X_dirichlet strong: the mean itself is prescribed). Single directions are constrained in the mean
-  itself. Of several effects that prescribe one unknown, the first in the scenario counts.
+  X is a vertex, or with CR and DG the centroid of a triangle: they are constrained at the triangles
+  of their surface, in the mean; one triangle alone, or two, leave rotations free. A DG face that is
+  prescribed in all directions has a node of its own, to which its cell is tied by a penalty
+  (src/fem/layout.c; -body_X_dirichlet strong: the mean itself is prescribed). Single directions are
+  constrained in the mean itself. Of several effects that prescribe one unknown, the first in the
+  scenario counts.
 */
 #include "effect_impl.h"
 #include "sbcontact.h"
@@ -32,16 +35,19 @@ typedef struct {
 
 static const SbOption fixed_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
-   "sets whose nodes are fixed: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
+   "sets whose nodes are fixed: vertices, p2 also edge midpoints, cr and dg the means over "
+   "boundary faces"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", COMPONENTS, "directions that are fixed"},
 };
 
 static const SbOption moved_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
-   "sets whose nodes are moved: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
+   "sets whose nodes are moved: vertices, p2 also edge midpoints, cr and dg the means over "
+   "boundary faces"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", COMPONENTS, "directions that are prescribed"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "translation, three formulas of t and the reference position x, y, z; live: interactive, as the file "
+   "translation, three formulas of t and the reference position x, y, z; live: interactive, as the "
+   "file "
    "live.txt says during the run"},
   {"angle", SB_OPTION_FORMULA, 1, "degrees", "0", "",
    "angle of rotation about the axis, a formula of the time t"},
@@ -71,10 +77,10 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
   PetscCall(options_fixed(e, scope));
   PetscCall(SbOptionGiven(scope, "displacement", &move));
   PetscCall(SbOptionGiven(scope, "angle", &turn));
-  PetscCheck(
-    move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one formula)",
-    e->name, e->name, e->name);
+  PetscCheck(move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle "
+             "(degrees, one formula)",
+             e->name, e->name, e->name);
   PetscCall(SbPathRead(e, scope, PETSC_TRUE, &d->path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,20 +93,25 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
   PetscFunctionBeginUser;
   PetscCall(SbEffectItems(space, &e->on, SB_ON_NODES, &n, &d->node));
   PetscCall(PetscMalloc1(n, &d->bits));
-  /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide alike */
+
+  /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide
+     alike */
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt node = d->node[i];
     const int free = d->components & ~(int)space->fixed[node];
 
-    if (!free) continue;
+    if (!free)
+      continue;
     PetscCall(SbSpacePrescribe(space, node, free));
     d->node[d->n] = node;
     d->bits[d->n++] = (uint8_t)free;
-    if (node < space->nnode_owned) d->nowned = d->n;
+    if (node < space->nnode_owned)
+      d->nowned = d->n;
   }
   PetscCallMPI(MPI_Allreduce(&d->nowned, &owned, 1, MPIU_INT, MPI_SUM, space->comm));
   PetscCheck(owned, space->comm, PETSC_ERR_USER_INPUT,
-             "%s: every displacement of %s is already prescribed by an earlier effect: remove one of the two",
+             "%s: every displacement of %s is already prescribed by an earlier effect: remove one "
+             "of the two",
              e->on.option, e->on.n == 1 ? e->on.name[0] : "these sets");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,15 +119,17 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
 {
   const Support *d = (const Support *)e->data;
-  const PetscReal theta = d->path.angle ? SbFormulaEval(d->path.angle, t, NULL) * PETSC_PI / 180 : 0,
-                  half = PetscSinReal(theta / 2);
+  const PetscReal theta =
+    d->path.angle ? SbFormulaEval(d->path.angle, t, NULL) * PETSC_PI / 180 : 0;
+  const PetscReal half = PetscSinReal(theta / 2);
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0, row = 0; i < d->n; i++) {
     const PetscReal *X = &space->node_x[3 * d->node[i]];
     PetscReal r[3], kr[3], kkr[3];
 
-    while (space->fixed_node[row] != d->node[i]) row++; /* both ascend, and it is among them */
+    while (space->fixed_node[row] != d->node[i])
+      row++; /* both ascend, and it is among them */
     SbSubtract(X, d->path.point, r);
     SbCross(d->path.axis, r, kr);
     SbCross(d->path.axis, kr, kkr);
@@ -126,35 +139,42 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
       if (d->path.angle)
         u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] +
             SbFormulaEval(d->path.displacement[c], t, X);
-      if (d->bits[i] & (1 << c)) space->fixed_value[3 * row + c] = u;
+      if (d->bits[i] & (1 << c))
+        space->fixed_value[3 * row + c] = u;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces rotate with the body, so their work is moment times angle; along the chord a constant moment would
-   give only the factor sin(angle). */
+/* Forces rotate with the body, so their work is moment times angle; along the chord a constant
+   moment would give only the factor sin(angle). */
 static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
-                                           const PetscReal r0[], const PetscReal r1[], PetscReal *work)
+                                           const PetscReal r0[], const PetscReal r1[],
+                                           PetscReal *work)
 {
   const Support *d = (const Support *)e->data;
   const PetscReal theta[2] = {SbFormulaEval(d->path.angle, t0, NULL) * PETSC_PI / 180,
-                              SbFormulaEval(d->path.angle, t1, NULL) * PETSC_PI / 180},
-                  *r[2] = {r0, r1}, still[3] = {0};
+                              SbFormulaEval(d->path.angle, t1, NULL) * PETSC_PI / 180};
+  const PetscReal *r[2] = {r0, r1};
+  const PetscReal still[3] = {0};
   SbPose pose[2];
 
   PetscFunctionBeginUser;
-  if (theta[0] == theta[1]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; k < 2; k++) SbPoseSet(d->path.axis, theta[k], d->path.point, still, &pose[k]);
+  if (theta[0] == theta[1])
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 2; k++)
+    SbPoseSet(d->path.axis, theta[k], d->path.point, still, &pose[k]);
   for (PetscInt i = 0; i < d->nowned; i++) {
     const PetscInt node = 3 * d->node[i];
     PetscReal x[2][3], way[3];
 
-    for (int k = 0; k < 2; k++) SbPoseApply(&pose[k], space->node_x + node, x[k]);
+    for (int k = 0; k < 2; k++)
+      SbPoseApply(&pose[k], space->node_x + node, x[k]);
     for (int k = 0; k < 2; k++) {
       SbPoseWay(&pose[0], &pose[1], &pose[k], x[k], way);
       for (int c = 0; c < 3; c++)
-        if (d->bits[i] & (1 << c)) *work += 0.5 * r[k][node + c] * (way[c] - (x[1][c] - x[0][c]));
+        if (d->bits[i] & (1 << c))
+          *work += 0.5 * r[k][node + c] * (way[c] - (x[1][c] - x[0][c]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -166,7 +186,8 @@ static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *
   const Support *d = (const Support *)e->data;
 
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < e->ncolumn; k++) values[k] = 0;
+  for (PetscInt k = 0; k < e->ncolumn; k++)
+    values[k] = 0;
   for (PetscInt i = 0; i < d->nowned; i++) {
     const PetscInt node = 3 * d->node[i];
     PetscReal arm[3], force[3], moment[3];
@@ -175,8 +196,10 @@ static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *
       force[c] = d->bits[i] & (1 << c) ? residual[node + c] : 0;
       values[c] += force[c];
     }
-    if (!d->path.angle) continue;
-    for (int c = 0; c < 3; c++) arm[c] = space->node_x[node + c] + stage->u[node + c] - d->path.point[c];
+    if (!d->path.angle)
+      continue;
+    for (int c = 0; c < 3; c++)
+      arm[c] = space->node_x[node + c] + stage->u[node + c] - d->path.point[c];
     SbCross(arm, force, moment);
     values[3] += SbDot3(d->path.axis, moment);
   }

@@ -4,16 +4,19 @@
     phi_i = l_i (2 l_i - 1) at vertex i,   phi_ij = 4 l_i l_j at the middle of edge ij,
     grad phi_i = (4 l_i - 1) grad l_i,     grad phi_ij = 4 (l_j grad l_i + l_i grad l_j).
 
-  So at a point the gradient is that of a P1 tet with the vertex displacements u_i' = (4 l_i - 1) u_i + sum_j
-  4 l_j u_ij, and the results of P1's kernels are mapped back by the transpose: this file has both maps.
+  So at a point the gradient is that of a P1 tet with the vertex displacements u_i' = (4 l_i - 1)
+  u_i + sum_j 4 l_j u_ij, and the results of P1's kernels are mapped back by the transpose: this
+  file has both maps.
 
-  Stresses are evaluated at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the
-  volume. Cubic functions, as det F of a linear F, by the rule of degree 3 with five.
+  Stresses are evaluated at the four points of the rule of degree 2 (Keast 1986), each with a
+  quarter of the volume. Cubic functions, as det F of a linear F, by the rule of degree 3 with five.
 
-  Tets with curved edges are P1 tets with other corners at each point of SbRuleQuintic (quadratic_map.c).
+  Tets with curved edges are P1 tets with other corners at each point of SbRuleQuintic
+  (quadratic_map.c).
 
-  Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz
-  1976) is its diagonal, scaled to the mass of the tet: row sums at vertices would be negative, -1/20.
+  Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and
+  Zienkiewicz 1976) is its diagonal, scaled to the mass of the tet: row sums at vertices would be
+  negative, -1/20.
 */
 #include <sbelement.h>
 
@@ -32,12 +35,15 @@ const SbPointRule SbRuleCubic = {5,
                                   {1. / 6, 1. / 6, 1. / 6, 1. / 2}},
                                  {-0.8, 0.45, 0.45, 0.45, 0.45}};
 
-SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30], SbPack u[restrict 12])
+SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30],
+                             SbPack u[restrict 12])
 {
   for (int k = 0; k < 12; k++)
-    for (int l = 0; l < SB_BATCH; l++) u[k][l] = (4 * L[k / 3] - 1) * U[k][l];
+    for (int l = 0; l < SB_BATCH; l++)
+      u[k][l] = (4 * L[k / 3] - 1) * U[k][l];
   for (int e = 0; e < 6; e++) {
-    const int i = SbTetEdge[e][0], j = SbTetEdge[e][1];
+    const int i = SbTetEdge[e][0];
+    const int j = SbTetEdge[e][1];
 
     for (int k = 0; k < 3; k++) {
       for (int l = 0; l < SB_BATCH; l++) {
@@ -50,12 +56,15 @@ SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30], 
   }
 }
 
-SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12], SbPack F[restrict 30])
+SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12],
+                              SbPack F[restrict 30])
 {
   for (int k = 0; k < 12; k++)
-    for (int l = 0; l < SB_BATCH; l++) F[k][l] += (4 * L[k / 3] - 1) * f[k][l];
+    for (int l = 0; l < SB_BATCH; l++)
+      F[k][l] += (4 * L[k / 3] - 1) * f[k][l];
   for (int e = 0; e < 6; e++) {
-    const int i = SbTetEdge[e][0], j = SbTetEdge[e][1];
+    const int i = SbTetEdge[e][0];
+    const int j = SbTetEdge[e][1];
 
     for (int k = 0; k < 3; k++)
       for (int l = 0; l < SB_BATCH; l++)
@@ -63,7 +72,8 @@ SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12],
   }
 }
 
-/* Vertices on which gradient a depends, with their factors at L: one for a vertex, two for an edge. */
+/* Vertices on which gradient a depends, with their factors at L: one for a vertex, two for an
+   edge. */
 SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal factor[2])
 {
   if (a < 4) {
@@ -86,22 +96,25 @@ SB_KERNEL void SbQuadraticBlocks(const SbPointRule *rule, const SbPack B[restric
   SbPack scaled[30];
 
   for (int k = 0; k < 30; k++)
-    for (int l = 0; l < SB_BATCH; l++) scaled[k][l] = factor[l] * b[k][l];
+    for (int l = 0; l < SB_BATCH; l++)
+      scaled[k][l] = factor[l] * b[k][l];
 
   for (int p = 0; p < SB_PAIRS; p++) {
     PetscReal weight[4 * SB_POINTS];
     const SbPack *block[4 * SB_POINTS];
-    int turned[4 * SB_POINTS], n = 0;
+    int turned[4 * SB_POINTS];
+    int n = 0;
 
     // sum over the points of the P1 blocks that contribute
     for (int q = 0; q < rule->n; q++) {
       PetscReal fa[2], fb[2];
       int va[2], vb[2];
-      const int na = gradient_of(SbPairA[p], rule->L[q], va, fa),
-                nb = gradient_of(SbPairB[p], rule->L[q], vb, fb);
+      const int na = gradient_of(SbPairA[p], rule->L[q], va, fa);
+      const int nb = gradient_of(SbPairB[p], rule->L[q], vb, fb);
 
       for (int k = 0; k < na * nb; k++, n++) {
-        const int i = va[k / nb], j = vb[k % nb];
+        const int i = va[k / nb];
+        const int j = vb[k % nb];
 
         weight[n] = fa[k / nb] * fb[k % nb];
         block[n] = B[q][pair[i][j]];
@@ -110,24 +123,29 @@ SB_KERNEL void SbQuadraticBlocks(const SbPointRule *rule, const SbPack B[restric
     }
     for (int e = 0; e < 9; e++) {
       const int other = 3 * (e % 3) + e / 3;
-      const PetscReal *x = scaled[3 * SbPairA[p] + e / 3], *y = b[3 * SbPairB[p] + e % 3];
+      const PetscReal *x = scaled[3 * SbPairA[p] + e / 3];
+      const PetscReal *y = b[3 * SbPairB[p] + e % 3];
       SbPack sum;
 
-      for (int l = 0; l < SB_BATCH; l++) sum[l] = x[l] * y[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        sum[l] = x[l] * y[l];
       for (int k = 0; k < n; k++) {
         const PetscReal *from = block[k][turned[k] ? other : e];
 
-        for (int l = 0; l < SB_BATCH; l++) sum[l] += weight[k] * from[l];
+        for (int l = 0; l < SB_BATCH; l++)
+          sum[l] += weight[k] * from[l];
       }
-      for (int l = 0; l < SB_BATCH; l++) K[p][e][l] = sum[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        K[p][e][l] = sum[l];
     }
   }
 }
 
-/* With gradients g of barycentric coordinates the second derivative of det F along u at a, v at b is (u x v)
-   . F (g_a x g_b). */
+/* With gradients g of barycentric coordinates the second derivative of det F along u at a, v at b
+   is (u x v) . F (g_a x g_b). */
 SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restrict 9],
-                                      const SbPack F[restrict 9], const PetscReal weight[restrict SB_BATCH],
+                                      const SbPack F[restrict 9],
+                                      const PetscReal weight[restrict SB_BATCH],
                                       SbPack K[restrict SB_PAIRS][9])
 {
   SbPack x[4][4][3];
@@ -137,22 +155,26 @@ SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restr
 
     SbPackGet(9, F, l, f);
     for (int k = 0; k < 3; k++) {
-      for (int a = 1; a < 4; a++) h[a][k] = g[3 * (a - 1) + k][l];
+      for (int a = 1; a < 4; a++)
+        h[a][k] = g[3 * (a - 1) + k][l];
       h[0][k] = -(h[1][k] + h[2][k] + h[3][k]);
     }
     for (int i = 0; i < 4; i++) {
       for (int j = 0; j < 4; j++) {
         SbCross(h[i], h[j], c);
-        for (int k = 0; k < 3; k++) x[i][j][k][l] = weight[l] * SbDot3(f + 3 * k, c);
+        for (int k = 0; k < 3; k++)
+          x[i][j][k][l] = weight[l] * SbDot3(f + 3 * k, c);
       }
     }
   }
   for (int p = 0; p < SB_PAIRS; p++) {
     PetscReal fa[2], fb[2];
     int va[2], vb[2];
-    const int na = gradient_of(SbPairA[p], L, va, fa), nb = gradient_of(SbPairB[p], L, vb, fb);
+    const int na = gradient_of(SbPairA[p], L, va, fa);
+    const int nb = gradient_of(SbPairB[p], L, vb, fb);
 
-    if (SbPairA[p] == SbPairB[p]) continue;
+    if (SbPairA[p] == SbPairB[p])
+      continue;
     for (int k = 0; k < na * nb; k++) {
       const PetscReal w = fa[k / nb] * fb[k % nb];
       const SbPack *c = x[va[k / nb]][vb[k % nb]];
@@ -171,11 +193,14 @@ SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restr
 
 PetscReal SbQuadraticMass(int a, int b)
 {
-  const int low = PetscMin(a, b), high = PetscMax(a, b);
+  const int low = PetscMin(a, b);
+  const int high = PetscMax(a, b);
 
-  if (high < 4) return a == b ? 1. / 70 : 1. / 420;
+  if (high < 4)
+    return a == b ? 1. / 70 : 1. / 420;
   const int *e = SbTetEdge[high - 4];
-  if (low < 4) return low == e[0] || low == e[1] ? -1. / 105 : -1. / 70;
+  if (low < 4)
+    return low == e[0] || low == e[1] ? -1. / 105 : -1. / 70;
   const int *d = SbTetEdge[low - 4];
   const int shared = (d[0] == e[0]) + (d[0] == e[1]) + (d[1] == e[0]) + (d[1] == e[1]);
   return shared == 2 ? 8. / 105 : shared ? 4. / 105 : 2. / 105;

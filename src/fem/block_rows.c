@@ -1,6 +1,6 @@
 /*
-  Rows of an operator as 3x3 blocks with local columns, for a matrix-free operator, AIJ, BAIJ or SBAIJ, whose
-  values are read in place, by the assembly plan; SBAIJ stores only the upper triangle.
+  Rows of an operator as 3x3 blocks with local columns, for a matrix-free operator, AIJ, BAIJ or
+  SBAIJ, whose values are read in place, by the assembly plan; SBAIJ stores only the upper triangle.
 */
 #include "fem_impl.h"
 
@@ -14,14 +14,18 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   PetscFunctionBeginUser;
   ia[0] = 0;
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node ? node[k] : k, nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+    const PetscInt i = node ? node[k] : k;
+    const PetscInt nd = p->di[i + 1] - p->di[i];
+    const PetscInt no = p->oi[i + 1] - p->oi[i];
 
     ia[k + 1] = ia[k] + nd + no;
-    if (!ja) continue;
+    if (!ja)
+      continue;
     PetscCall(PetscArraycpy(ja + ia[k], p->dj + p->di[i], nd));
     PetscCall(PetscArraycpy(ja + ia[k] + nd, p->oj + p->oi[i], no));
   }
-  if (!block) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!block)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMatrixFreeGetRotations(A, &R));
   if (R) {
     PetscCall(PetscArrayzero(block, 9 * ia[n]));
@@ -30,10 +34,12 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   }
   PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &b));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node ? node[k] : k, nd = p->di[i + 1] - p->di[i];
+    const PetscInt i = node ? node[k] : k;
+    const PetscInt nd = p->di[i + 1] - p->di[i];
 
     for (PetscInt e = 0; e < ia[k + 1] - ia[k]; e++) {
-      PetscInt row = i, at = e < nd ? p->di[i] + e : ~(p->oi[i] + e - nd);
+      PetscInt row = i;
+      PetscInt at = e < nd ? p->di[i] + e : ~(p->oi[i] + e - nd);
       const PetscBool lower = (PetscBool)(b.symmetric && p->dj[at] < i);
       PetscReal *to = block + 9 * (ia[k] + e);
       const PetscScalar *v;
@@ -46,7 +52,8 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
         at += p->di[row];
       }
       v = sb_block(&b, p, row, at, &rs, &cs);
-      for (size_t m = 0; m < 9; m++) to[m] = lower ? v[m % 3 * rs + m / 3 * cs] : v[m / 3 * rs + m % 3 * cs];
+      for (size_t m = 0; m < 9; m++)
+        to[m] = lower ? v[m % 3 * rs + m / 3 * cs] : v[m / 3 * rs + m % 3 * cs];
     }
   }
   PetscCall(SbMatRestoreBlocks(&b));

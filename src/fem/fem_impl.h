@@ -1,26 +1,32 @@
 /*
-  fem_impl.h - functions shared by the files of src/fem: layout, face terms, assembly, points of a batch.
+  fem_impl.h - functions shared by the files of src/fem: layout, face terms, assembly, points of a
+  batch.
 */
 #pragma once
 #include "sbassembly.h"
 
-/* layout.c: creates the nodes of the space. After the batches: the nodes of each stress. Collective. */
+/* layout.c: creates the nodes of the space. After the batches: the nodes of each stress.
+   Collective. */
 PetscErrorCode SbLayoutNodes(SbSpace space);
 PetscErrorCode SbLayoutCliques(SbSpace space);
 PetscErrorCode SbLayoutDestroy(SbSpace space);
 
 /* jump.c: face terms of CR and DG, as stiffness or times the body's beta. Not collective. */
-typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
+typedef enum {
+  SB_JUMP_STIFFNESS,
+  SB_JUMP_DAMPING
+} SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; complete on owned nodes.
-   x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; complete on owned
+   nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in padding. */
+/* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in
+   padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
 /* Sums the current face terms for the matrix, in the plan. */
@@ -32,14 +38,16 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan);
 /* tangent.c: the table of SbMatrixSetAssembly(), NULL for a matrix of blocks. */
 PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly);
 
-/* Address of block k (as in SbPlan.offset) of a row, and the distances between its rows and columns. */
+/* Address of block k (as in SbPlan.offset) of a row, and the distances between its rows and
+   columns. */
 static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row, PetscInt k,
                                     size_t *row_stride, size_t *column_stride)
 {
   const int q = k < 0;
   const PetscInt *ptr = q ? p->oi : p->di;
 
-  if (q) k = ~k;
+  if (q)
+    k = ~k;
   if (x->kind == SB_MATRIX_AIJ) {
     *row_stride = 3 * (size_t)(ptr[row + 1] - ptr[row]);
     *column_stride = 1;
@@ -47,28 +55,34 @@ static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row
   }
   *row_stride = 1;
   *column_stride = 3;
-  if (x->symmetric) k = p->ui[row] + k - p->diagonal[row];
+  if (x->symmetric)
+    k = p->ui[row] + k - p->diagonal[row];
   return x->value[q] + 9 * (size_t)k;
 }
 
 /* Adds a block, or its transpose, times a factor, at its position in an owned row. */
 static inline void sb_insert_block(SbSpace s, const SbMatBlocks *x, PetscInt row, PetscInt column,
-                                   PetscInt position, PetscReal factor, PetscBool turn, const PetscReal k[9])
+                                   PetscInt position, PetscReal factor, PetscBool turn,
+                                   const PetscReal k[9])
 {
   size_t rs, cs;
   PetscScalar *v;
 
-  if (position == SB_NOT_OWNED || (x->symmetric && row > column)) return;
+  if (position == SB_NOT_OWNED || (x->symmetric && row > column))
+    return;
   v = sb_block(x, s->plan, row, position, &rs, &cs);
   for (size_t i = 0; i < 3; i++)
-    for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
+    for (size_t j = 0; j < 3; j++)
+      v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
 }
 
-/* For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
-   to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms. */
+/* For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or
+   sets them to the face terms with the factors of a stage and beta[nbody], s, damping. NULL:
+   without face terms. */
 void SbInsertClear(SbSpace space, const SbMatBlocks *x, PetscInt b, const SbStage *faces,
                    const PetscReal beta[]);
-/* quadratic.c: points of a batch. P1, CR and DG have one; P2 four, curved cells those of SbRuleQuintic. */
+/* quadratic.c: points of a batch. P1, CR and DG have one; P2 four, curved cells those of
+   SbRuleQuintic. */
 typedef struct {
   int n, step;             /* number of points; gradients of point q: g + step q */
   const SbPointRule *rule; /* rule of P2 */
@@ -79,15 +93,18 @@ SbPoints SbBatchPoints(SbSpace space, PetscInt b);
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
-  for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
+  for (int l = 0; l < SB_BATCH; l++)
+    W[l] = at->weight[q][l] * (*at->V)[l];
 }
-/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: less I). */
+/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: less
+   I). */
 void SbBatchGradients(SbSpace space, PetscInt b, const PetscReal x[], PetscBool rate, SbPack U[30],
                       SbPack F[SB_POINTS][9]);
-/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one point). */
+/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one
+   point). */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
-/* The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
-   tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points. */
+/* The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean
+   (Pa, tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points. */
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
 /* The rule that is exact for det F; for a curved cell that of its points. */
@@ -95,17 +112,20 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 {
   return at->step ? at->rule : &SbRuleCubic;
 }
-/* Evaluates the law at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
+/* Evaluates the law at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be
+   NULL. */
 void SbBatchState(SbSpace space, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS]);
-/* residual.c: f += elastic forces of a region (if `elastic`) and of damping by beta, s; u NULL: rest. */
+/* residual.c: f += elastic forces of a region (if `elastic`) and of damping by beta, s; u NULL:
+   rest. */
 void SbRegionForces(SbSpace space, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[]);
-/* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair, m^3. */
+/* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair,
+   m^3. */
 void SbBatchMass(SbSpace space, PetscInt b, SbPack mass[SB_PAIRS]);
 
-/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means at faces. K is
-   32-byte aligned. */
+/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means at
+   faces. K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                    const SbPack K[][9]);
 /* constraint.c: projects an assembled matrix, or regularises it. Not collective. */

@@ -6,45 +6,53 @@
     W_F = 1/2 kappa1 int_F |[u]|^2 + 1/2 kappa0 |F| |[u]_0|^2,
     kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
 
-  H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
-  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant
-  within a step: they are invariant under rotations, and rigid motions have no jumps.
+  H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu
+  / h with h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are
+  isotropic and constant within a step: they are invariant under rotations, and rigid motions have
+  no jumps.
 
-  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the
-  jump at the three vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
+  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite
+  v. So the jump at the three vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and
+  since J is linear there
 
     int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
 
-  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight
-  nodes by the transpose of this map. For CR both sides share the face's node, whose parts cancel.
+  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to
+  the eight nodes by the transpose of this map. For CR both sides share the face's node, whose parts
+  cancel.
 
-  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex
-  function of F, has twist modes with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal
-  values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For continuous
-  displacements the sum over the cells vanishes but for the boundary; here the penalty balances it. So
+  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another
+  non-convex function of F, has twist modes with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i
+  and s_i principal values of the first Piola stress and of F: under a hydrostatic pressure p it is
+  mu - p. For continuous displacements the sum over the cells vanishes but for the boundary; here
+  the penalty balances it. So
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic.
-  A dependence on the current state would have to be differentiated: jumps would add a spurious pressure.
+  evaluated at the start of the step, so that the terms are constant within it and their energy is
+  quadratic. A dependence on the current state would have to be differentiated: jumps would add a
+  spurious pressure.
 
-  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the
-  energy of a face when kappa1 changes at the start of a step. With r = 0 every change of kappa1 would add 1/2
-  (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r is parallel to [u], so that a
-  body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2 and one. The upper bound
-  dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result
-  depends on the loads alone; so has the start of a dynamic run from a given state. With Newmark, without
-  damping, m never decreases: near nu = 1/2 it would change a hundredfold with each wave.
+  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that
+  keeps the energy of a face when kappa1 changes at the start of a step. With r = 0 every change of
+  kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r
+  is parallel to [u], so that a body at rest has no force, with a factor between (kappa1 with m = mu
+  / kappa1)^2 and one. The upper bound dissipates, the lower one adds little. Load steps, which may
+  be long, have r = 0, so that their result depends on the loads alone; so has the start of a
+  dynamic run from a given state. With Newmark, without damping, m never decreases: near nu = 1/2 it
+  would change a hundredfold with each wave.
 
-  A boundary face with a support node (layout.c): the other side is rigid and has the displacement of that
-  node. H(k) is 2 k then; kappa1 = 0, because the support prescribes the mean only.
+  A boundary face with a support node (layout.c): the other side is rigid and has the displacement
+  of that node. H(k) is 2 k then; kappa1 = 0, because the support prescribes the mean only.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4.  /* factor on the negative stiffness in load steps; docs/reference/theory.md */
-#define RATE 2.    /* further one in time steps: the secant of a growing penalty is about half its tangent */
-#define LEAST 1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define FOLLOW 4. /* factor on the negative stiffness in load steps; docs/reference/theory.md */
+#define RATE \
+  2. /* further one in time steps: the secant of a growing penalty is about half its tangent */
+#define LEAST \
+  1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
 #define RENEWED 0.01 /* relative change of a penalty that is reported */
 #define SAME 1e-12   /* relative change that is rounding */
 
@@ -63,20 +71,25 @@ struct _p_SbJump {
   PetscInt *n;     /* [nbatch] number of faces in the batch */
   PetscInt *node;  /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
   SbPack *c0, *c1; /* [nbatch] factors above, N/m; zero in padding */
-  SbPack *r;       /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
+  SbPack *r; /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
   PetscBool began; /* the run has made time steps, or its checkpoint has */
   PetscBool renew; /* penalties restored from a checkpoint differ from those of the rest state */
-  SbPack *share;   /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
+  SbPack *
+    share; /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
 };
 
-/* Nodes of a face: for each side that on the face, then those opposite its vertices, in the same order. */
+/* Nodes of a face: for each side that on the face, then those opposite its vertices, in the same
+   order. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 {
-  const PetscInt plus = 4 * face->cell[0], minus = 4 * face->cell[1];
+  const PetscInt plus = 4 * face->cell[0];
+  const PetscInt minus = 4 * face->cell[1];
 
-  for (PetscInt i = 0; i < 4; i++) node[i] = s->cell_node[plus + (face->face[0] + i) % 4];
+  for (PetscInt i = 0; i < 4; i++)
+    node[i] = s->cell_node[plus + (face->face[0] + i) % 4];
   if (face->cell[1] == SUPPORT) {
-    for (int i = 4; i < 8; i++) node[i] = s->dirichlet_node[plus + face->face[0]];
+    for (int i = 4; i < 8; i++)
+      node[i] = s->dirichlet_node[plus + face->face[0]];
     return;
   }
   node[4] = s->cell_node[minus + face->face[1]];
@@ -84,7 +97,8 @@ static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
     const PetscInt v = s->mesh->cell[plus + (face->face[0] + i) % 4];
     PetscInt b = 0;
 
-    while (b < 3 && s->mesh->cell[minus + b] != v) b++;
+    while (b < 3 && s->mesh->cell[minus + b] != v)
+      b++;
     node[4 + i] = s->cell_node[minus + b];
   }
 }
@@ -95,10 +109,13 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
 }
 
 /* c0 and c1 of a face; `rest`: with m = mu. */
-static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, PetscReal *c0, PetscReal *c1)
+static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, PetscReal *c0,
+                         PetscReal *c1)
 {
-  const PetscInt *v = s->mesh->cell + 4 * face->cell[0], f = face->face[0];
-  const PetscReal *x = s->mesh->x, *corner = x + 3 * v[(f + 1) % 4];
+  const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
+  const PetscInt f = face->face[0];
+  const PetscReal *x = s->mesh->x;
+  const PetscReal *corner = x + 3 * v[(f + 1) % 4];
   const SbElement e = SbSpaceCellElement(s, face->cell[0]);
   PetscReal k0[2], k1[2], p[3], q[3], n[3], area;
 
@@ -125,36 +142,44 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
 PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 {
   const SbMesh mesh = s->mesh;
-  PetscInt nface = 0, b = -1;
+  PetscInt nface = 0;
+  PetscInt b = -1;
   SbJump j;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&j));
   PetscCall(PetscMalloc3(mesh->ncell, &j->V, mesh->ncell, &j->modulus, 4 * mesh->ncell, &j->face));
   for (PetscInt k = 0; k < s->nbatch; k++)
-    for (PetscInt l = 0; l < s->batch_n[k]; l++) j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
-  for (PetscInt c = 0; c < mesh->ncell; c++) j->modulus[c] = s->material[mesh->cell_material[c]]->mu;
+    for (PetscInt l = 0; l < s->batch_n[k]; l++)
+      j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
+  for (PetscInt c = 0; c < mesh->ncell; c++)
+    j->modulus[c] = s->material[mesh->cell_material[c]]->mu;
 
   /* list the faces with an owned node, sorted by body */
   for (PetscInt body = 0; body < mesh->nbody; body++) {
     for (PetscInt i = 0; i < 4 * mesh->ncell && !s->element[body]->nodes_per[0]; i++) {
       Face *face = &j->face[nface];
       const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
-      PetscInt node[8], f = 0;
+      PetscInt node[8];
+      PetscInt f = 0;
       PetscBool owned = PETSC_FALSE;
 
-      if (mesh->cell_body[i / 4] != body || (!supported && s->neighbour[i] < i / 4)) continue;
-      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
+      if (mesh->cell_body[i / 4] != body || (!supported && s->neighbour[i] < i / 4))
+        continue;
+      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4)
+        f++;
       *face = (Face){{i / 4, supported ? SUPPORT : s->neighbour[i]}, {i % 4, f}};
       face_nodes(s, face, node);
-      for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
+      for (int k = 0; k < 8; k++)
+        owned = (PetscBool)(owned || node[k] < s->nnode_owned);
       nface += owned;
     }
   }
 
   /* a batch has faces of one body: at most one more batch per body */
   j->nbatch = nface / SB_BATCH + mesh->nbody;
-  PetscCall(PetscMalloc3(j->nbatch, &j->body, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
+  PetscCall(
+    PetscMalloc3(j->nbatch, &j->body, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
   for (PetscInt i = 0; i < nface; i++) {
     const Face *face = &j->face[i];
@@ -172,26 +197,31 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
     face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
     for (int side = 0; side < 2; side++)
-      j->share[b][l] += face->cell[face->cell[1] == SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
+      j->share[b][l] +=
+        face->cell[face->cell[1] == SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
   }
   j->nbatch = b + 1;
   *jump = j;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
-   twist modes; keep: m may not decrease. Returns whether some m changed. */
-static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal factor, PetscBool keep)
+/* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
+   stiffness of twist modes; keep: m may not decrease. Returns whether some m changed. */
+static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal factor,
+                              PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
   const PetscInt n = s->batch_n[b];
-  PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
+  PetscReal *modulus = s->jump->modulus + s->batch_cell[b];
+  PetscReal before[SB_BATCH];
+  PetscReal largest = 0.;
   PetscBool changed = PETSC_FALSE;
   SbPack u[30], F[9], P[9], U[9], stretch[3], V[9];
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
-    if (!keep) modulus[l] = m->mu;
+    if (!keep)
+      modulus[l] = m->mu;
   }
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
@@ -201,23 +231,26 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
   for (PetscInt l = 0; l < n; l++) {
     PetscReal square = 0.;
 
-    for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
+    for (int k = 0; k < 9; k++)
+      square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(m->mu / factor)) SbStretches((const SbPack *)F, U, stretch, V);
+  if (largest >= 0.5 * PetscSqr(m->mu / factor))
+    SbStretches((const SbPack *)F, U, stretch, V);
   for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(m->mu / factor); l++) {
     PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
 
     for (int k = 0; k < 27; k++)
       principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
     for (int k = 0; k < 3; k++) {
-      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
-                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
+      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l];
+      const PetscReal twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
 
       modulus[l] = PetscMax(modulus[l], -factor * twist);
     }
   }
-  for (PetscInt l = 0; l < n; l++) changed = (PetscBool)(changed || modulus[l] != before[l]);
+  for (PetscInt l = 0; l < n; l++)
+    changed = (PetscBool)(changed || modulus[l] != before[l]);
   return changed;
 }
 
@@ -230,25 +263,30 @@ static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
 }
 
 /* Jumps at the three vertices less offsets r, J[3 i + c], and the sum of the jumps. */
-SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x[], const SbPack r[9], int l,
-                            PetscReal J[9], PetscReal sum[3])
+SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x[],
+                            const SbPack r[9], int l, PetscReal J[9], PetscReal sum[3])
 {
   for (int c = 0; c < 3; c++) {
     PetscReal u[8], S;
 
-    for (int k = 0; k < 8; k++) u[k] = x[3 * node[k * SB_BATCH + l] + c];
+    for (int k = 0; k < 8; k++)
+      u[k] = x[3 * node[k * SB_BATCH + l] + c];
     S = (u[0] - u[4]) + (u[1] - u[5]) + (u[2] - u[6]) + (u[3] - u[7]);
-    for (int i = 0; i < 3; i++) J[3 * i + c] = S - 3. * (u[1 + i] - u[5 + i]) - r[3 * i + c][l];
+    for (int i = 0; i < 3; i++)
+      J[3 * i + c] = S - 3. * (u[1 + i] - u[5 + i]) - r[3 * i + c][l];
     sum[c] = 3. * (u[0] - u[4]);
   }
 }
 
-/* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J = 0. */
+/* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J =
+   0. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
   static const SbPack zero[9];
   const SbPack *r = left_out(j, b, SB_JUMP_STIFFNESS);
-  PetscReal sum[3], square = 0., along = 0.;
+  PetscReal sum[3];
+  PetscReal square = 0.;
+  PetscReal along = 0.;
 
   gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
   for (int c = 0; c < 3; c++) {
@@ -268,30 +306,35 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed:
-   set if one changed on this rank by a percent or more. */
+/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0.
+   changed: set if one changed on this rank by a percent or more. */
 static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
 {
   const SbJump j = s->jump;
   PetscReal J[9];
 
   PetscFunctionBeginUser;
-  if (x && !j->r) PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
+  if (x && !j->r)
+    PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const PetscReal before = j->c1[b][l], part = x ? held_part(j, b, l, x, J) : 1.;
+      const PetscReal before = j->c1[b][l];
+      const PetscReal part = x ? held_part(j, b, l, x, J) : 1.;
       PetscReal c0, least, held, kept;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
-      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
-      if (!x || j->c1[b][l] == 0.) continue;
+      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before)
+        *changed = PETSC_TRUE;
+      if (!x || j->c1[b][l] == 0.)
+        continue;
 
       /* scale the jumps so that the face keeps its energy or, in the first step, its force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
       kept = before / j->c1[b][l];
-      held =
-        PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), PetscSqr(least / j->c1[b][l]), 1.);
-      for (int k = 0; k < 9; k++) j->r[9 * b + k][l] = (1. - held) * J[k];
+      held = PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)),
+                               PetscSqr(least / j->c1[b][l]), 1.);
+      for (int k = 0; k < 9; k++)
+        j->r[9 * b + k][l] = (1. - held) * J[k];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -305,7 +348,8 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  for (PetscInt i = 0; i < 5 * s->mesh->ncell_owned; i++) k[i] = i % 5 == 4 ? j->modulus[i / 5] : 0.;
+  for (PetscInt i = 0; i < 5 * s->mesh->ncell_owned; i++)
+    k[i] = i % 5 == 4 ? j->modulus[i / 5] : 0.;
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
@@ -334,19 +378,25 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
       const Face *face = &j->face[i];
       const PetscReal before = j->c1[b][l];
 
-      if (face->cell[1] == SUPPORT) continue;
+      if (face->cell[1] == SUPPORT)
+        continue;
+
       /* the owner of a cell may not have each of its faces */
-      j->c1[b][l] = PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
-      if (PetscAbsReal(j->c1[b][l] - before) > SAME * before) j->renew = PETSC_TRUE;
+      j->c1[b][l] =
+        PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
+      if (PetscAbsReal(j->c1[b][l] - before) > SAME * before)
+        j->renew = PETSC_TRUE;
     }
   }
-  for (PetscInt c = 0; c < s->mesh->ncell; c++) j->modulus[c] = k[5 * c + 4];
+  for (PetscInt c = 0; c < s->mesh->ncell; c++)
+    j->modulus[c] = k[5 * c + 4];
   j->began = PETSC_TRUE;
   PetscCall(PetscFree(k));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets r. */
+/* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets
+   r. */
 static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
@@ -354,8 +404,10 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 
   s->jump->renew = PETSC_FALSE;
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear) continue;
-    if (follow_batch(s, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED))) any = PETSC_TRUE;
+    if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear)
+      continue;
+    if (follow_batch(s, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED)))
+      any = PETSC_TRUE;
   }
   return any;
 }
@@ -363,12 +415,14 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 void SbJumpSumTerms(SbSpace s)
 {
   const SbPlan p = s->plan;
-  const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
+  const PetscInt *nodes;
+  const PetscInt nbatch = SbJumpCliques(s, &nodes);
 
   for (int q = 0; q < 2; q++) {
     const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
 
-    for (PetscInt k = 0; k < n; k++) p->face_term[q][k] = 0.;
+    for (PetscInt k = 0; k < n; k++)
+      p->face_term[q][k] = 0.;
   }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
@@ -376,16 +430,20 @@ void SbJumpSumTerms(SbSpace s)
       PetscReal K[8][8];
 
       SbJumpMatrix(s, b, l, K);
-      if (K[0][0] == 0.) continue; // padding lanes are zero
+      if (K[0][0] == 0.)
+        continue; // padding lanes are zero
       for (int k = 0; k < 64; k++) {
-        const PetscInt row = node[k / 8 * SB_BATCH], column = node[k % 8 * SB_BATCH];
+        const PetscInt row = node[k / 8 * SB_BATCH];
+        const PetscInt column = node[k % 8 * SB_BATCH];
         const int q = column >= s->nnode_owned;
         const PetscInt *j = q ? p->oj : p->dj;
         PetscInt at;
 
-        if (row >= s->nnode_owned) continue;
+        if (row >= s->nnode_owned)
+          continue;
         at = (q ? p->oi : p->di)[row];
-        while (j[at] != column) at++;
+        while (j[at] != column)
+          at++;
         p->face_term[q][at] += K[k / 8][k % 8];
       }
     }
@@ -396,22 +454,32 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
-  PetscBool any, first, mine = PETSC_FALSE;
+  PetscBool any, first;
+  PetscBool mine = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  if (changed) *changed = PETSC_FALSE;
-  if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  if (changed)
+    *changed = PETSC_FALSE;
+  if (!s->jump || s->linear)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
+
   /* the initial state of a dynamic run has the forces of a load step */
   first = (PetscBool)(in_time && !s->jump->began);
-  if (in_time) s->jump->began = PETSC_TRUE;
-  if (first && follow(s, x, SB_STEPS_OF_LOAD)) PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
+  if (in_time)
+    s->jump->began = PETSC_TRUE;
+  if (first && follow(s, x, SB_STEPS_OF_LOAD))
+    PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
   any = follow(s, x, steps);
-  if (any) PetscCall(renew(s, in_time ? x : NULL, first, &mine));
+  if (any)
+    PetscCall(renew(s, in_time ? x : NULL, first, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  if (in_time) mine = any;
-  if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-  if (s->plan && any) SbJumpSumTerms(s);
+  if (in_time)
+    mine = any;
+  if (changed)
+    PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (s->plan && any)
+    SbJumpSumTerms(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -420,7 +488,8 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   SbJump j = *jump;
 
   PetscFunctionBeginUser;
-  if (!j) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!j)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree3(j->V, j->modulus, j->face));
   PetscCall(PetscFree3(j->body, j->n, j->node));
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
@@ -441,8 +510,10 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
     gather_jumps(node, x, r, l, J, sum);
     for (int c = 0; c < 3; c++) {
       const PetscReal common = c1[l] * (J[c] + J[3 + c] + J[6 + c]) + c0[l] * sum[c];
-      const PetscReal t0 = c1[l] * J[c] + common, t1 = c1[l] * J[3 + c] + common,
-                      t2 = c1[l] * J[6 + c] + common, all = t0 + t1 + t2;
+      const PetscReal t0 = c1[l] * J[c] + common;
+      const PetscReal t1 = c1[l] * J[3 + c] + common;
+      const PetscReal t2 = c1[l] * J[6 + c] + common;
+      const PetscReal all = t0 + t1 + t2;
 
       t[c][l] = all;
       t[3 + c][l] = all - 3. * t0;
@@ -461,11 +532,13 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
     const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[j->body[b]];
     SbPack t[12];
 
-    if (scale == 0.) continue;
+    if (scale == 0.)
+      continue;
     jump_forces(node, j->c0[b], j->c1[b], left_out(j, b, factor), x, t);
     for (PetscInt l = 0; l < j->n[b]; l++) {
       for (int k = 0; k < 4; k++) {
-        PetscReal *plus = f + 3 * node[k * SB_BATCH + l], *minus = f + 3 * node[(4 + k) * SB_BATCH + l];
+        PetscReal *plus = f + 3 * node[k * SB_BATCH + l];
+        PetscReal *minus = f + 3 * node[(4 + k) * SB_BATCH + l];
 
         for (int c = 0; c < 3; c++) {
           plus[c] += scale * t[3 * k + c][l];
@@ -482,18 +555,24 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
   PetscReal energy = 0.;
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[j->body[b]], before = energy;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[j->body[b]];
+    const PetscReal before = energy;
     const SbPack *r = left_out(j, b, factor);
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
-      PetscReal J[9], sum[3], squares = 0.;
+      PetscReal J[9], sum[3];
+      PetscReal squares = 0.;
 
       gather_jumps(j->node + 8 * SB_BATCH * b, x, r, l, J, sum);
-      for (int k = 0; k < 9; k++) squares += J[k] * J[k];
-      for (int k = 0; k < 3; k++) squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
-      energy += 0.5 * scale * j->share[b][l] * (j->c1[b][l] * squares + j->c0[b][l] * SbDot3(sum, sum));
+      for (int k = 0; k < 9; k++)
+        squares += J[k] * J[k];
+      for (int k = 0; k < 3; k++)
+        squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
+      energy +=
+        0.5 * scale * j->share[b][l] * (j->c1[b][l] * squares + j->c0[b][l] * SbDot3(sum, sum));
     }
-    if (body) body[j->body[b]] += energy - before;
+    if (body)
+      body[j->body[b]] += energy - before;
   }
   return energy;
 }
@@ -507,15 +586,18 @@ PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
 /* Entry (a, b) of the 8x8 matrix of a face, sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
 void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
 {
-  static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}}, D[4] = {3, 0, 0, 0};
-  const PetscReal c1 = s->jump->c1[b][l], c0 = s->jump->c0[b][l];
+  static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}};
+  static const PetscReal D[4] = {3, 0, 0, 0};
+  const PetscReal c1 = s->jump->c1[b][l];
+  const PetscReal c0 = s->jump->c0[b][l];
 
   for (int p = 0; p < 8; p++) {
     for (int q = 0; q < 8; q++) {
       const PetscReal sign = p / 4 == q / 4 ? 1. : -1.;
       PetscReal sum = (c1 + c0) * D[p % 4] * D[q % 4];
 
-      for (int i = 0; i < 3; i++) sum += c1 * d[i][p % 4] * d[i][q % 4];
+      for (int i = 0; i < 3; i++)
+        sum += c1 * d[i][p % 4] * d[i][q % 4];
       K[p][q] = sign * sum;
     }
   }

@@ -3,17 +3,18 @@
 
   With rotated gradients h_a = R grad phi_a the product A p of a cell is
     H = sum_a p_a h_a^T,  T = 2 mu sym(H) + lambda tr(H) I,  q_a = V T h_a,
-  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per
-  cell, an application about as much as a product with a stored matrix, and no blocks are formed: with few
-  iterations per step this is several times cheaper than assembly.
+  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine
+  products per cell, an application about as much as a product with a stored matrix, and no blocks
+  are formed: with few iterations per step this is several times cheaper than assembly.
 
-  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them
-  (quadratic.c). With far and near the two coordinates of the points, point q sees a linear cell; i moves by
+  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H)
+  over them (quadratic.c). With far and near the two coordinates of the points, point q sees a
+  linear cell; i moves by
     (4 far - 1) p_i + 4 far sum_j p_ij + 4 (near - far) p_iq,   p_ii = p_i:
   all terms but the last are the same at the four points.
 
-  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are
-  evaluated at a time: 4x4 transposes turn eight loads of a node into lanes.
+  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight
+  cells are evaluated at a time: 4x4 transposes turn eight loads of a node into lanes.
 
   Prescribed unknowns: p is zero there, and their rows are a multiple of the identity.
   Not handled: the consistent mass, tangents of effects.
@@ -22,11 +23,11 @@
 
 typedef struct {
   SbSpace space;
-  void *memory;                  /* allocation that contains R and h */
-  SbPack *R;                     /* [nbatch][sb_rotation_points()][9] rotations */
-  SbPack *h;                     /* [nbatch][sb_rotation_points()][9] rotated gradients of nodes 1..3, 1/m */
-  PetscReal *lambda, *mu;        /* [nregion] Lame constants times the factor of the stiffness, Pa */
-  PetscReal *inertia;            /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
+  void *memory; /* allocation that contains R and h */
+  SbPack *R;    /* [nbatch][sb_rotation_points()][9] rotations */
+  SbPack *h;    /* [nbatch][sb_rotation_points()][9] rotated gradients of nodes 1..3, 1/m */
+  PetscReal *lambda, *mu; /* [nregion] Lame constants times the factor of the stiffness, Pa */
+  PetscReal *inertia;     /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
   PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
   Vec ghosted;                   /* ghosted work vector; NULL on one rank */
   PetscReal *p, *q;              /* [nnode][4] input and output of the product */
@@ -41,7 +42,8 @@ SB_INLINE void gather(const PetscReal *p, const PetscInt node[SB_BATCH], Eight l
   Eight t[4];
 
   for (int k = 0; k < 4; k++) {
-    const Four low = *(const Four *)(p + 4 * node[k]), high = *(const Four *)(p + 4 * node[k + 4]);
+    const Four low = *(const Four *)(p + 4 * node[k]);
+    const Four high = *(const Four *)(p + 4 * node[k + 4]);
 
     t[k] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
   }
@@ -57,7 +59,10 @@ SB_INLINE void gather(const PetscReal *p, const PetscInt node[SB_BATCH], Eight l
 /* Adds component c of eight nodes, lanes[c], to q. */
 SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], PetscReal *q)
 {
-  const Eight zero = {0}, x = lanes[0], y = lanes[1], z = lanes[2];
+  const Eight zero = {0};
+  const Eight x = lanes[0];
+  const Eight y = lanes[1];
+  const Eight z = lanes[2];
   const Eight xy0 = __builtin_shufflevector(x, y, 0, 8, 2, 10, 4, 12, 6, 14);
   const Eight xy1 = __builtin_shufflevector(x, y, 1, 9, 3, 11, 5, 13, 7, 15);
   const Eight z0 = __builtin_shufflevector(z, zero, 0, 8, 2, 10, 4, 12, 6, 14);
@@ -77,20 +82,29 @@ SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], 
 SB_INLINE void gradient(const Eight u[4][3], const Eight h[9], Eight H[9])
 {
   for (int i = 0; i < 3; i++) {
-    const Eight d1 = u[1][i] - u[0][i], d2 = u[2][i] - u[0][i], d3 = u[3][i] - u[0][i];
+    const Eight d1 = u[1][i] - u[0][i];
+    const Eight d2 = u[2][i] - u[0][i];
+    const Eight d3 = u[3][i] - u[0][i];
 
-    for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * h[j] + d2 * h[3 + j] + d3 * h[6 + j];
+    for (int j = 0; j < 3; j++)
+      H[3 * i + j] = d1 * h[j] + d2 * h[3 + j] + d3 * h[6 + j];
   }
 }
 
 /* Forces of T = 2 mu sym(H) + lambda tr(H) I + p I on the vertices; pv = p V or NULL. */
-SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscReal lambda, PetscReal mu,
-                      const Eight *pv, Eight f[4][3])
+SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscReal lambda,
+                      PetscReal mu, const Eight *pv, Eight f[4][3])
 {
-  const Eight mv = mu * *V, m2 = mv + mv, sum = lambda * *V * (H[0] + H[4] + H[8]);
+  const Eight mv = mu * *V;
+  const Eight m2 = mv + mv;
+  const Eight sum = lambda * *V * (H[0] + H[4] + H[8]);
   const Eight pressure = pv ? sum + *pv : sum;
-  const Eight xx = m2 * H[0] + pressure, yy = m2 * H[4] + pressure, zz = m2 * H[8] + pressure;
-  const Eight xy = mv * (H[1] + H[3]), xz = mv * (H[2] + H[6]), yz = mv * (H[5] + H[7]);
+  const Eight xx = m2 * H[0] + pressure;
+  const Eight yy = m2 * H[4] + pressure;
+  const Eight zz = m2 * H[8] + pressure;
+  const Eight xy = mv * (H[1] + H[3]);
+  const Eight xz = mv * (H[2] + H[6]);
+  const Eight yz = mv * (H[5] + H[7]);
 
   for (int a = 0; a < 3; a++) {
     const Eight *g = h + 3 * a;
@@ -99,22 +113,27 @@ SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscR
     f[a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
     f[a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
   }
-  for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
+  for (int i = 0; i < 3; i++)
+    f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
 }
 
-/* q += A p for the batches of one region, gradients `stride` apart. Padding lanes have volume zero. */
-SB_KERNEL static void apply_region(PetscInt nbatch, PetscInt width, const PetscInt *node, PetscInt stride,
-                                   const SbPack *gradients, const SbPack *volume, PetscReal lambda,
-                                   PetscReal mu, const PetscReal *p, PetscReal *q)
+/* q += A p for the batches of one region, gradients `stride` apart. Padding lanes have volume
+   zero. */
+SB_KERNEL static void apply_region(PetscInt nbatch, PetscInt width, const PetscInt *node,
+                                   PetscInt stride, const SbPack *gradients, const SbPack *volume,
+                                   PetscReal lambda, PetscReal mu, const PetscReal *p, PetscReal *q)
 {
   for (PetscInt b = 0; b < nbatch; b++, node += width * SB_BATCH) {
-    const Eight *h = (const Eight *)(gradients + stride * b), *V = (const Eight *)(volume + b);
+    const Eight *h = (const Eight *)(gradients + stride * b);
+    const Eight *V = (const Eight *)(volume + b);
     Eight u[4][3], H[9], f[4][3];
 
-    for (int a = 0; a < 4; a++) gather(p, node + a * SB_BATCH, u[a]);
+    for (int a = 0; a < 4; a++)
+      gather(p, node + a * SB_BATCH, u[a]);
     gradient((const Eight(*)[3])u, h, H);
     forces(H, h, V, lambda, mu, NULL, f);
-    for (int a = 0; a < 4; a++) scatter_add(f[a], node + a * SB_BATCH, q);
+    for (int a = 0; a < 4; a++)
+      scatter_add(f[a], node + a * SB_BATCH, q);
   }
 }
 
@@ -125,42 +144,54 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
                                       PetscReal *q)
 {
   static const int between[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
-  const PetscReal far4 = 4. * SbRuleQuadratic.L[0][1], step = 4. * SbRuleQuadratic.L[0][0] - far4;
+  const PetscReal far4 = 4. * SbRuleQuadratic.L[0][1];
+  const PetscReal step = 4. * SbRuleQuadratic.L[0][0] - far4;
 
   for (PetscInt b = 0; b < nbatch; b++, node += width * SB_BATCH) {
-    const Eight *h = (const Eight *)(gradients + 36 * b), V = 0.25 * *(const Eight *)(volume + b);
-    Eight u[10][3], same[4][3], H[4][9], f[4][4][3], mean = {0};
+    const Eight *h = (const Eight *)(gradients + 36 * b);
+    const Eight V = 0.25 * *(const Eight *)(volume + b);
+    Eight u[10][3], same[4][3], H[4][9], f[4][4][3];
+    Eight mean = {0};
 
-    for (int a = 0; a < 10; a++) gather(p, node + a * SB_BATCH, u[a]);
+    for (int a = 0; a < 10; a++)
+      gather(p, node + a * SB_BATCH, u[a]);
+
     // terms of the vertices that are the same at all points; then the gradients at each point
     for (int i = 0; i < 3; i++) {
       for (int a = 0; a < 4; a++) {
         same[a][i] = (far4 - 1.) * u[a][i];
         for (int c = 0; c < 4; c++)
-          if (c != a) same[a][i] += far4 * u[between[a][c]][i];
+          if (c != a)
+            same[a][i] += far4 * u[between[a][c]][i];
       }
     }
     for (int k = 0; k < 4; k++) {
       Eight here[4][3];
 
       for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 4; a++) here[a][i] = same[a][i] + step * u[between[a][k]][i];
+        for (int a = 0; a < 4; a++)
+          here[a][i] = same[a][i] + step * u[between[a][k]][i];
       gradient((const Eight(*)[3])here, h + 9 * k, H[k]);
       mean += H[k][0] + H[k][4] + H[k][8];
     }
     mean *= 0.25 * lambda[1] * V;
+
     // forces of the points on the vertices
-    for (int k = 0; k < 4; k++) forces(H[k], h + 9 * k, &V, lambda[0], mu, &mean, f[k]);
+    for (int k = 0; k < 4; k++)
+      forces(H[k], h + 9 * k, &V, lambda[0], mu, &mean, f[k]);
+
     // adjoint of the above: back to vertices and edge nodes
     for (int i = 0; i < 3; i++) {
-      for (int a = 0; a < 4; a++) same[a][i] = f[0][a][i] + f[1][a][i] + f[2][a][i] + f[3][a][i];
+      for (int a = 0; a < 4; a++)
+        same[a][i] = f[0][a][i] + f[1][a][i] + f[2][a][i] + f[3][a][i];
       for (int a = 0; a < 4; a++) {
         u[a][i] = (far4 - 1.) * same[a][i] + step * f[a][a][i];
         for (int c = a + 1; c < 4; c++)
           u[between[a][c]][i] = far4 * (same[a][i] + same[c][i]) + step * (f[c][a][i] + f[a][c][i]);
       }
     }
-    for (int a = 0; a < 10; a++) scatter_add(u[a], node + a * SB_BATCH, q);
+    for (int a = 0; a < 10; a++)
+      scatter_add(u[a], node + a * SB_BATCH, q);
   }
 }
 
@@ -175,6 +206,7 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &o));
   s = o->space;
+
   /* p: X with ghosts, zero at prescribed unknowns */
   if (o->ghosted) {
     PetscCall(VecCopy(X, o->ghosted));
@@ -182,38 +214,44 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   }
   PetscCall(SbSpaceGetLocalRead(s, from, &x));
   for (PetscInt i = 0; i < s->nnode; i++)
-    for (PetscInt c = 0; c < 3; c++) o->p[4 * i + c] = x[3 * i + c];
+    for (PetscInt c = 0; c < 3; c++)
+      o->p[4 * i + c] = x[3 * i + c];
   PetscCall(SbSpaceRestoreLocalRead(s, from, &x));
   for (PetscInt k = 0; k < 3 * s->nfixed; k++) {
     const PetscInt i = s->fixed_node[k / 3];
 
-    if (s->fixed[i] & (1 << k % 3)) o->p[4 * i + k % 3] = 0.;
+    if (s->fixed[i] & (1 << k % 3))
+      o->p[4 * i + k % 3] = 0.;
   }
   for (PetscInt i = 0; i < s->nnode_owned; i++)
-    for (PetscInt c = 0; c < 4; c++) o->q[4 * i + c] = o->inertia[i] * o->p[4 * i + c];
+    for (PetscInt c = 0; c < 4; c++)
+      o->q[4 * i + c] = o->inertia[i] * o->p[4 * i + c];
   PetscCall(PetscArrayzero(o->q + 4 * s->nnode_owned, 4 * (s->nnode - s->nnode_owned)));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscInt b = region->bstart, n = region->bend - b;
+    const PetscInt b = region->bstart;
+    const PetscInt n = region->bend - b;
     const PetscReal lambda[2] = {region->pointwise == region->material ? o->lambda[r] : 0.,
                                  region->pointwise == region->material ? 0. : o->lambda[r]};
-    const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b,
-                 *V = (const SbPack *)s->batch_V + b;
+    const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
+    const SbPack *V = (const SbPack *)s->batch_V + b;
 
     if (region->quadratic)
       apply_quadratic(n, s->width, sb_batch_nodes(s, b), h, V, lambda, o->mu[r], o->p, o->q);
     else
-      apply_region(n, s->width, sb_batch_nodes(s, b), 9 * sb_rotation_points(s), h, V, o->lambda[r], o->mu[r],
-                   o->p, o->q);
+      apply_region(n, s->width, sb_batch_nodes(s, b), 9 * sb_rotation_points(s), h, V, o->lambda[r],
+                   o->mu[r], o->p, o->q);
   }
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
-    for (PetscInt c = 0; c < 3; c++) y[3 * i + c] = o->q[4 * i + c];
+    for (PetscInt c = 0; c < 3; c++)
+      y[3 * i + c] = o->q[4 * i + c];
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
     const PetscInt i = 3 * s->fixed_node[k / 3] + k % 3;
 
-    if (s->fixed[i / 3] & (1 << k % 3)) y[i] = o->prescribed_diagonal * x[i];
+    if (s->fixed[i / 3] & (1 << k % 3))
+      y[i] = o->prescribed_diagonal * x[i];
   }
   PetscCall(VecRestoreArray(Y, &y));
   PetscCall(VecRestoreArrayRead(X, &x));
@@ -277,9 +315,11 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
       }
     }
   }
+
   /* as large as other diagonal entries: E times the edge of a typical cell; ranks may differ */
   o->prescribed_diagonal =
-    s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.) : 1.;
+    s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.)
+              : 1.;
   PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -298,16 +338,19 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
 {
   static const SbAssembly assembly = {.assemble = assemble};
-  const size_t packs = 9 * (size_t)(sb_rotation_points(s) * s->nbatch), nodes = 8 * (size_t)s->nnode;
+  const size_t packs = 9 * (size_t)(sb_rotation_points(s) * s->nbatch);
+  const size_t nodes = 8 * (size_t)s->nnode;
   PetscBool has;
   Operator *o;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &has));
-  PetscCheck(has, s->comm, PETSC_ERR_SUP,
-             "The tangent of this law, element cr or dg, curved tets, or the consistent mass, need an "
-             "assembled matrix");
-  if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+  PetscCheck(
+    has, s->comm, PETSC_ERR_SUP,
+    "The tangent of this law, element cr or dg, curved tets, or the consistent mass, need an "
+    "assembled matrix");
+  if (!s->plan)
+    PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscNew(&o));
   o->space = s;
   PetscCall(PetscMalloc(2 * packs * sizeof(SbPack) + nodes * sizeof(PetscReal) + 64, &o->memory));
@@ -317,9 +360,10 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   o->q = o->p + 4 * s->nnode;
   PetscCall(PetscArrayzero(o->p, 8 * s->nnode));
   PetscCall(PetscMalloc3(s->nregion, &o->lambda, s->nregion, &o->mu, s->nnode_owned, &o->inertia));
-  if (s->ghosted) PetscCall(SbSpaceCreateVec(s, &o->ghosted));
-  PetscCall(
-    MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, o, A));
+  if (s->ghosted)
+    PetscCall(SbSpaceCreateVec(s, &o->ghosted));
+  PetscCall(MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE,
+                           PETSC_DETERMINE, o, A));
   PetscCall(MatSetBlockSize(*A, 3));
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(MatMult_Frames)));
   PetscCall(MatShellSetOperation(*A, MATOP_DESTROY, SB_OPERATION(MatDestroy_Frames)));
@@ -338,7 +382,8 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R)
   PetscFunctionBeginUser;
   *R = NULL;
   PetscCall(SbMatrixGetAssembly(A, &own));
-  if (!own || own->assemble != assemble) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!own || own->assemble != assemble)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatShellGetContext(A, &o));
   *R = (const SbPack *)o->R;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -357,25 +402,32 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
   s = o->space;
   p = s->plan;
   PetscCall(PetscMalloc1(s->nnode, &wanted));
-  for (PetscInt i = 0; i < s->nnode; i++) wanted[i] = -1;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    wanted[i] = -1;
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = node ? node[k] : k;
 
     wanted[i] = k;
-    for (PetscInt c = 0; c < 3; c++) block[9 * (ia[k] + p->diagonal[i] - p->di[i]) + 4 * c] += o->inertia[i];
+    for (PetscInt c = 0; c < 3; c++)
+      block[9 * (ia[k] + p->diagonal[i] - p->di[i]) + 4 * c] += o->inertia[i];
   }
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
     const PetscBool mean = (PetscBool)(region->quadratic && region->pointwise != region->material);
-    const PetscInt r = (PetscInt)(region - s->region), npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscInt r = (PetscInt)(region - s->region);
+    const PetscInt npair = region->quadratic ? SB_PAIRS : 10;
     const PetscInt *corner = sb_batch_nodes(s, b);
     const SbPoints points = SbBatchPoints(s, b);
     PetscBool any = PETSC_FALSE;
     SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), B[4][10][9] __attribute__((aligned(64)));
-    SbPack factor, volume[30] = {{0}};
+    SbPack factor;
+    SbPack volume[30] = {{0}};
 
-    for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
-    if (!any) continue;
+    for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++)
+      any = (PetscBool)(any || wanted[corner[l]] >= 0);
+    if (!any)
+      continue;
+
     // the points, and for P2 lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
     for (int q = 0; q < points.n; q++) {
       const SbPack *R = (const SbPack *)o->R + 9 * (sb_rotation_points(s) * b + q);
@@ -383,7 +435,8 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
 
       SbPointVolume(&points, q, V);
       SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
-      if (region->quadratic) SbPointForce(&points, q, R, volume);
+      if (region->quadratic)
+        SbPointForce(&points, q, R, volume);
     }
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscReal V = s->batch_V[b][l];
@@ -398,22 +451,29 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       const size_t start = (size_t)b * s->width * s->width * SB_BATCH + l;
 
       for (PetscInt turn = 0; turn < 2 * npair; turn++) {
-        const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],
-                       c = turn % 2 ? SbPairA[pair] : SbPairB[pair];
-        const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
+        const PetscInt pair = turn / 2;
+        const PetscInt a = turn % 2 ? SbPairB[pair] : SbPairA[pair];
+        const PetscInt c = turn % 2 ? SbPairA[pair] : SbPairB[pair];
+        const PetscInt i = corner[a * SB_BATCH + l];
+        const PetscInt k = wanted[i];
 
-        if (k < 0 || (a == c && turn % 2)) continue;
+        if (k < 0 || (a == c && turn % 2))
+          continue;
         const PetscInt position = p->offset[start + (size_t)(SB_BATCH * (s->width * a + c))];
         const PetscInt at =
-          ia[k] + (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
+          ia[k] +
+          (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
 
-        for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][turn % 2 ? 3 * (e % 3) + e / 3 : e][l];
+        for (int e = 0; e < 9; e++)
+          block[9 * at + e] += K[pair][turn % 2 ? 3 * (e % 3) + e / 3 : e][l];
       }
     }
   }
+
   /* clear rows and columns of prescribed unknowns */
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i];
+    const PetscInt i = node[k];
+    const PetscInt nd = p->di[i + 1] - p->di[i];
 
     for (PetscInt at = 0; at < ia[k + 1] - ia[k]; at++) {
       const PetscInt j = at < nd ? p->dj[p->di[i] + at] : p->oj[p->oi[i] + at - nd];

@@ -1,21 +1,24 @@
 /*
-  The assembly plan: the graph of node blocks and, for each cell, the positions of its blocks in the matrix.
+  The assembly plan: the graph of node blocks and, for each cell, the positions of its blocks in the
+  matrix.
 
-  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns
-  of its row; at the same time the positions of the blocks of that row are stored for the cells, without a
-  search. The face terms are constant within a step: they are summed here, and every assembly starts from
-  them. At 200k tets this takes a small fraction of the time of DMCreateMatrix (`make bench`).
+  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give
+  the columns of its row; at the same time the positions of the blocks of that row are stored for
+  the cells, without a search. The face terms are constant within a step: they are summed here, and
+  every assembly starts from them. At 200k tets this takes a small fraction of the time of
+  DMCreateMatrix (`make bench`).
 */
 #include "fem_impl.h"
 #include "sblog.h"
 
-/* Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot
-   of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the group that they
-   repeat. */
+/* Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight).
+   The slot of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the
+   group that they repeat. */
 typedef struct {
   const PetscInt *node;
-  PetscInt nodes;         /* number of nodes in a group */
-  PetscInt *start, *slot; /* [nnode_owned+1] offsets; slots of each owned node, one per group around it */
+  PetscInt nodes; /* number of nodes in a group */
+  PetscInt *start,
+    *slot; /* [nnode_owned+1] offsets; slots of each owned node, one per group around it */
 } Groups;
 
 /* Node 0 of the group of a slot; node b of the group is at SB_BATCH b. */
@@ -26,15 +29,21 @@ static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
 
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
-  const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1, w = s->width;
+  const PetscInt nrow = s->nnode_owned;
+  const PetscInt ngroup = s->jump ? 2 : 1;
+  const PetscInt w = s->width;
   const size_t npoint = (size_t)s->nbatch * (size_t)(w * w) * SB_BATCH;
-  PetscInt *seen, *position, *column, widest = 1, capacity = nrow, nfresh = 0;
+  PetscInt *seen, *position, *column;
+  PetscInt widest = 1;
+  PetscInt capacity = nrow;
+  PetscInt nfresh = 0;
   Groups group[2] = {{.node = s->batch_clique, .nodes = w}, {.nodes = 8}};
   SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(plan));
   p = *plan;
+
   // for each owned node: the cells around it, and the faces with a penalty on jumps
   for (PetscInt k = 0; k < ngroup; k++) {
     const PetscInt nbatch = k ? SbJumpCliques(s, &group[k].node) : s->nbatch;
@@ -42,6 +51,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 
     PetscCall(SbBucketByKey(g->nodes * SB_BATCH * nbatch, g->node, nrow, &g->start, &g->slot));
   }
+
   // upper bound for the graph: a node shares each group with all its other nodes
   for (PetscInt i = 0; i < nrow; i++) {
     PetscInt most = 1;
@@ -54,11 +64,15 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &position, widest, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
   PetscCall(PetscMalloc2(nrow, &p->diagonal, npoint, &p->offset));
-  for (size_t k = 0; k < npoint; k++) p->offset[k] = SB_NOT_OWNED;
-  for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
+  for (size_t k = 0; k < npoint; k++)
+    p->offset[k] = SB_NOT_OWNED;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    seen[i] = -1;
   p->di[0] = p->oi[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) {
-    PetscInt n = 0, nd = p->di[i], no = p->oi[i];
+    PetscInt n = 0;
+    PetscInt nd = p->di[i];
+    PetscInt no = p->oi[i];
 
     // the columns of the row: every node that shares a group with it, once
     for (PetscInt k = 0; k < ngroup; k++) {
@@ -68,14 +82,17 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
         const PetscInt *node = slot_group(g, g->slot[at]);
 
         for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) {
-          if (seen[node[b]] == i) continue;
+          if (seen[node[b]] == i)
+            continue;
           seen[node[b]] = i;
           column[n++] = node[b];
         }
       }
     }
+
     // sort in local order: ghosts are sorted by global number, so each part is in global order
     PetscCall(PetscSortInt(n, column));
+
     // the row of the graph: owned columns in the diagonal part, ghosts in the off-diagonal part
     for (PetscInt k = 0; k < n; k++) {
       if (column[k] < nrow) {
@@ -89,26 +106,33 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     p->diagonal[i] = position[i];
     p->di[i + 1] = nd;
     p->oi[i + 1] = no;
+
     // store the positions of the row's blocks for the cells around the node
     for (PetscInt at = group[0].start[i]; at < group[0].start[i + 1]; at++) {
-      const PetscInt slot = group[0].slot[at], lane = slot % SB_BATCH, *node = slot_group(&group[0], slot);
+      const PetscInt slot = group[0].slot[at];
+      const PetscInt lane = slot % SB_BATCH;
+      const PetscInt *node = slot_group(&group[0], slot);
       PetscInt *offset = p->offset + w * (size_t)(slot - lane) + lane;
 
-      for (PetscInt b = 0; b < w * SB_BATCH; b += SB_BATCH) offset[b] = position[node[b]];
+      for (PetscInt b = 0; b < w * SB_BATCH; b += SB_BATCH)
+        offset[b] = position[node[b]];
     }
   }
   if (s->jump) {
     PetscCall(PetscMalloc2(p->di[nrow], &p->face_term[0], p->oi[nrow], &p->face_term[1]));
     SbJumpSumTerms(s);
   }
-  // the rows in the order in which the batches add to them first: the first batch clears a row in the cache
+
+  // the rows in the order in which the batches add to them first: the first batch clears a row in
+  // the cache
   PetscCall(PetscMalloc2(s->nbatch + 1, &p->fresh_start, nrow, &p->fresh));
   for (PetscInt b = 0; b < s->nbatch; b++) {
     p->fresh_start[b] = nfresh;
     for (PetscInt k = w * SB_BATCH * b; k < w * SB_BATCH * (b + 1); k++) {
       const PetscInt row = s->batch_clique[k];
 
-      if (row >= nrow || seen[row] == nrow) continue;
+      if (row >= nrow || seen[row] == nrow)
+        continue;
       seen[row] = nrow;
       p->fresh[nfresh++] = row;
     }
@@ -127,7 +151,8 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   SbPlan p = *plan;
 
   PetscFunctionBeginUser;
-  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree4(p->di, p->dj, p->oi, p->oj));
   PetscCall(PetscFree2(p->diagonal, p->offset));
   PetscCall(PetscFree2(p->ui, p->upper));
@@ -138,31 +163,37 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SBAIJ on one rank: the first upper block of each row, and of each cell's blocks in the upper triangle. */
+/* SBAIJ on one rank: the first upper block of each row, and of each cell's blocks in the upper
+   triangle. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
 
   PetscFunctionBeginUser;
-  if (p->upper) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->upper)
+    PetscFunctionReturn(PETSC_SUCCESS);
   p->npair = s->edge_node ? SB_PAIRS : 10;
   PetscCall(PetscMalloc2(nrow + 1, &p->ui, (size_t)(s->nbatch * p->npair) * SB_BATCH, &p->upper));
 
   /* a row consists of the blocks from its diagonal on */
   p->ui[0] = 0;
-  for (PetscInt i = 0; i < nrow; i++) p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
+  for (PetscInt i = 0; i < nrow; i++)
+    p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
 
   /* a pair of nodes belongs to the row of the lower one; ~u: its block has to be transposed */
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = sb_batch_nodes(s, b),
-                   *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
+    const PetscInt *node = sb_batch_nodes(s, b);
+    const PetscInt *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
     PetscInt *upper = p->upper + (size_t)(b * p->npair) * SB_BATCH;
 
     for (PetscInt q = 0; q < p->npair; q++) {
       for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscInt a = SbPairA[q], c = SbPairB[q], na = node[SB_BATCH * a + l],
-                       nc = node[SB_BATCH * c + l];
-        const PetscInt row = PetscMin(na, nc), u = p->ui[row] - p->diagonal[row];
+        const PetscInt a = SbPairA[q];
+        const PetscInt c = SbPairB[q];
+        const PetscInt na = node[SB_BATCH * a + l];
+        const PetscInt nc = node[SB_BATCH * c + l];
+        const PetscInt row = PetscMin(na, nc);
+        const PetscInt u = p->ui[row] - p->diagonal[row];
         const PetscInt k = offset[SB_BATCH * (na <= nc ? s->width * a + c : s->width * c + a) + l];
 
         upper[SB_BATCH * q + l] = na <= nc ? u + k : ~(u + k);
@@ -172,23 +203,27 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the blocks with a prescribed unknown in their row or column, to be cleared after each assembly. */
+/* Lists the blocks with a prescribed unknown in their row or column, to be cleared after each
+   assembly. */
 static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
+
   /* counted in the first pass, listed in the second */
   for (PetscInt pass = 0; pass < 2; pass++) {
     PetscInt n = 0;
 
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       for (PetscInt part = 0; part < 2; part++) {
-        const PetscInt *ptr = part ? p->oi : p->di, *col = part ? p->oj : p->dj;
+        const PetscInt *ptr = part ? p->oi : p->di;
+        const PetscInt *col = part ? p->oj : p->dj;
 
         for (PetscInt k = ptr[i]; k < ptr[i + 1]; k++) {
           const int mask = s->fixed[i] | (s->fixed[col[k]] << 3) | (!part && col[k] == i ? 64 : 0);
 
-          if (!(mask & 63)) continue;
+          if (!(mask & 63))
+            continue;
           if (pass) {
             p->fix_block[n] = part ? ~k : k;
             p->fix_row[n] = i;
@@ -198,7 +233,8 @@ static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
         }
       }
     }
-    if (!pass) PetscCall(PetscMalloc3(n, &p->fix_block, n, &p->fix_row, n, &p->fix_mask));
+    if (!pass)
+      PetscCall(PetscMalloc3(n, &p->fix_block, n, &p->fix_row, n, &p->fix_mask));
     p->nfix = n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -212,15 +248,17 @@ void SbRigidMode(PetscInt kind, const PetscReal x[3], const PetscReal box[6], Pe
   if (kind < 3) {
     value[kind] = 1.;
   } else {
-    const PetscInt i = (kind + 1) % 3, j = (kind + 2) % 3;
+    const PetscInt i = (kind + 1) % 3;
+    const PetscInt j = (kind + 2) % 3;
 
     value[i] = -(x[j] - 0.5 * (box[j] + box[3 + j])) / extent;
     value[j] = (x[i] - 0.5 * (box[i] + box[3 + i])) / extent;
   }
 }
 
-PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
-                             const void *ctx)
+PetscErrorCode
+SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
+              const void *ctx)
 {
   Vec mode[6];
   PetscInt kept = 0;
@@ -237,7 +275,8 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
     PetscCall(fill(m, v, ctx));
     PetscCall(VecRestoreArray(mode[kept], &v));
 
-    /* orthonormal to the earlier modes, as MatNullSpaceCreate() requires; modes that vanish are left out */
+    /* orthonormal to the earlier modes, as MatNullSpaceCreate() requires; modes that vanish are
+       left out */
     PetscCall(VecNormalize(mode[kept], &norm));
     for (PetscInt k = 0; k < kept; k++) {
       PetscCall(VecDot(mode[kept], mode[k], &dot));
@@ -252,7 +291,8 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
   PetscCall(MatNullSpaceCreate(PetscObjectComm((PetscObject)A), PETSC_FALSE, kept, mode, &near));
   PetscCall(MatSetNearNullSpace(A, near));
   PetscCall(MatNullSpaceDestroy(&near));
-  for (PetscInt k = 0; k < kept; k++) PetscCall(VecDestroy(&mode[k]));
+  for (PetscInt k = 0; k < kept; k++)
+    PetscCall(VecDestroy(&mode[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,7 +306,8 @@ static PetscErrorCode fill_rigid_mode(PetscInt m, PetscScalar v[], const void *c
     PetscReal value[3];
 
     SbRigidMode(m, s->node_x + 3 * i, s->mesh->body[s->node_body[i]].bbox, value);
-    for (PetscInt c = 0; c < 3; c++) v[3 * i + c] = s->fixed[i] & (1 << c) ? 0. : value[c];
+    for (PetscInt c = 0; c < 3; c++)
+      v[3 * i + c] = s->fixed[i] & (1 << c) ? 0. : value[c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,21 +316,25 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
 {
   static const MatType types[] = {MATAIJ, MATBAIJ, MATSBAIJ};
   const PetscBool aij = (PetscBool)(kind == SB_MATRIX_AIJ);
-  PetscInt *dnnz, *onnz, *unnz, *column, widest = 0;
+  PetscInt *dnnz, *onnz, *unnz, *column;
+  PetscInt widest = 0;
   PetscScalar *zeros;
   Mat part;
   SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));
-  PetscCheck(kind != SB_MATRIX_SBAIJ || !s->ghosted, s->comm, PETSC_ERR_SUP,
-             "Symmetric block storage is for one rank: there is no public access to its parallel parts");
+  PetscCheck(
+    kind != SB_MATRIX_SBAIJ || !s->ghosted, s->comm, PETSC_ERR_SUP,
+    "Symmetric block storage is for one rank: there is no public access to its parallel parts");
 
   /* parts of the plan for this storage and these prescribed unknowns */
-  if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+  if (!s->plan)
+    PetscCall(SbPlanCreate(s, &s->plan));
   p = s->plan;
   PetscCall(plan_fixed(s, p));
-  if (kind == SB_MATRIX_SBAIJ) PetscCall(plan_upper(s, p));
+  if (kind == SB_MATRIX_SBAIJ)
+    PetscCall(plan_upper(s, p));
 
   /* a matrix of the type, with exact preallocation */
   PetscCall(PetscMalloc3(s->nnode_owned, &dnnz, s->nnode_owned, &onnz, s->nnode_owned, &unnz));
@@ -300,34 +345,43 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
     widest = PetscMax(widest, dnnz[i] + onnz[i]);
   }
   PetscCall(MatCreate(s->comm, A));
-  PetscCall(MatSetSizes(*A, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE));
+  PetscCall(
+    MatSetSizes(*A, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetBlockSize(*A, 3));
   PetscCall(MatSetType(*A, types[kind]));
   PetscCall(MatXAIJSetPreallocation(*A, 3, dnnz, onnz, unnz, onnz));
   PetscCall(PetscFree3(dnnz, onnz, unnz));
 
-  /* its pattern: zero blocks, row by row. The diagonal part of AIJ is set three scalar rows at a time: with
-     MAT_SORTED_FULL (sorted, complete rows) PETSc copies them unchanged, six times faster at 200,000 tets
-     than block by block. */
+  /* its pattern: zero blocks, row by row. The diagonal part of AIJ is set three scalar rows at a
+     time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them unchanged, six times
+     faster at 200,000 tets than block by block. */
   PetscCall(PetscCalloc2(3 * widest, &column, 9 * widest, &zeros));
   part = *A;
-  if (aij && s->ghosted) PetscCall(MatMPIAIJGetSeqAIJ(*A, &part, NULL, NULL));
-  if (aij) PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_TRUE));
+  if (aij && s->ghosted)
+    PetscCall(MatMPIAIJGetSeqAIJ(*A, &part, NULL, NULL));
+  if (aij)
+    PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_TRUE));
   for (PetscInt i = 0; aij && i < s->nnode_owned; i++) {
-    const PetscInt rows[3] = {3 * i, 3 * i + 1, 3 * i + 2}, n = 3 * (p->di[i + 1] - p->di[i]);
+    const PetscInt rows[3] = {3 * i, 3 * i + 1, 3 * i + 2};
+    const PetscInt n = 3 * (p->di[i + 1] - p->di[i]);
 
-    for (PetscInt k = 0; k < n; k++) column[k] = 3 * p->dj[p->di[i] + k / 3] + k % 3;
+    for (PetscInt k = 0; k < n; k++)
+      column[k] = 3 * p->dj[p->di[i] + k / 3] + k % 3;
     PetscCall(MatSetValues(part, 3, rows, n, column, zeros, INSERT_VALUES));
   }
-  if (aij) PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_FALSE));
+  if (aij)
+    PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_FALSE));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt grow = s->gnode_start + i;
     PetscInt n = 0;
 
-    for (PetscInt k = kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : p->di[i]; !aij && k < p->di[i + 1]; k++)
+    for (PetscInt k = kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : p->di[i]; !aij && k < p->di[i + 1];
+         k++)
       column[n++] = s->gnode_start + p->dj[k];
-    for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) column[n++] = s->gnode[p->oj[k]];
-    if (n) PetscCall(MatSetValuesBlocked(*A, 1, &grow, n, column, zeros, INSERT_VALUES));
+    for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++)
+      column[n++] = s->gnode[p->oj[k]];
+    if (n)
+      PetscCall(MatSetValuesBlocked(*A, 1, &grow, n, column, zeros, INSERT_VALUES));
   }
   PetscCall(PetscFree2(column, zeros));
   PetscCall(MatAssemblyBegin(*A, MAT_FINAL_ASSEMBLY));

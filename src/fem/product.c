@@ -1,68 +1,83 @@
 /*
   Products with symmetric block matrices that read the upper triangle of the diagonal part only.
 
-  Memory bandwidth limits a product. BAIJ stores both triangles and reads twice as much as SBAIJ; PETSc's
-  SBAIJ product is not vectorised, and the parallel one not accessible. Here a row i computes y_i += A_ij x_j
-  and y_j += A_ij^T x_i block by block, four numbers at a time. The upper blocks of BAIJ are copied when the
-  values have changed, at the cost of about two products; reading them in place would leave gaps, which defeat
-  the prefetcher (measured: three times slower than reading both triangles). PETSc adds the columns of other
-  ranks. The copy is a SBAIJ matrix, which an incomplete factorisation can use, too (SbProductGetSymmetric).
+  Memory bandwidth limits a product. BAIJ stores both triangles and reads twice as much as SBAIJ;
+  PETSc's SBAIJ product is not vectorised, and the parallel one not accessible. Here a row i
+  computes y_i += A_ij x_j and y_j += A_ij^T x_i block by block, four numbers at a time. The upper
+  blocks of BAIJ are copied when the values have changed, at the cost of about two products; reading
+  them in place would leave gaps, which defeat the prefetcher (measured: three times slower than
+  reading both triangles). PETSc adds the columns of other ranks. The copy is a SBAIJ matrix, which
+  an incomplete factorisation can use, too (SbProductGetSymmetric).
 
   petsc/private/petscimpl.h: there is no public call that tells whether a matrix has changed.
 
-  Measured at 200,000 tets on one rank: 0.9 ms instead of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
+  Measured at 200,000 tets on one rank: 0.9 ms instead of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half
+  the time.
 */
 #include "fem_impl.h"
 #include "sbfour.h"
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
-  Mat diagonal, other;     /* parts of the matrix, borrowed; off-diagonal: NULL on one rank */
-  PetscScalar *full;       /* values of BAIJ's diagonal part; NULL for SBAIJ */
-  Mat symmetric;           /* the upper blocks: SBAIJ itself (borrowed), or a copy of BAIJ's (owned) */
-  PetscScalar *upper;      /* values of `symmetric`, by rows */
+  Mat diagonal, other; /* parts of the matrix, borrowed; off-diagonal: NULL on one rank */
+  PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
+  Mat symmetric;       /* the upper blocks: SBAIJ itself (borrowed), or a copy of BAIJ's (owned) */
+  PetscScalar *upper;  /* values of `symmetric`, by rows */
   PetscObjectState copied; /* state of `diagonal` at the last copy */
   VecScatter scatter;      /* scatter of x to the ghosts */
   Vec ghosts;
 } Product;
 
-/* y += A x. Row i has the columns column[start[i]..start[i+1]), i first: y_i += A_ii x_i, and for each block
-   right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. */
-SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
-                               const PetscScalar value[restrict], const PetscScalar x[restrict],
-                               PetscScalar y[restrict])
+/* y += A x. Row i has the columns column[start[i]..start[i+1]), i first: y_i += A_ii x_i, and for
+   each block right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. */
+SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict],
+                               const PetscInt column[restrict], const PetscScalar value[restrict],
+                               const PetscScalar x[restrict], PetscScalar y[restrict])
 {
   for (PetscInt i = 0; i < nrow; i++) {
-    const PetscScalar *a = value + 9 * (size_t)start[i], *u = x + 3 * (size_t)column[start[i]];
+    const PetscScalar *a = value + 9 * (size_t)start[i];
+    const PetscScalar *u = x + 3 * (size_t)column[start[i]];
     PetscScalar *w = y + 3 * (size_t)column[start[i]];
-    const Four xi = {u[0], u[1], u[2], 0.}, last = {a[6], a[7], a[8], 0.};
+    const Four xi = {u[0], u[1], u[2], 0.};
+    const Four last = {a[6], a[7], a[8], 0.};
     Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
 
     for (PetscInt k = 1; k < start[i + 1] - start[i]; k++) {
-      /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to y_i */
-      const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[start[i] + k];
+      /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to
+         y_i */
+      const PetscScalar *b = a + 9 * k;
+      const PetscScalar *xj = x + 3 * (size_t)column[start[i] + k];
       PetscScalar *yj = y + 3 * (size_t)column[start[i] + k];
-      const Four c0 = *(const Four *)b, c1 = *(const Four *)(b + 3), c5 = *(const Four *)(b + 5);
-      const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0), p0 = c0 * xi, p1 = c1 * xi, p2 = c2 * xi;
+      const Four c0 = *(const Four *)b;
+      const Four c1 = *(const Four *)(b + 3);
+      const Four c5 = *(const Four *)(b + 5);
+      const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0);
+      const Four p0 = c0 * xi;
+      const Four p1 = c1 * xi;
+      const Four p2 = c2 * xi;
       const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
-      const Two low = {s[0], s[1]}, high = {s[2], s[3]};
+      const Two low = {s[0], s[1]};
+      const Two high = {s[2], s[3]};
 
       sum += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
       *(Two *)yj += low + high;
       yj[2] += (p2[0] + p2[2]) + (p2[1] + p2[3]);
     }
-    for (int k = 0; k < 3; k++) w[k] += sum[k];
+    for (int k = 0; k < 3; k++)
+      w[k] += sum[k];
   }
 }
 
 /* Borrows the block pattern of a sequential BAIJ or SBAIJ matrix. */
-PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], const PetscInt *column[])
+PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[],
+                               const PetscInt *column[])
 {
   PetscBool done;
 
   PetscFunctionBeginUser;
   PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_TRUE, n, start, column, &done));
-  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_PLIB, "PETSc does not show the rows of a block matrix");
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "PETSc does not show the rows of a block matrix");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,14 +97,15 @@ static PetscErrorCode product_of(Mat A, Product **product)
   PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)product));
   p = *product;
   PetscCall(PetscObjectStateGet((PetscObject)p->diagonal, &state));
-  if (!p->full || state == p->copied) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->full || state == p->copied)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &column));
   PetscCall(SbMatGetPattern(p->symmetric, &n, &start, &column));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt length = start[i + 1] - start[i];
 
-    PetscCall(PetscArraycpy(p->upper + 9 * (size_t)start[i], p->full + 9 * (size_t)(all[i + 1] - length),
-                            9 * (size_t)length));
+    PetscCall(PetscArraycpy(p->upper + 9 * (size_t)start[i],
+                            p->full + 9 * (size_t)(all[i + 1] - length), 9 * (size_t)length));
   }
   p->copied = state;
   PetscCall(PetscObjectStateIncrease((PetscObject)p->symmetric));
@@ -112,7 +128,8 @@ PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y)
 
   PetscFunctionBeginUser;
   PetscCall(product_of(A, &p));
-  if (!p->other) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->other)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScale(p->ghosts, -1.));
@@ -131,7 +148,8 @@ static PetscErrorCode MatMult_Product(Mat A, Vec x, Vec y)
   PetscFunctionBeginUser;
   PetscCall(product_of(A, &p));
   PetscCall(SbMatGetPattern(p->symmetric, &n, &start, &column));
-  if (p->other) PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
+  if (p->other)
+    PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGetArrayRead(x, &in));
   PetscCall(VecGetArrayWrite(y, &out));
   PetscCall(PetscArrayzero(out, 3 * n));
@@ -151,7 +169,8 @@ static PetscErrorCode destroy_product(void *ctx)
   Product *p = SB_DESTROY_CTX(Product, ctx);
 
   PetscFunctionBeginUser;
-  if (p->full) PetscCall(MatDestroy(&p->symmetric));
+  if (p->full)
+    PetscCall(MatDestroy(&p->symmetric));
   PetscCall(VecScatterDestroy(&p->scatter));
   PetscCall(VecDestroy(&p->ghosts));
   PetscCall(PetscFree(p));
@@ -176,6 +195,7 @@ PetscErrorCode SbProductAttach(Mat A)
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (parallel) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
+
     /* ghosts in the order of the off-diagonal part's columns */
     PetscCall(MatCreateVecs(p->other, &p->ghosts, NULL));
     PetscCall(MatCreateVecs(A, &x, NULL));
@@ -185,6 +205,7 @@ PetscErrorCode SbProductAttach(Mat A)
     PetscCall(ISDestroy(&from));
     PetscCall(VecDestroy(&x));
   }
+
   /* the value arrays keep their addresses for the life of the matrix: its pattern is fixed */
   if (!symmetric) {
     PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));

@@ -1,29 +1,33 @@
 /*
   Cells of P2: strains at the four points of SbRuleQuadratic, and the volumetric energy.
 
-  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points
-  all of them would be constrained near nu = 1/2, and the element would lock. Here the energy of a cell is
+  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the
+  points all of them would be constrained near nu = 1/2, and the element would lock. Here the energy
+  of a cell is
 
     W = sum_q w_q V psi_mu(F_q) + V lambda/2 m^2,   m = (1/V) int theta dV:
 
-  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force,
-  tangent and stress follow from W. Where theta is J - 1, m is the exact change of the volume of the cell: det
-  F is cubic. Otherwise m is that of the four points, exact for linear and stvk.
+  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1).
+  Force, tangent and stress follow from W. Where theta is J - 1, m is the exact change of the volume
+  of the cell: det F is cubic. Otherwise m is that of the four points, exact for linear and stvk.
 
-  Pressures of single cells may oscillate on coarse meshes supported all around; means at vertices do not.
+  Pressures of single cells may oscillate on coarse meshes supported all around; means at vertices
+  do not.
 
-  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of
-  the points of SbRuleQuintic, whose degree suffices: constant stress and pressure are in equilibrium.
+  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume
+  at each of the points of SbRuleQuintic, whose degree suffices: constant stress and pressure are in
+  equilibrium.
 */
 #include "fem_impl.h"
 
 SbPoints SbBatchPoints(SbSpace s, PetscInt b)
 {
-  static const SbPack one[1] = {{[0 ... SB_BATCH - 1] = 1.}},
-                      quarter[4] = {[0 ... 3] = {[0 ... SB_BATCH - 1] = 0.25}};
+  static const SbPack one[1] = {{[0 ... SB_BATCH - 1] = 1.}};
+  static const SbPack quarter[4] = {[0 ... 3] = {[0 ... SB_BATCH - 1] = 0.25}};
   const SbRegion *region = s->batch_region[b];
   const PetscInt k = SB_POINTS * (b - region->bstart);
-  SbPoints at = {1, 0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b, one};
+  SbPoints at = {1,  0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b,
+                 one};
 
   if (region->curve_g)
     at = (SbPoints){SB_POINTS,      9,
@@ -45,9 +49,11 @@ void SbBatchGradients(SbSpace s, PetscInt b, const PetscReal x[], PetscBool rate
     memset(U, 0, 30 * sizeof(SbPack));
   for (int q = 0; q < at.n; q++) {
     const SbPack *g = at.g + at.step * q;
-    SbPack here[12], *u = at.rule ? here : U;
+    SbPack here[12];
+    SbPack *u = at.rule ? here : U;
 
-    if (at.rule) SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
+    if (at.rule)
+      SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
     SbCellGradient(g, (const SbPack *)u, rate ? 0. : 1., F[q]);
   }
 }
@@ -73,10 +79,13 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
   const PetscReal lambda = m->lambda;
 
-  for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
-  if (b) memset(b, 0, 30 * sizeof(SbPack));
+  for (int l = 0; l < SB_BATCH; l++)
+    pressure[l] = 0.;
+  if (b)
+    memset(b, 0, 30 * sizeof(SbPack));
   for (int q = 0; q < rule->n; q++) {
-    const SbPack *g = at->g + at->step * q, *here = cubic ? NULL : F[q];
+    const SbPack *g = at->g + at->step * q;
+    const SbPack *here = cubic ? NULL : F[q];
     SbPack u[12], own[9], D[9], p, W, f[12];
 
     if (cubic) {
@@ -87,12 +96,15 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
     if (m->linear || m->ops.frame || m->ops.spin) {
       // theta = R : F - 3, with its derivative
       m->ops.volumetric(m, here, D);
-      for (int l = 0; l < SB_BATCH; l++) p[l] = 3. * lambda;
+      for (int l = 0; l < SB_BATCH; l++)
+        p[l] = 3. * lambda;
       for (int k = 0; k < 9; k++)
-        for (int l = 0; l < SB_BATCH; l++) p[l] -= lambda * D[k][l] * here[k][l];
+        for (int l = 0; l < SB_BATCH; l++)
+          p[l] -= lambda * D[k][l] * here[k][l];
     } else {
       m->ops.pressure(m, here, p);
-      if (b) m->ops.volumetric(m, here, D);
+      if (b)
+        m->ops.volumetric(m, here, D);
     }
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal weight = cubic ? rule->weight[q] : at->weight[q][l];
@@ -100,7 +112,8 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
       pressure[l] -= weight * p[l];
       W[l] = weight * (*at->V)[l];
     }
-    if (!b) continue;
+    if (!b)
+      continue;
     SbCellForce(g, W, (const SbPack *)D, f);
     SbQuadraticAdd(rule->L[q], (const SbPack *)f, b);
   }
@@ -113,13 +126,15 @@ void SbBatchMass(SbSpace s, PetscInt b, SbPack mass[SB_PAIRS])
   const int npair = region->quadratic ? SB_PAIRS : 10;
 
   for (int k = 0; k < npair; k++) {
-    const int i = SbPairA[k], j = SbPairB[k];
+    const int i = SbPairA[k];
+    const int j = SbPairB[k];
     const SbElementOps *e = &region->element->ops;
     const PetscReal straight = region->quadratic ? SbQuadraticMass(i, j)
                                : i == j          ? e->mass_diagonal
                                                  : e->mass_coupling;
 
-    for (int l = 0; l < SB_BATCH; l++) mass[k][l] = at.step ? 0. : straight * (*at.V)[l];
+    for (int l = 0; l < SB_BATCH; l++)
+      mass[k][l] = at.step ? 0. : straight * (*at.V)[l];
   }
   for (int q = 0; at.step && q < at.n; q++) {
     PetscReal phi[SB_CELL_NODES];
@@ -128,12 +143,13 @@ void SbBatchMass(SbSpace s, PetscInt b, SbPack mass[SB_PAIRS])
     SbQuadraticBasis(at.rule->L[q], phi);
     SbPointVolume(&at, q, W);
     for (int k = 0; k < npair; k++)
-      for (int l = 0; l < SB_BATCH; l++) mass[k][l] += phi[SbPairA[k]] * phi[SbPairB[k]] * W[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        mass[k][l] += phi[SbPairA[k]] * phi[SbPairB[k]] * W[l];
   }
 }
 
-void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9],
-                  SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
+void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
+                  SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
   const SbRegion *region = s->batch_region[b];
   const SbMaterial m = region->pointwise;
@@ -142,11 +158,15 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
 
   SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
   for (int q = 0; q < at.n; q++) {
-    if (P) m->ops.stress(m, (const SbPack *)F[q], P[q]);
-    if (psi) m->ops.energy(m, (const SbPack *)F[q], psi[q]);
-    if (pressure) m->ops.pressure(m, (const SbPack *)F[q], pressure[q]);
+    if (P)
+      m->ops.stress(m, (const SbPack *)F[q], P[q]);
+    if (psi)
+      m->ops.energy(m, (const SbPack *)F[q], psi[q]);
+    if (pressure)
+      m->ops.pressure(m, (const SbPack *)F[q], pressure[q]);
   }
-  if (m == region->material) return;
+  if (m == region->material)
+    return;
 
   /* contribution of the mean theta */
   const PetscReal lambda = region->material->lambda;
@@ -155,63 +175,79 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
   for (int q = 0; q < at.n; q++) {
     SbPack D[9];
 
-    if (P) region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
+    if (P)
+      region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
     for (int k = 0; P && k < 9; k++)
-      for (int l = 0; l < SB_BATCH; l++) P[q][k][l] += p[l] * D[k][l];
+      for (int l = 0; l < SB_BATCH; l++)
+        P[q][k][l] += p[l] * D[k][l];
     for (int l = 0; l < SB_BATCH; l++) {
-      if (psi) psi[q][l] += p[l] * p[l] / (2. * lambda);
-      if (pressure) pressure[q][l] = -p[l];
+      if (psi)
+        psi[q][l] += p[l] * p[l] / (2. * lambda);
+      if (pressure)
+        pressure[q][l] = -p[l];
     }
   }
 }
 
-/* Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D =
-   dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u + du) is lambda
-   times this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the
-   pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) +
-   dp/dF : dF; after its elimination the right-hand side is still the residual of u (Magisano, Leonetti and
-   Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution. */
+/* Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D :
+   dF, D = dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u +
+   du) is lambda times this error, orders of magnitude above any stress, and makes the geometric
+   stiffness useless. With the pressure as an unknown and p = -lambda theta as a second equation,
+   the tangent after the step has p(u) + dp/dF : dF; after its elimination the right-hand side is
+   still the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017:
+   all stresses). Both formulations have the same solution. */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
 {
-  const PetscReal *u, *du = NULL;
+  const PetscReal *u;
+  const PetscReal *du = NULL;
 
   PetscFunctionBeginUser;
   s->linear_pressure = (PetscBool)(U && !s->linear);
-  if (!s->linear_pressure) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->pressure) PetscCall(PetscCalloc1(s->nbatch, &s->pressure));
+  if (!s->linear_pressure)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->pressure)
+    PetscCall(PetscCalloc1(s->nbatch, &s->pressure));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  if (step) PetscCall(SbSpaceGetLocalRead(s, step, &du));
+  if (step)
+    PetscCall(SbSpaceGetLocalRead(s, step, &du));
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
     const SbMaterial m = region->material;
     const PetscReal lambda = m->lambda;
     const SbPoints at = SbBatchPoints(s, b);
-    SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p, change = {0.};
+    SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p;
+    SbPack change = {0.};
 
     /* regions whose tangents use these pressures */
-    if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
+    if (region->quadratic ? region->pointwise == m : !m->ops.curvature)
+      continue;
     SbBatchGradients(s, b, u, PETSC_FALSE, x, F);
-    if (step) SbBatchGradients(s, b, du, PETSC_TRUE, dx, H);
+    if (step)
+      SbBatchGradients(s, b, du, PETSC_TRUE, dx, H);
     if (region->quadratic)
       SbQuadraticVolume(m, &at, (const SbPack *)x, (const SbPack(*)[9])F, p, step ? D : NULL);
     else {
       m->ops.pressure(m, (const SbPack *)F[0], p);
       m->ops.volumetric(m, (const SbPack *)F[0], D);
-      for (int l = 0; l < SB_BATCH; l++) p[l] = -p[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        p[l] = -p[l];
     }
     for (int k = 0; step && k < (region->quadratic ? 30 : 9); k++) {
       const PetscReal *way = region->quadratic ? dx[k] : H[0][k];
 
-      for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        change[l] += D[k][l] * way[l];
     }
     for (int l = 0; l < SB_BATCH; l++) {
-      const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->pressure[b][l] : 0.;
+      const PetscReal V = region->quadratic ? (*at.V)[l] : 1.;
+      const PetscReal old = step ? s->pressure[b][l] : 0.;
       const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
 
       s->pressure[b][l] = step ? old + part * (goal - old) : goal;
     }
   }
-  if (step) PetscCall(SbSpaceRestoreLocalRead(s, step, &du));
+  if (step)
+    PetscCall(SbSpaceRestoreLocalRead(s, step, &du));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

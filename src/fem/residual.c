@@ -1,21 +1,22 @@
 /*
   Internal forces, inertial forces, and stresses and strains of cells.
 
-  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad
-  v. Ghost cells are evaluated, too, so that forces on owned nodes are complete. Energies are of owned ones.
+  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping,
+  H = grad v. Ghost cells are evaluated, too, so that forces on owned nodes are complete. Energies
+  are of owned ones.
 
-  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a
-  Poisson's ratio near 0.5 lambda is large and theta small. P1 has fewer displacements than volume constraints
-  of cells: it locks, and p alternates between neighbours. CR and DG satisfy the constraints in the mean of
-  each cell and p converges (Crouzeix and Raviart 1973; Hansbo and Larson 2002). P2 has one stress at each
-  point: the stress of a cell is their mean.
+  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume:
+  for a Poisson's ratio near 0.5 lambda is large and theta small. P1 has fewer displacements than
+  volume constraints of cells: it locks, and p alternates between neighbours. CR and DG satisfy the
+  constraints in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and Larson
+  2002). P2 has one stress at each point: the stress of a cell is their mean.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 #include "sblog.h"
 
-/* P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
-   likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H. */
+/* P2: each point with its fraction of the volume; the volumetric part by the mean of the cell.
+   Damping likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H. */
 void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[])
 {
@@ -25,29 +26,36 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const SbPoints at = SbBatchPoints(s, b);
-    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30], p = {0};
+    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30];
+    SbPack p = {0};
 
-    if (at.rule) memset(fe, 0, sizeof(fe));
+    if (at.rule)
+      memset(fe, 0, sizeof(fe));
     SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
       for (int k = 0; k < 30; k++)
-        for (int l = 0; l < SB_BATCH; l++) fe[k][l] = p[l] * b10[k][l];
+        for (int l = 0; l < SB_BATCH; l++)
+          fe[k][l] = p[l] * b10[k][l];
     }
     if (beta != 0.) {
       SbBatchGradients(s, b, stage->v, PETSC_TRUE, U, H);
-      for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
+      for (int l = 0; l < SB_BATCH; l++)
+        p[l] = 0.;
       for (int q = 0; q < at.n && mean; q++) {
         SbMaterialRotation(m, (const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++)
-          for (int l = 0; l < SB_BATCH; l++) p[l] += at.weight[q][l] * beta * lambda * R[k][l] * H[q][k][l];
+          for (int l = 0; l < SB_BATCH; l++)
+            p[l] += at.weight[q][l] * beta * lambda * R[k][l] * H[q][k][l];
       }
     }
     for (int q = 0; q < at.n; q++) {
-      if (elastic) m->ops.stress(m, (const SbPack *)F[q], P);
+      if (elastic)
+        m->ops.stress(m, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
-        if (mean) SbMaterialRotation(m, (const SbPack *)F[q], R);
+        if (mean)
+          SbMaterialRotation(m, (const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++)
           for (int l = 0; l < SB_BATCH; l++)
             P[k][l] = (elastic ? P[k][l] : 0.) + beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
@@ -71,7 +79,8 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   }
   if (s->jump) {
     SbJumpAdd(s, stage->u, SB_JUMP_STIFFNESS, f);
-    if (stage->v) SbJumpAdd(s, stage->v, SB_JUMP_DAMPING, f);
+    if (stage->v)
+      SbJumpAdd(s, stage->v, SB_JUMP_DAMPING, f);
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,24 +89,37 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   for (PetscInt i = 0; !s->consistent_mass && i < 3 * s->nnode_owned; i++) {
-    if (stage->a) f[i] += s->node_mass[i / 3] * stage->a[i];
-    if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
+    if (stage->a)
+      f[i] += s->node_mass[i / 3] * stage->a[i];
+    if (stage->v)
+      f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
   }
+
   /* the consistent mass times w = a + alpha v */
   for (PetscInt b = 0; s->consistent_mass && b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
-    const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
-    const int n = (int)region->nnode, npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscReal alpha = stage->v ? s->alpha[region->body] : 0.;
+    const PetscReal density = region->material->density;
+    const int n = (int)region->nnode;
+    const int npair = region->quadratic ? SB_PAIRS : 10;
     const PetscInt *node = sb_batch_nodes(s, b);
-    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
+    SbPack w[30] = {{0}};
+    SbPack v[30];
+    SbPack fe[30] = {{0}};
+    SbPack mass[SB_PAIRS];
 
-    if (stage->a) sb_gather_nodes(n, node, stage->a, w);
-    if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
+    if (stage->a)
+      sb_gather_nodes(n, node, stage->a, w);
+    if (alpha != 0.)
+      sb_gather_nodes(n, node, stage->v, v);
     for (int k = 0; alpha != 0. && k < 3 * n; k++)
-      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+      for (int l = 0; l < SB_BATCH; l++)
+        w[k][l] += alpha * v[k][l];
     SbBatchMass(s, b, mass);
     for (int k = 0; k < 3 * npair; k++) {
-      const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
+      const int p = k / 3;
+      const int i = 3 * SbPairA[p] + k % 3;
+      const int j = 3 * SbPairB[p] + k % 3;
 
       for (int l = 0; l < SB_BATCH; l++) {
         fe[i][l] += density * mass[p][l] * w[j][l];
@@ -115,10 +137,11 @@ static PetscReal lane_det(const SbPack F[9], PetscInt l)
          F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
 }
 
-void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[],
-                      PetscReal pressure[])
+void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[],
+                      PetscReal psi[], PetscReal pressure[])
 {
-  static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+  static const int row[6] = {0, 1, 2, 0, 1, 0};
+  static const int column[6] = {0, 1, 2, 1, 2, 2};
 
   for (PetscInt b = 0; b < s->nbatch_owned; b++) {
     const SbRegion *region = s->batch_region[b];
@@ -130,24 +153,36 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       const PetscInt c = s->batch_cell[b] + l;
 
-      if (J) J[c] = 0.;
-      if (psi) psi[c] = 0.;
-      if (pressure) pressure[c] = 0.;
-      for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
+      if (J)
+        J[c] = 0.;
+      if (psi)
+        psi[c] = 0.;
+      if (pressure)
+        pressure[c] = 0.;
+      for (int k = 0; sigma && k < 6; k++)
+        sigma[6 * c + k] = 0.;
       for (int q = 0; q < at.n; q++) {
-        const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
+        const PetscReal det = lane_det((const SbPack *)F[q], l);
+        const PetscReal part = at.weight[q][l];
 
-        if (J) J[c] += part * det;
-        if (psi) psi[c] += part * energy[q][l];
-        if (pressure) pressure[c] += part * pressures[q][l];
+        if (J)
+          J[c] += part * det;
+        if (psi)
+          psi[c] += part * energy[q][l];
+        if (pressure)
+          pressure[c] += part * pressures[q][l];
+
         /* Cauchy stress P F^T / J; for small strain it is P itself */
         for (int k = 0; sigma && k < 6; k++) {
-          const int i = row[k], j = column[k];
-          const SbPack *p = (const SbPack *)P[q] + 3 * i, *f = (const SbPack *)F[q] + 3 * j;
+          const int i = row[k];
+          const int j = column[k];
+          const SbPack *p = (const SbPack *)P[q] + 3 * i;
+          const SbPack *f = (const SbPack *)F[q] + 3 * j;
 
-          sigma[6 * c + k] += part * (region->material->linear
-                                        ? p[j][l]
-                                        : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
+          sigma[6 * c + k] +=
+            part * (region->material->linear
+                      ? p[j][l]
+                      : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
         }
       }
     }
@@ -164,8 +199,11 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
 
     SbBatchState(s, b, x, F, stress, energy, NULL);
     for (PetscInt i = 0; point && region->quadratic && !at.step && i < 4 * s->batch_n[b]; i++)
-      SbPackGet(9, (const SbPack *)stress[i % 4], (int)(i / 4), point + 9 * (4 * s->batch_cell[b] + i));
-    /* a curved cell: the linear function of l next to P (L2 projection on the straight tet) at the points
+      SbPackGet(9, (const SbPack *)stress[i % 4], (int)(i / 4),
+                point + 9 * (4 * s->batch_cell[b] + i));
+
+    /* a curved cell: the linear function of l next to P (L2 projection on the straight tet) at the
+       points
          of SbRuleQuadratic; with b_i = sum_q w_q l_i P_q it has 20 b_i - 4 sum_j b_j at corner i */
     for (PetscInt i = 0; point && at.step && i < 36 * s->batch_n[b]; i++) {
       PetscReal *to = point + 36 * s->batch_cell[b] + i;
@@ -174,13 +212,15 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
       for (int q = 0; q < at.n; q++) {
         PetscReal value = -4.;
 
-        for (int c = 0; c < 4; c++) value += 20. * SbRuleQuadratic.L[i / 9 % 4][c] * at.rule->L[q][c];
+        for (int c = 0; c < 4; c++)
+          value += 20. * SbRuleQuadratic.L[i / 9 % 4][c] * at.rule->L[q][c];
         *to += at.rule->weight[q] * value * stress[q][i % 9][i / 36];
       }
     }
 
     /* means over the points */
-    for (int l = 0; l < SB_BATCH; l++) all[l] = at.weight[0][l];
+    for (int l = 0; l < SB_BATCH; l++)
+      all[l] = at.weight[0][l];
     for (int q = 1; q < at.n; q++) {
       for (int l = 0; l < SB_BATCH; l++) {
         const PetscReal part = at.weight[q][l];
@@ -193,20 +233,23 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
         energy[0][l] += (energy[q][l] - energy[0][l]) * part / all[l];
       }
     }
-    if (R) SbMaterialRotation(region->material, (const SbPack *)F[0], rotation);
+    if (R)
+      SbMaterialRotation(region->material, (const SbPack *)F[0], rotation);
     for (int l = 0; l < s->batch_n[b]; l++) {
       const PetscInt c = s->batch_cell[b] + l;
 
       SbPackGet(9, (const SbPack *)stress[0], l, P + 9 * c);
-      if (R) SbPackGet(9, (const SbPack *)rotation, l, R + 9 * c);
+      if (R)
+        SbPackGet(9, (const SbPack *)rotation, l, R + 9 * c);
       psi[c] = energy[0][l];
     }
   }
 }
 
-/* Exact volumes of the cells of a P2 batch, and the smallest det F at the points of the exact rule. */
-static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const PetscReal x[], SbPack volume,
-                             SbPack least)
+/* Exact volumes of the cells of a P2 batch, and the smallest det F at the points of the exact
+   rule. */
+static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const PetscReal x[],
+                             SbPack volume, SbPack least)
 {
   const SbPointRule *rule = SbVolumeRule(at);
   SbPack U[30], u[12], F[9];
@@ -216,8 +259,9 @@ static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const Pe
     SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
     SbCellGradient(at->g + at->step * q, (const SbPack *)u, 1., F);
     for (int l = 0; l < SB_BATCH; l++) {
-      const PetscReal det = lane_det((const SbPack *)F, l),
-                      part = (at->step ? at->weight[q][l] : rule->weight[q]) * s->batch_V[b][l] * det;
+      const PetscReal det = lane_det((const SbPack *)F, l);
+      const PetscReal part =
+        (at->step ? at->weight[q][l] : rule->weight[q]) * s->batch_V[b][l] * det;
 
       volume[l] = q ? volume[l] + part : part;
       least[l] = q ? PetscMin(least[l], det) : det;
@@ -225,8 +269,8 @@ static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const Pe
   }
 }
 
-void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], PetscReal *energy, PetscReal *minJ,
-                         PetscInt *ninverted, PetscReal *volume)
+void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], PetscReal *energy,
+                         PetscReal *minJ, PetscInt *ninverted, PetscReal *volume)
 {
   *energy = 0.;
   *volume = 0.;
@@ -236,15 +280,19 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
     const SbRegion *region = s->batch_region[b];
     const SbPoints at = SbBatchPoints(s, b);
     const PetscReal before = *energy;
-    SbPack F[SB_POINTS][9], psi[SB_POINTS], exact = {0}, lowest;
+    SbPack F[SB_POINTS][9], psi[SB_POINTS];
+    SbPack exact = {0};
+    SbPack lowest;
 
     SbBatchState(s, b, x, F, NULL, psi, NULL);
-    if (region->quadratic) quadratic_volume(s, b, &at, x, exact, lowest);
+    if (region->quadratic)
+      quadratic_volume(s, b, &at, x, exact, lowest);
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
 
       for (int q = 0; q < at.n; q++) {
-        const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] * at.weight[q][l];
+        const PetscReal det = lane_det((const SbPack *)F[q], l);
+        const PetscReal part = s->batch_V[b][l] * at.weight[q][l];
 
         *energy += part * psi[q][l];
         *volume += region->quadratic ? 0. : part * det;
@@ -254,12 +302,15 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
       *minJ = PetscMin(*minJ, least);
       *ninverted += least <= 0.;
     }
-    if (body) body[region->body] += *energy - before;
+    if (body)
+      body[region->body] += *energy - before;
   }
-  if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
+  if (s->jump)
+    *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
 }
 
-PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[], PetscReal *power)
+PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[],
+                                   PetscReal *power)
 {
   const SbStage stage = {.u = x, .v = v};
   PetscReal *f;
@@ -274,7 +325,8 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
       SbRegionForces(s, region, PETSC_FALSE, beta, &stage, f);
   }
   *power = s->jump ? 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL) : 0.;
-  for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * f[i];
+  for (PetscInt i = 0; i < 3 * s->nnode; i++)
+    *power += v[i] * f[i];
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     *power += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * v[i] * v[i];
   PetscCall(PetscFree(f));

@@ -1,15 +1,16 @@
 /*
-  The tangent A = shift_a M + shift_v C + shift_k K(u), written directly to the value arrays of the matrix.
+  The tangent A = shift_a M + shift_v C + shift_k K(u), written directly to the value arrays of the
+  matrix.
 
-  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M
-  + beta K per region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the
-  kernel is vectorised over the lanes, and the blocks of all lanes are added to the matrix (insert.c), which
-  clears each row before its first block.
+  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C
+  = alpha M + beta K per region; the lumped M is added to the diagonal blocks. Cells are evaluated
+  in batches: the kernel is vectorised over the lanes, and the blocks of all lanes are added to the
+  matrix (insert.c), which clears each row before its first block.
 
   petsc/private/petscimpl.h: no public call increases the state of a parallel matrix.
 
-  Prescribed unknowns: their rows and columns are zero except for the diagonal entry, which keeps its
-  magnitude, so that the scaling of the matrix is unchanged.
+  Prescribed unknowns: their rows and columns are zero except for the diagonal entry, which keeps
+  its magnitude, so that the scaling of the matrix is unchanged.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
@@ -37,37 +38,44 @@ PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly)
   PetscFunctionBeginUser;
   *assembly = NULL;
   PetscCall(PetscObjectQuery((PetscObject)A, ASSEMBLY, &container));
-  if (container) PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)assembly));
+  if (container)
+    PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)assembly));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMatGetBlocks(Mat A, PetscBool aij, SbMatBlocks *x)
 {
   static const char *const types[5] = {MATSEQAIJ, MATMPIAIJ, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ};
-  static PetscErrorCode (*const get[3])(Mat, PetscScalar **) = {MatSeqAIJGetArray, MatSeqBAIJGetArray,
-                                                                MatSeqSBAIJGetArray};
+  static PetscErrorCode (*const get[3])(Mat, PetscScalar **) = {
+    MatSeqAIJGetArray, MatSeqBAIJGetArray, MatSeqSBAIJGetArray};
   const SbAssembly *own;
   PetscInt type = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbMatrixGetAssembly(A, &own));
-  if (own && own->stored) A = own->stored;
+  if (own && own->stored)
+    A = own->stored;
   for (PetscBool same = PETSC_FALSE; type < 5; type++) {
     PetscCall(PetscObjectTypeCompare((PetscObject)A, types[type], &same));
-    if (same) break;
+    if (same)
+      break;
   }
   PetscCheck(type < 5 && (aij || type > 1), PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
              "%s and SBAIJ matrices, and this one is %s: leave -mat_type alone",
              aij ? "Assembly takes AIJ, BAIJ" : "This preconditioner takes BAIJ",
              ((PetscObject)A)->type_name);
   *x = (SbMatBlocks){(SbMatrixKind)(type / 2), (PetscBool)(type == 4), {A, NULL}, {NULL, NULL}};
-  if (type == 1) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
-  if (type == 3) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
-  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(get[x->kind](x->part[q], &x->value[q]));
+  if (type == 1)
+    PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
+  if (type == 3)
+    PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
+  for (int q = 0; q < 2 && x->part[q]; q++)
+    PetscCall(get[x->kind](x->part[q], &x->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]),
+                                PetscScalar *value[])
 {
   PetscObjectState state;
 
@@ -91,8 +99,9 @@ PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *x)
 
 /* Factors of one evaluation in a region. */
 typedef struct {
-  PetscReal stiffness;    /* factor on dP/dF */
-  PetscReal damping;      /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
+  PetscReal stiffness; /* factor on dP/dF */
+  PetscReal
+    damping; /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
   PetscReal lambda;       /* volumetric modulus of the law, Pa */
   PetscReal mu;           /* shear modulus of the law, Pa */
   const SbPack *pressure; /* pressure in addition to the law's own, Pa, tension; NULL: none */
@@ -100,21 +109,25 @@ typedef struct {
 
 static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
 {
-  for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
+  for (int l = 0; l < SB_BATCH; l++)
+    W[l] = factor * V[l];
 }
 
-/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on its moduli. */
+/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on its
+   moduli. */
 typedef struct {
   SbPack D[9];
   PetscReal factor;
 } Split;
 
 /* C -= lambda D D^T */
-SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restrict 9], SbPack C[restrict 81])
+SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restrict 9],
+                                        SbPack C[restrict 81])
 {
   for (int i = 0; i < 9; i++) {
     for (int k = 0; k < 9; k++)
-      for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] -= lambda * (D[i][l] * D[k][l]);
+      for (int l = 0; l < SB_BATCH; l++)
+        C[9 * i + k][l] -= lambda * (D[i][l] * D[k][l]);
   }
 }
 
@@ -122,7 +135,8 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
 static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                        const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
+  const PetscReal both = x->stiffness + x->damping;
+  const PetscReal lambda = split ? 0. : x->lambda;
   SbPack R[9], T[9], W;
 
   scaled_volumes(V, both, W);
@@ -133,17 +147,20 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
   } else if (m->ops.spin && x->stiffness != 0.) {
     /* the same plus a tensor T on the spins (sbelement.h); damping has this form, T = -mu I */
     m->ops.spin(m, F, R, T);
+
     /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
     for (int l = 0; x->pressure && l < SB_BATCH; l++) {
       const PetscReal p =
         m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
 
-      for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
+      for (int k = 0; k < 9; k++)
+        T[k][l] *= 1. - p / (2. * x->mu);
     }
     for (int k = 0; x->damping != 0. && k < 9; k++) {
       const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
 
-      for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
+      for (int l = 0; l < SB_BATCH; l++)
+        T[k][l] = (x->stiffness * T[k][l] - rest) / both;
     }
     SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
   } else {
@@ -156,18 +173,22 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
       split->factor = x->stiffness;
       remove_volumetric(x->lambda, (const SbPack *)split->D, C);
     }
-    if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
+    if (x->pressure && m->ops.curvature)
+      m->ops.curvature(m, F, *x->pressure, C);
     scaled_volumes(V, x->stiffness, W);
     SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
-    if (x->damping == 0.) return;
+    if (x->damping == 0.)
+      return;
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
     SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
     for (int k = 0; k < 90; k++)
-      for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
+      for (int l = 0; l < SB_BATCH; l++)
+        K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     return;
   }
-  if (!split) return;
+  if (!split)
+    return;
   memcpy(split->D, R, sizeof(split->D));
   split->factor = both;
 }
@@ -178,32 +199,38 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 {
   for (int p = 0; p < SB_PAIRS; p++) {
     for (int e = 0; e < 9; e++) {
-      const PetscReal *x = b[3 * SbPairA[p] + e / 3], *y = b[3 * SbPairB[p] + e % 3];
+      const PetscReal *x = b[3 * SbPairA[p] + e / 3];
+      const PetscReal *y = b[3 * SbPairB[p] + e % 3];
 
-      for (int l = 0; l < SB_BATCH; l++) K[p][e][l] += factor[l] * (x[l] * y[l]);
+      for (int l = 0; l < SB_BATCH; l++)
+        K[p][e][l] += factor[l] * (x[l] * y[l]);
     }
   }
 }
 
-/* Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one
-   pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the
-   modes that the pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12
-   cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30. */
+/* Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off.
+   With one pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining
+   modulus stiffens the modes that the pressures hardly constrain. Iterations of -solver pressure,
+   bar at nu 0.4999, 3, 6, 8, 12 cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92,
+   105, 111, 118 with 30. */
 #define KEPT 10.      /* times mu, */
 #define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
-/* Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the
-   mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2 m/du^2, which a filtered
-   tangent omits. For damping R replaces D in b. With `out`, b is stored there and lambda/V b b^T is not
-   added. */
+/* Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta
+   times the mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2
+   m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
+   there and lambda/V b b^T is not added. */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
-                             const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
+                             const Factors *x, PetscInt batch, const SbVolumetric *out,
+                             SbPack K[SB_PAIRS][9])
 {
-  const SbMaterial m = region->material, law = region->pointwise;
+  const SbMaterial m = region->material;
+  const SbMaterial law = region->pointwise;
   const SbPoints points = SbBatchPoints(s, batch);
   const SbPack *V = points.V;
-  const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin),
-                  split = (PetscBool)(out && mean && x->lambda > 0.);
+  const PetscBool mean = (PetscBool)(law != m);
+  const PetscBool one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
+  const PetscBool split = (PetscBool)(out && mean && x->lambda > 0.);
   SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
     b[30] = {{0}};
   Factors at = *x;
@@ -211,9 +238,11 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
-    if (s->linear_pressure) memcpy(p, s->pressure[batch], sizeof(p));
+    if (s->linear_pressure)
+      memcpy(p, s->pressure[batch], sizeof(p));
     at.lambda = 0.;
-    at.pressure = m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
+    at.pressure =
+      m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
   }
   for (int q = 0; q < points.n; q++) {
     SbPointVolume(&points, q, W);
@@ -224,13 +253,18 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     const PetscReal kept = split ? PetscMin(KEPT_MOST * x->lambda, KEPT * x->mu) : x->lambda;
 
     factor[l] = (*V)[l] > 0. ? kept * both / (*V)[l] : 0.;
-    if (out) out->modulus[batch][l] = split ? both * (x->lambda - kept) : 0.;
-    if (out) out->shear[batch][l] = split ? both * (x->mu + 0.75 * kept) : 0.;
+    if (out)
+      out->modulus[batch][l] = split ? both * (x->lambda - kept) : 0.;
+    if (out)
+      out->shear[batch][l] = split ? both * (x->mu + 0.75 * kept) : 0.;
   }
-  if (out) memset(out->b + out->stride * batch, 0, sizeof(b));
-  if (split) memcpy(out->b + out->stride * batch, b, sizeof(b));
+  if (out)
+    memset(out->b + out->stride * batch, 0, sizeof(b));
+  if (split)
+    memcpy(out->b + out->stride * batch, b, sizeof(b));
   SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
-  if (!mean) return;
+  if (!mean)
+    return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
     const SbPointRule *rule = SbVolumeRule(&points);
 
@@ -241,11 +275,13 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
       SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
       SbCellGradient(g, (const SbPack *)u, 1., here);
       for (int l = 0; l < SB_BATCH; l++)
-        factor[l] = x->stiffness * (points.step ? points.weight[q][l] : rule->weight[q]) * (*V)[l] * p[l];
+        factor[l] =
+          x->stiffness * (points.step ? points.weight[q][l] : rule->weight[q]) * (*V)[l] * p[l];
       SbQuadraticAddJacobian(rule->L[q], g, (const SbPack *)here, factor, K);
     }
   }
-  if (one_D || x->damping == 0.) return;
+  if (one_D || x->damping == 0.)
+    return;
   memset(b, 0, sizeof(b));
   for (int q = 0; q < points.n; q++) {
     SbPack R[9];
@@ -253,7 +289,8 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     SbPolar((const SbPack *)F[q], R);
     SbPointForce(&points, q, (const SbPack *)R, b);
   }
-  for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
+  for (int l = 0; l < SB_BATCH; l++)
+    factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
 }
 
@@ -261,11 +298,13 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
 typedef struct {
   SbSpace space;
   SbMatBlocks x;
-  const SbStage *faces;  /* its rows start from the face terms with the factors of this stage, or NULL, */
+  const SbStage
+    *faces; /* its rows start from the face terms with the factors of this stage, or NULL, */
   const PetscReal *beta; /* and with the damping [nbody], s */
 } Fill;
 
-/* Adds the blocks of a batch, ten or SB_PAIRS per cell, and its consistent mass; K is work space. */
+/* Adds the blocks of a batch, ten or SB_PAIRS per cell, and its consistent mass; K is work
+   space. */
 static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbPack K[][9])
 {
   const SbSpace s = fill->space;
@@ -275,7 +314,8 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   SbInsertClear(s, &fill->x, b, fill->faces, fill->beta);
   if (region->broken) {
     SbInsertBatch(s, &fill->x, b, npair, PETSC_TRUE, (const SbPack(*)[9])K);
-    if (inertia == 0.) return;
+    if (inertia == 0.)
+      return;
     memset(K, 0, 90 * sizeof(SbPack));
   }
   if (inertia != 0.) {
@@ -283,29 +323,31 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
 
     SbBatchMass(s, b, mass);
     for (int k = 0; k < 3 * npair; k++)
-      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
+      for (int l = 0; l < SB_BATCH; l++)
+        K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
   }
   SbInsertBatch(s, &fill->x, b, npair, PETSC_FALSE, (const SbPack(*)[9])K);
 }
 
 /* Assembles region r into several matrices; fill[0] is that of the space itself. */
-static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nfill, const Fill fill[],
-                        const SbVolumetric *out)
+static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nfill,
+                        const Fill fill[], const SbVolumetric *out)
 {
   const SbRegion *region = &s->region[r];
   const SbMaterial m = region->material;
-  const PetscReal shift = stage->shift_a + stage->shift_v * s->alpha[region->body],
-                  inertia = s->consistent_mass ? m->density * shift : 0.;
+  const PetscReal shift = stage->shift_a + stage->shift_v * s->alpha[region->body];
+  const PetscReal inertia = s->consistent_mass ? m->density * shift : 0.;
   const Factors factors = {.stiffness = stage->shift_k,
                            .damping = stage->shift_v * s->beta[region->body],
                            .lambda = m->lambda,
                            .mu = m->mu};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
-  Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
+  Split kept;
+  Split *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), copy[10][9] __attribute__((aligned(64))), U[30],
-      F[SB_POINTS][9];
+    SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), copy[10][9] __attribute__((aligned(64))),
+      U[30], F[SB_POINTS][9];
 
     if (region->quadratic)
       quadratic_blocks(s, region, stage->u, &factors, b, out, K);
@@ -313,38 +355,47 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       Factors at = factors;
       SbPack p;
 
-      if (!m->linear) SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
+      if (!m->linear)
+        SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
       if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
         m->ops.pressure(m, (const SbPack *)F[0], p);
-        for (int l = 0; l < SB_BATCH; l++) p[l] += s->pressure[b][l];
+        for (int l = 0; l < SB_BATCH; l++)
+          p[l] += s->pressure[b][l];
         at.pressure = &p;
       }
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
+
       /* b_a = V D grad psi_a, as the force of a stress D */
       for (int l = 0; out && l < SB_BATCH; l++) {
         out->modulus[b][l] = split ? split->factor * factors.lambda : 0.;
         out->shear[b][l] = split ? split->factor * factors.mu : 0.;
       }
-      if (out) memset(out->b + out->stride * b, 0, 12 * sizeof(SbPack));
+      if (out)
+        memset(out->b + out->stride * b, 0, 12 * sizeof(SbPack));
       if (split)
-        SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)split->D, out->b + out->stride * b);
+        SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)split->D,
+                    out->b + out->stride * b);
     }
+
     /* the same cells in another space: the gradients of P1 are -1/3 times those of CR */
     for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
-      const PetscReal scale = faces && fill[n].space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
+      const PetscReal scale =
+        faces && fill[n].space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
 
       for (int k = 0; k < 90; k++)
-        for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
+        for (int l = 0; l < SB_BATCH; l++)
+          copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
       fill_batch(&fill[n], r, b, inertia, copy);
     }
     fill_batch(&fill[0], r, b, inertia, K);
   }
 }
 
-PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
-                                    const Mat A[], const SbVolumetric *out)
+PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
+                                    const SbSpace space[], const Mat A[], const SbVolumetric *out)
 {
-  const PetscBool lumped = (PetscBool)(!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.));
+  const PetscBool lumped =
+    (PetscBool)(!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.));
   Fill fill[3];
 
   PetscFunctionBeginUser;
@@ -366,7 +417,8 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
       PetscScalar *v = sb_block(&fill[k].x, to->plan, i, to->plan->diagonal[i], &rs, &cs);
 
       for (size_t c = 0; c < 3; c++)
-        v[c * (rs + cs)] += (stage->shift_a + stage->shift_v * s->alpha[to->node_body[i]]) * to->node_mass[i];
+        v[c * (rs + cs)] +=
+          (stage->shift_a + stage->shift_v * s->alpha[to->node_body[i]]) * to->node_mass[i];
     }
     PetscCall(SbMatRestoreBlocks(&fill[k].x));
   }
@@ -391,14 +443,17 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9])
 {
-  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)}, w = s->width;
+  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)};
+  const PetscInt w = s->width;
   PetscInt batch;
   SbMatBlocks x;
 
   PetscFunctionBeginUser;
-  if (node[0] >= s->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (node[0] >= s->nnode_owned)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFindInt(cell, s->nbatch, s->batch_cell, &batch));
-  if (batch < 0) batch = -batch - 2; /* not the first cell of its batch */
+  if (batch < 0)
+    batch = -batch - 2; /* not the first cell of its batch */
   PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &x));
   sb_insert_block(
     s, &x, node[0], node[1],
@@ -408,7 +463,8 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9])
+PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a,
+                                const PetscReal block[9])
 {
   const SbAssembly *own;
 
@@ -429,23 +485,29 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   PetscFunctionBeginUser;
   PetscCall(SbMatrixGetAssembly(A, &own));
   if (own) {
-    if (own->finish) PetscCall((own->finish)(A));
+    if (own->finish)
+      PetscCall((own->finish)(A));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &x));
+
   /* clear rows and columns of prescribed unknowns, keeping the magnitude on the diagonal */
   for (PetscInt n = 0; n < p->nfix; n++) {
-    const int rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
+    const int rows = p->fix_mask[n] & 7;
+    const int columns = (p->fix_mask[n] >> 3) & 7;
+    const int diagonal = p->fix_mask[n] & 64;
     size_t rs, cs;
     PetscScalar *v;
 
-    if (x.symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
+    if (x.symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]])
+      continue;
     v = sb_block(&x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
         PetscScalar *e = v + (size_t)i * rs + (size_t)j * cs;
 
-        if (!(rows & (1 << i)) && !(columns & (1 << j))) continue;
+        if (!(rows & (1 << i)) && !(columns & (1 << j)))
+          continue;
         if (diagonal && i == j)
           *e = *e == 0. ? 1. : PetscAbsScalar(*e);
         else
@@ -453,13 +515,17 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
       }
     }
   }
-  if (s->constraints) SbConstraintsFinishTangent(s, &x);
+  if (s->constraints)
+    SbConstraintsFinishTangent(s, &x);
   PetscCall(SbMatRestoreBlocks(&x));
-  /* assembly of the parts invalidates their cached diagonals; of the parallel one the state is enough */
+
+  /* assembly of the parts invalidates their cached diagonals; of the parallel one the state is
+     enough */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(x.part[q], MAT_FINAL_ASSEMBLY));
   }
-  if (x.part[0] != A) PetscCall(PetscObjectStateIncrease((PetscObject)A));
+  if (x.part[0] != A)
+    PetscCall(PetscObjectStateIncrease((PetscObject)A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

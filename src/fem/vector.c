@@ -1,10 +1,12 @@
 /*
-  Vectors of a space: the storage of a ghosted vector is the local array of the kernels, owned nodes first.
-  Reading updates the ghosts; writing does not communicate. On one rank vectors are plain sequential ones.
+  Vectors of a space: the storage of a ghosted vector is the local array of the kernels, owned nodes
+  first. Reading updates the ghosts; writing does not communicate. On one rank vectors are plain
+  sequential ones.
 
-  Prescribed unknowns stay in the system, so that the block size is three everywhere: their rows are u =
-  prescribed (see tangent.c for the matrix). The initial guess of every solve has the prescribed values, so
-  that their residual is zero and their effect on free unknowns is in the right-hand side.
+  Prescribed unknowns stay in the system, so that the block size is three everywhere: their rows are
+  u = prescribed (see tangent.c for the matrix). The initial guess of every solve has the prescribed
+  values, so that their residual is zero and their effect on free unknowns is in the right-hand
+  side.
 */
 #include "fem_impl.h"
 
@@ -46,7 +48,8 @@ PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace s, PetscReal x[])
 {
   PetscFunctionBeginUser;
-  if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->ghosted)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecPlaceArray(s->template_vec, x));
   PetscCall(VecGhostUpdateBegin(s->template_vec, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGhostUpdateEnd(s->template_vec, INSERT_VALUES, SCATTER_FORWARD));
@@ -66,11 +69,13 @@ PetscErrorCode SbSpacePrescribe(SbSpace s, PetscInt node, int components)
 PetscErrorCode SbSpacePrescribeDone(SbSpace s)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    s->nfixed += s->fixed[i] != 0;
   PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
   s->nfixed = 0;
   for (PetscInt i = 0; i < s->nnode; i++)
-    if (s->fixed[i]) s->fixed_node[s->nfixed++] = i;
+    if (s->fixed[i])
+      s->fixed_node[s->nfixed++] = i;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,7 +87,8 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int k = 0; k < 3; k++)
-      if (prescribed == ((s->fixed[i] >> k) & 1)) x[3 * i + k] = 0.;
+      if (prescribed == ((s->fixed[i] >> k) & 1))
+        x[3 * i + k] = 0.;
   }
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);

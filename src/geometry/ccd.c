@@ -1,25 +1,29 @@
 /*
-  ccd.c - continuous collision detection of vertices, edges and triangles by conservative advancement.
+  ccd.c - continuous collision detection of vertices, edges and triangles by conservative
+  advancement.
 
-  Vertices move linearly, x_a(t) = x_a + t q_a. Let n be the unit vector along the shortest connection, of
-  length d, at time t. Each side is behind a plane with normal n, and the planes are d apart: for all i of the
-  first side and j of the second, n . (x_i - x_j) >= d. So the distance at a later time s is at least the
-  minimum of n . (x_i - x_j) + (s - t) n . (q_i - q_j), and t can be advanced until this bound equals the gap
-  to be kept. The iteration converges from below to the time at which that gap is reached.
+  Vertices move linearly, x_a(t) = x_a + t q_a. Let n be the unit vector along the shortest
+  connection, of length d, at time t. Each side is behind a plane with normal n, and the planes are
+  d apart: for all i of the first side and j of the second, n . (x_i - x_j) >= d. So the distance at
+  a later time s is at least the minimum of n . (x_i - x_j) + (s - t) n . (q_i - q_j), and t can be
+  advanced until this bound equals the gap to be kept. The iteration converges from below to the
+  time at which that gap is reached.
 
-  This is additive CCD (Li, Kaufman, Jiang, "Codimensional Incremental Potential Contact", 2021, section 4),
-  which bounds the approach by norms of q, with the bound of Mirtich ("Impulse-based dynamic simulation",
-  1996, section 2.3): sliding and separating pairs need one distance only.
+  This is additive CCD (Li, Kaufman, Jiang, "Codimensional Incremental Potential Contact", 2021,
+  section 4), which bounds the approach by norms of q, with the bound of Mirtich ("Impulse-based
+  dynamic simulation", 1996, section 2.3): sliding and separating pairs need one distance only.
 
-  Rounding: the bound holds for any unit vector n. Differences are formed between coordinates at the same
-  time, so their relative error is small, far from the origin and for fast motion too. The rounding of the
-  caller's coordinates at a fraction of the step, eps |x| initially plus eps |x1 - x0| for the full step, is
-  added to the gap: SB_CCD_ROUNDING times that.
+  Rounding: the bound holds for any unit vector n. Differences are formed between coordinates at the
+  same time, so their relative error is small, far from the origin and for fast motion too. The
+  rounding of the caller's coordinates at a fraction of the step, eps |x| initially plus eps |x1 -
+  x0| for the full step, is added to the gap: SB_CCD_ROUNDING times that.
 */
 #include "sbgeometry.h"
 
-#define STEPS 1024 /* largest number of iterations; then the time reached is returned, which is safe */
-#define AIM 0.9    /* iterations aim at this fraction of the gap to be kept, so that few of them are enough */
+#define STEPS \
+  1024 /* largest number of iterations; then the time reached is returned, which is safe */
+#define AIM \
+  0.9 /* iterations aim at this fraction of the gap to be kept, so that few of them are enough */
 #define CLOSER 0.5 /* fraction to keep of a gap that is below the separation already */
 
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
@@ -27,7 +31,13 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
 {
   const int nfirst = kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
   const int n = kind == SB_PAIR_EDGE_EDGE ? 4 : 2 + (int)kind;
-  PetscReal y[12], q[12], x[12], at = 0, speed = 0, far = 0, fast = 0, aim = 0, stop = 0;
+  PetscReal y[12], q[12], x[12];
+  PetscReal at = 0;
+  PetscReal speed = 0;
+  PetscReal far = 0;
+  PetscReal fast = 0;
+  PetscReal aim = 0;
+  PetscReal stop = 0;
 
   // positions and displacements relative to the first vertex
   for (int a = 0; a < n; a++) {
@@ -53,14 +63,17 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
     }
   }
   speed = PetscSqrtReal(speed);
-  if (speed == 0) return PETSC_FALSE;
+  if (speed == 0)
+    return PETSC_FALSE;
   far *= SB_CCD_ROUNDING * PETSC_MACHINE_EPSILON;
   fast *= SB_CCD_ROUNDING * PETSC_MACHINE_EPSILON;
   for (int step = 0; step < STEPS; step++) {
     SbDistance s;
-    PetscReal along[4][2], gap, length = PETSC_MAX_REAL;
+    PetscReal along[4][2], gap;
+    PetscReal length = PETSC_MAX_REAL;
 
-    for (int i = 0; i < 3 * n; i++) x[i] = y[i] + at * q[i];
+    for (int i = 0; i < 3 * n; i++)
+      x[i] = y[i] + at * q[i];
     SbDistanceFind(kind, x, &s);
     gap = s.d - limits->radius;
     if (step == 0) {
@@ -71,13 +84,15 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
         return PETSC_TRUE;
       }
       stop = limits->keep * (gap - least);
-      if (limits->most > 0) stop = PetscMin(stop, limits->most);
+      if (limits->most > 0)
+        stop = PetscMin(stop, limits->most);
       aim = least + AIM * stop;
       stop += least;
     } else if (!(gap - at * fast > stop))
       break;
 
-    // time until a vertex of one side may reach one of the other along n; at least that by the largest speed
+    // time until a vertex of one side may reach one of the other along n; at least that by the
+    // largest speed
     for (int a = 0; a < n; a++) {
       along[a][0] = SbDot3(s.n, x + 3 * a);
       along[a][1] = SbDot3(s.n, q + 3 * a);
@@ -94,7 +109,8 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
       }
     }
     at += PetscMax(length, (gap - aim - at * fast) / (speed + fast));
-    if (at >= 1) return PETSC_FALSE;
+    if (at >= 1)
+      return PETSC_FALSE;
   }
   *time = at;
   return PETSC_TRUE;

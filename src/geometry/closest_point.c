@@ -1,5 +1,6 @@
 /*
-  closest_point.c - closest point of a triangle to a point, and intersection of a ray with a triangle.
+  closest_point.c - closest point of a triangle to a point, and intersection of a ray with a
+  triangle.
 
   Closest point by the Voronoi regions of Ericson, "Real-Time Collision Detection", 2005, 5.1.5.
 */
@@ -39,9 +40,11 @@ static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *con
     SbSubtract(p, x[k], r);
     length2 = SbDot3(e, e);
     t = length2 > 0 ? PetscMax(0, PetscMin(1, SbDot3(r, e) / length2)) : 0;
-    for (int i = 0; i < 3; i++) r[i] -= t * e[i];
+    for (int i = 0; i < 3; i++)
+      r[i] -= t * e[i];
     other = SbDot3(r, r);
-    if (other >= *d2) continue;
+    if (other >= *d2)
+      continue;
     *d2 = other;
     w[k] = 1 - t;
     w[l] = t;
@@ -51,13 +54,14 @@ static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *con
   return place;
 }
 
-SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *const x[3], PetscReal w[3],
-                                         PetscReal *d2)
+SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *const x[3],
+                                         PetscReal w[3], PetscReal *d2)
 {
   PetscReal ab[3], ac[3], r[3], d[6], area[3];
   SbTriangleFeature place;
 
-  // products of the edges at corner 0 with vectors from corners to p; unnormalised barycentric coordinates
+  // products of the edges at corner 0 with vectors from corners to p; unnormalised barycentric
+  // coordinates
   SbSubtract(x[1], x[0], ab);
   SbSubtract(x[2], x[0], ac);
   for (int k = 0; k < 3; k++) {
@@ -68,6 +72,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   area[2] = d[0] * d[3] - d[2] * d[1];
   area[1] = d[4] * d[1] - d[0] * d[5];
   area[0] = d[2] * d[5] - d[4] * d[3];
+
   // Voronoi regions of the corners, of the edges, then the face
   if (d[0] <= 0 && d[1] <= 0)
     place = put(SB_FEATURE_CORNER_0, 1, 0, 0, w);
@@ -96,7 +101,8 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
       w[0] = PetscMax(0, 1 - w[1] - w[2]);
       away(p, x, w, r);
       *d2 = SbDot3(r, r);
-      if (total > SLIM * SLIM * scale * scale) return SB_FEATURE_FACE;
+      if (total > SLIM * SLIM * scale * scale)
+        return SB_FEATURE_FACE;
     }
     return closest_edge(p, x, SB_FEATURE_FACE, w, d2);
   }
@@ -116,13 +122,15 @@ PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const Pets
   SbSubtract(p, x[0], r);
   SbCross(way, e2, c);
   det = SbDot3(e1, c);
-  if (!(PetscAbsReal(det) > PARALLEL * SbDot3(e1, e1) * PetscSqrtReal(SbDot3(way, way)))) return PETSC_FALSE;
+  if (!(PetscAbsReal(det) > PARALLEL * SbDot3(e1, e1) * PetscSqrtReal(SbDot3(way, way))))
+    return PETSC_FALSE;
   weight[1] = SbDot3(r, c) / det;
   SbCross(r, e1, c);
   weight[2] = SbDot3(way, c) / det;
   *t = SbDot3(e2, c) / det;
   *out = (PetscBool)(det < 0);
-  for (int k = 1; k < 3; k++) weight[k] = PetscAbsReal(weight[k]) < RIM ? 0 : weight[k];
+  for (int k = 1; k < 3; k++)
+    weight[k] = PetscAbsReal(weight[k]) < RIM ? 0 : weight[k];
   weight[0] = 1 - weight[1] - weight[2];
   if (PetscAbsReal(weight[0]) < RIM) {
     weight[0] = 0;

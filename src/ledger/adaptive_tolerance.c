@@ -1,15 +1,17 @@
 /*
-  Adaptive tolerances: -accuracy sets a target error, -step_time_budget a limit on the seconds per step.
+  Adaptive tolerances: -accuracy sets a target error, -step_time_budget a limit on the seconds per
+  step.
 
-  -accuracy e: the time step is chosen so that the integrator's error is uniform over the run (TSAdapt, error
-  per unit of time), and the tolerance of solves so that their estimated error is a tenth of e. The mesh is
-  not changed. Barrier contact may have half of e: the width of the barrier is adapted to the error of its
-  gaps, which is proportional to it. It is reduced at once, and the step solved again; it is increased only
-  between steps and while the energy stored in the gaps hardly grows, which would accelerate the bodies apart.
-  The error of contact need not be less than a tenth of the mesh's.
+  -accuracy e: the time step is chosen so that the integrator's error is uniform over the run
+  (TSAdapt, error per unit of time), and the tolerance of solves so that their estimated error is a
+  tenth of e. The mesh is not changed. Barrier contact may have half of e: the width of the barrier
+  is adapted to the error of its gaps, which is proportional to it. It is reduced at once, and the
+  step solved again; it is increased only between steps and while the energy stored in the gaps
+  hardly grows, which would accelerate the bodies apart. The error of contact need not be less than
+  a tenth of the mesh's.
 
-  -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step took
-  longer than s, and reduced when it took less than s / 2. Results differ from run to run.
+  -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step
+  took longer than s, and reduced when it took less than s / 2. Results differ from run to run.
 
   Values of the user (-snes_rtol, -ksp_rtol, -ts_adapt_type) are kept.
 */
@@ -21,7 +23,8 @@
 #define MESH 0.1    /* allowed error of contact, over that of the mesh */
 #define AIM 0.5     /* target error of a new width, over the allowed error */
 #define ROOM 0.1    /* error over the allowed one below which a width may grow */
-#define GROWTH 0.01 /* largest energy of gaps from a growing width, over that of the allowed error */
+#define GROWTH \
+  0.01 /* largest energy of gaps from a growing width, over that of the allowed error */
 #define LOOSEST 0.3 /* largest relative tolerance of a solve */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* factor on the error of a solve */
@@ -35,12 +38,14 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
   PetscCheck(l->accuracy == 0. || l->budget == 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-accuracy %g and -step_time_budget %g s both choose tolerances; give one of them",
              (double)l->accuracy, (double)l->budget);
-  PetscCheck(l->budget == 0. || l->run->model->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-step_time_budget %g s is about time steps, and -time static has none: give -accuracy",
-             (double)l->budget);
+  PetscCheck(
+    l->budget == 0. || l->run->model->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-step_time_budget %g s is about time steps, and -time static has none: give -accuracy",
+    (double)l->budget);
   if (l->accuracy > 0. && l->run->model->dynamic) {
     PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_adapt_type", &given));
-    if (!given) PetscCall(PetscOptionsSetValue(NULL, "-ts_adapt_type", "basic"));
+    if (!given)
+      PetscCall(PetscOptionsSetValue(NULL, "-ts_adapt_type", "basic"));
   }
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_rtol", &rtol[0]));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol[1]));
@@ -48,7 +53,8 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the relative tolerance of solves: Newton's, or the linear solver's for one solve per step. */
+/* Sets the relative tolerance of solves: Newton's, or the linear solver's for one solve per
+   step. */
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
@@ -60,7 +66,8 @@ PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
   if (l->run->single)
     PetscCall(KSPSetTolerances(ksp, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   else
-    PetscCall(SNESSetTolerances(snes, PETSC_DEFAULT, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+    PetscCall(
+      SNESSetTolerances(snes, PETSC_DEFAULT, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -72,8 +79,9 @@ static PetscReal left_by_solves(SbLedger l)
   return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
 }
 
-/* Ratio of the error of the last solved step to the allowed one, that of the run times dt / its length; less
-   errors of solves, a part of the differences of accelerations that shorter steps would not reduce. */
+/* Ratio of the error of the last solved step to the allowed one, that of the run times dt / its
+   length; less errors of solves, a part of the differences of accelerations that shorter steps
+   would not reduce. */
 static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
                                  PetscReal *ratio)
 {
@@ -95,31 +103,38 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   if (l->accuracy > 0. && run->ts) {
     run->post_solve.error = step_error;
     PetscCall(TSGetAdapt(run->ts, &adapt));
+
     /* explicit steps are at most the stable one */
-    PetscCall(
-      TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
+    PetscCall(TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end,
+                                   run->snes && run->J ? 0.1 * run->t_end : run->dt));
   }
   if (l->may_tune && run->snes && run->J)
     PetscCall(SbAdaptiveToleranceSet(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adapts the barrier's width to its allowed error; `again`: the step has to be solved with the new width. */
+/* Adapts the barrier's width to its allowed error; `again`: the step has to be solved with the new
+   width. */
 static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
-  PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored), error;
+  PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored);
+  PetscReal error;
   PetscBool changed;
 
   PetscFunctionBeginUser;
-  if (!(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(allowed > 0.))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbEstimateGaps(l, step->U, ROOM * allowed, &error));
-  if (!(error > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(error > 0.))
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (error < ROOM * allowed) {
     PetscCall(SbModelScaleBarrierWidths(l->run->model, PetscMin(3., AIM * allowed / error),
-                                        step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL, &changed));
+                                        step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL,
+                                        &changed));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (error <= allowed) PetscFunctionReturn(PETSC_SUCCESS);
+  if (error <= allowed)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* too large, unless the error of the mesh is much larger */
   PetscCall(SbSpaceEstimateCompute(l->space, step->t + step->dt, step->U, step->V, step->A));
@@ -141,6 +156,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   PetscReal allowed, left;
 
   PetscFunctionBeginUser;
+
   /* until something moves, the reference energy is that of the first attempt */
   if (!step->V || step->t == run->t0) {
     SbEnergies e;
@@ -148,14 +164,19 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
     PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
     l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
   }
-  if (step->solved && run->model->npotential) PetscCall(update_widths(l, step, again));
-  if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
-  allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * (step->V ? step->dt / run->t_end : 1.);
+  if (step->solved && run->model->npotential)
+    PetscCall(update_widths(l, step, again));
+  if (!l->may_tune || !step->solved)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  allowed =
+    SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * (step->V ? step->dt / run->t_end : 1.);
   left = left_by_solves(l);
-  if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(left > 0.) || !(allowed > 0.))
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {
     /* a small excess in one of many steps is compensated by the next */
-    if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed) *again = PETSC_TRUE;
+    if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed)
+      *again = PETSC_TRUE;
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
   } else if (left < 0.1 * allowed)
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));
@@ -167,15 +188,18 @@ PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step)
   PetscReal took = step->wall - l->wall;
 
   PetscFunctionBeginUser;
-  if (l->budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (l->budget == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &took, 1, MPIU_REAL, MPI_MAX, l->run->model->comm));
   l->wall = step->wall;
-  if (step->step == l->run->step0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (step->step == l->run->step0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   l->nstep++;
   l->nkept += took <= l->budget;
   l->longest = PetscMax(l->longest, took);
   l->total += took;
-  if (!l->may_tune || !l->run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l->may_tune || !l->run->J)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (took > 0.9 * l->budget)
     PetscCall(SbAdaptiveToleranceSet(l, 4. * l->rtol));
   else if (took < 0.5 * l->budget)

@@ -9,17 +9,23 @@
 PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool strain, Vec R)
 {
   const SbModel m = l->run->model;
-  const Vec moved = l->w[1], other = l->w[2];
-  PetscReal size, volume = 0., length, energy;
+  const Vec moved = l->w[1];
+  const Vec other = l->w[2];
+  PetscReal size;
+  PetscReal volume = 0.;
+  PetscReal length, energy;
   PetscInt ninverted;
 
   PetscFunctionBeginUser;
+
   /* the step moves bodies by at most a millionth of their size */
   PetscCall(VecNorm(D, NORM_INFINITY, &size));
-  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
+  for (PetscInt b = 0; b < m->nbody; b++)
+    volume = PetscMax(volume, m->body[b].volume);
   length = size > 0. ? PROBE * PetscPowReal(volume, 1. / 3.) / size : 0.;
   PetscCall(VecZeroEntries(R));
-  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(length > 0.))
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int side = 0; side < 2; side++) {
     const Vec F = side ? R : other;
 
@@ -52,7 +58,8 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   PetscCall(VecDuplicate(D, &R));
   if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
       !run->model->space->consistent_mass) {
-    /* the last tangent, where it is a matrix K + shift M of the free unknowns with the lumped mass */
+    /* the last tangent, where it is a matrix K + shift M of the free unknowns with the lumped
+       mass */
     PetscCall(VecCopy(D, moved));
     PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
     PetscCall(MatMult(run->J, moved, R));

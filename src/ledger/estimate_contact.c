@@ -1,19 +1,21 @@
 /*
-  Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it (forces
-  grow from zero) bounds the energy of the error, but includes rigid displacements as springs deflect.
+  Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it
+  (forces grow from zero) bounds the energy of the error, but includes rigid displacements as
+  springs deflect.
 
-  So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K + springs)
-  delta = F, moves the body to its position with exact contact, up to the ratio of its stiffness to theirs;
-  the elastic energy of delta is that of the error.
+  So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K +
+  springs) delta = F, moves the body to its position with exact contact, up to the ratio of its
+  stiffness to theirs; the elastic energy of delta is that of the error.
 
   The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n
-  (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the error is
-  relative to the same step without gaps.
+  (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the
+  error is relative to the same step without gaps.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
-#define CLOSELY 1e-3 /* tolerance of delta: mostly rigid, by the gap, while strains are differences */
+#define CLOSELY \
+  1e-3 /* tolerance of delta: mostly rigid, by the gap, while strains are differences */
 
 /* Elastic energy of the displacement of bodies in contact under the forces F. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
@@ -63,14 +65,17 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
     PetscCall(SbEstimateGaps(l, step->U, 0., error));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   /* half the force times gap of all points, J */
   energy = 0.;
   PetscCall(SbModelContactPoints(m, step->t, step->U, &list));
   for (PetscInt i = 0; i < list.n; i++)
-    energy += 0.5 * PetscAbsReal(list.point[i].gap * SbDot3(list.point[i].force, list.point[i].normal));
+    energy +=
+      0.5 * PetscAbsReal(list.point[i].gap * SbDot3(list.point[i].force, list.point[i].normal));
   PetscCall(PetscFree(list.point));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &energy, 1, MPIU_REAL, MPI_SUM, m->comm));
-  for (PetscInt e = 0; e < m->nbegin_step; e++) springs = (PetscBool)(springs || m->begin_step[e]->springs);
+  for (PetscInt e = 0; e < m->nbegin_step; e++)
+    springs = (PetscBool)(springs || m->begin_step[e]->springs);
   if (springs && !m->dynamic && energy > 0.) {
     Vec F;
 

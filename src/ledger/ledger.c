@@ -1,13 +1,13 @@
 /*
   Error estimates of a run: which steps are estimated, and how the errors of steps accumulate.
 
-  The energy of a propagated error is constant or, with damping, decreases like that of the motion: so the
-  errors of steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving
-  Ordinary Differential Equations I, II.3).
+  The energy of a propagated error is constant or, with damping, decreases like that of the motion:
+  so the errors of steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett,
+  Wanner, Solving Ordinary Differential Equations I, II.3).
 
-  Steps are estimated while the work for estimates is below a fixed fraction of the run's, in residual
-  evaluations, not seconds, so that repeated runs estimate the same steps. Other steps have the error of the
-  last estimated one; with -accuracy the integrator's error is estimated in each.
+  Steps are estimated while the work for estimates is below a fixed fraction of the run's, in
+  residual evaluations, not seconds, so that repeated runs estimate the same steps. Other steps have
+  the error of the last estimated one; with -accuracy the integrator's error is estimated in each.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
@@ -20,20 +20,25 @@ const char *const SbErrorNames[SB_ERROR_COUNT] = {"space",  "time",    "nonlinea
 
 const SbOption SbLedgerRows[] = {
   {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
-   "estimate the error of the result by its sources (mesh, time step, iterations, contact), and print a "
+   "estimate the error of the result by its sources (mesh, time step, iterations, contact), and "
+   "print a "
    "table of them with the seconds spent on each, the error ledger"},
   {"ledger_every", SB_OPTION_INT, 1, "", "0", "[0, inf)",
-   "steps between estimates of the spatial discretisation error in history.csv; 0: at the end only"},
+   "steps between estimates of the spatial discretisation error in history.csv; 0: at the end "
+   "only"},
   {"ledger_quantity", SB_OPTION_CHOICE, 1, "", "none", "none|displacement|reaction|volume",
-   "quantity of interest whose error is estimated as well: displacement of the node nearest to ledger_at, "
+   "quantity of interest whose error is estimated as well: displacement of the node nearest to "
+   "ledger_at, "
    "reaction on the prescribed nodes of ledger_on, or volume of all bodies"},
   {"ledger_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
    "ledger_quantity displacement: its position in the reference configuration"},
   {"ledger_direction", SB_OPTION_REALS, 3, "", "0,0,1", "(-inf, inf)",
    "ledger_quantity displacement and reaction: direction; its length does not matter"},
-  {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "ledger_quantity reaction: set of its prescribed nodes"},
+  {"ledger_on", SB_OPTION_STRING, 1, "", "", "",
+   "ledger_quantity reaction: set of its prescribed nodes"},
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "target relative error in the energy norm: chooses time steps, tolerances and the width of response "
+   "target relative error in the energy norm: chooses time steps, tolerances and the width of "
+   "response "
    "barrier; 0: as given by their options"},
   {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "wall time that a step may take: tolerances are chosen as tight as it allows; 0: no limit"},
@@ -51,10 +56,11 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscCall(SbOptionBool(&SbRunScope, "ledger", &named));
   PetscCall(SbOptionReal(&SbRunScope, "accuracy", &accuracy));
   PetscCall(SbOptionReal(&SbRunScope, "step_time_budget", &budget));
-  if (!named && accuracy == 0. && budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(
-    run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the same method");
+  if (!named && accuracy == 0. && budget == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the "
+             "same method");
   PetscCall(PetscNew(&l));
   l->run = run;
   PetscCall(SbLogNamed("Est", "ledger", &l->event));
@@ -84,14 +90,17 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   SbLedger l = (SbLedger)ctx;
 
   PetscFunctionBeginUser;
+
   /* keep the accelerations for third differences; a repeated step counts once */
   if (step->A0 && l->order == 2 && (!l->kept || step->t != l->kept_t)) {
     Vec spare = l->before;
 
-    if (l->kept) l->before_dt = step->t - l->kept_t;
+    if (l->kept)
+      l->before_dt = step->t - l->kept_t;
     l->before = l->kept;
     l->kept = spare;
-    if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
+    if (!l->kept)
+      PetscCall(VecDuplicate(step->A0, &l->kept));
     PetscCall(VecCopy(step->A0, l->kept));
     l->kept_t = step->t;
   }
@@ -107,15 +116,18 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
     else
       PetscCall(SNESGetFunctionNorm(run->snes, &l->residual));
   }
-  if (!l->seen && l->accuracy == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l->seen && l->accuracy == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   begin(l);
-  if (step->V) PetscCall(SbEstimateTime(l, step, l->seen));
+  if (step->V)
+    PetscCall(SbEstimateTime(l, step, l->seen));
   if (l->seen && step->solved) {
     PetscCall(SbEstimateSolver(l, step));
     l->seen_residual = l->residual;
   }
   end(l);
-  if (l->accuracy > 0.) PetscCall(SbAdaptiveToleranceUpdate(l, step, again));
+  if (l->accuracy > 0.)
+    PetscCall(SbAdaptiveToleranceUpdate(l, step, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,24 +140,29 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscReal scale;
 
   PetscFunctionBeginUser;
-  if (step->again) PetscFunctionReturn(PETSC_SUCCESS);
+  if (step->again)
+    PetscFunctionReturn(PETSC_SUCCESS);
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
+
   // in residual evaluations: a tangent costs three, an iteration with its preconditioner two
   l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
 
-  /* A static run has the errors of its last solve. In a dynamic one the integrator's errors add up; those of
-     linear solves, in changing directions, add in squares, those of linearisation, smooth, linearly. The
-     errors of a step without an estimate are scaled by its last residual. */
+  /* A static run has the errors of its last solve. In a dynamic one the integrator's errors add up;
+     those of linear solves, in changing directions, add in squares, those of linearisation, smooth,
+     linearly. The errors of a step without an estimate are scaled by its last residual. */
   if (!first) {
     const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
-    PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];
+    PetscReal *linear = &l->error[SB_ERROR_LINEAR];
+    PetscReal *nonlinear = &l->error[SB_ERROR_NONLINEAR];
     PetscReal left = step->V ? 1. : 0.;
 
     /* the fraction that damping leaves: as of the motion, by its power over twice the energy */
     if (step->V && run->damping_power > 0. && energy > 0.)
       left = PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
-    if (step->V) SbEstimateTimeAdd(l, step->dt, left);
-    *linear = PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
+    if (step->V)
+      SbEstimateTimeAdd(l, step->dt, left);
+    *linear =
+      PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
     *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
   }
 
@@ -159,19 +176,23 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscCall(PetscArraycpy(l->space_error, l->space->body2, m->nbody));
     l->error[SB_ERROR_SPACE] =
       PetscMax(m->dynamic ? l->error[SB_ERROR_SPACE] : 0., PetscSqrtReal(l->space->total2));
-    if ((m->nbegin_step || m->npotential) && step->R) PetscCall(SbEstimateContact(l, step, &contact));
+    if ((m->nbegin_step || m->npotential) && step->R)
+      PetscCall(SbEstimateContact(l, step, &contact));
     l->error[SB_ERROR_CONTACT] = PetscMax(m->dynamic ? l->error[SB_ERROR_CONTACT] : 0., contact);
     l->own_work += SPACE_WORK;
   }
-  if (l->quantity.kind) PetscCall(SbQuantityValue(l, step));
+  if (l->quantity.kind)
+    PetscCall(SbQuantityValue(l, step));
   if (step->last && !first) {
     PetscCall(SbEstimateRounding(l, step->t, step->U, &l->error[SB_ERROR_ROUNDING]));
-    if (l->quantity.kind) PetscCall(SbQuantityErrors(l, step));
+    if (l->quantity.kind)
+      PetscCall(SbQuantityErrors(l, step));
   }
 
   /* relative to the stored energy */
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
-  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * SbLedgerError(l, i);
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    l->relative[i] = scale * SbLedgerError(l, i);
   end(l);
   PetscCall(SbAdaptiveToleranceAccept(l, step));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -190,7 +211,8 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
     for (PetscInt i = 0; i < space->batch_n[b]; i++) {
       const PetscInt c = space->batch_cell[b] + i;
 
-      if (c < space->mesh->ncell_owned) values[c] = l->space->cell2[c] / space->batch_V[b][i];
+      if (c < space->mesh->ncell_owned)
+        values[c] = l->space->cell2[c] / space->batch_V[b][i];
     }
   }
   l->own_work += SPACE_WORK;
@@ -232,14 +254,17 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   SbRun run;
 
   PetscFunctionBeginUser;
-  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l)
+    PetscFunctionReturn(PETSC_SUCCESS);
   run = l->run;
   begin(l);
   PetscCall(SbSpaceEstimateCreate(run->model, &l->space));
   PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));
-  for (int i = 0; i < 3; i++) PetscCall(VecDuplicate(run->U, &l->w[i]));
+  for (int i = 0; i < 3; i++)
+    PetscCall(VecDuplicate(run->U, &l->w[i]));
   PetscCall(VecDuplicate(run->U, &l->delta));
-  if (run->model->dynamic) SbRunLocalError(run, &l->order, &l->c, &l->ahead);
+  if (run->model->dynamic)
+    SbRunLocalError(run, &l->order, &l->c, &l->ahead);
   PetscCall(SbQuantityAttach(l));
 
   /* columns of history.csv */
@@ -279,7 +304,8 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   to->total = from->total;
   to->anew = PETSC_TRUE;
   PetscCall(SbQuantityContinue(from, to));
-  if (to->may_tune && to->run->snes && to->run->J) PetscCall(SbAdaptiveToleranceSet(to, from->rtol));
+  if (to->may_tune && to->run->snes && to->run->J)
+    PetscCall(SbAdaptiveToleranceSet(to, from->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,11 +314,13 @@ PetscErrorCode SbLedgerDestroy(SbLedger *ledger)
   SbLedger l = *ledger;
 
   PetscFunctionBeginUser;
-  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDestroy(&l->quantity.weight));
   PetscCall(SbSpaceEstimateDestroy(&l->space));
   PetscCall(PetscFree(l->space_error));
-  for (int i = 0; i < 3; i++) PetscCall(VecDestroy(&l->w[i]));
+  for (int i = 0; i < 3; i++)
+    PetscCall(VecDestroy(&l->w[i]));
   PetscCall(VecDestroy(&l->delta));
   PetscCall(VecDestroy(&l->kept));
   PetscCall(VecDestroy(&l->before));

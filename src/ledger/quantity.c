@@ -1,10 +1,11 @@
 /*
   The quantity of interest of the user, and its error.
 
-  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the dual solution, K z =
-  dQ/du, the error by the mesh is a(e_u, e_z), the energy product of the errors of u and z, by the space
-  estimate eta: (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the error by the solver is dQ/du . delta. Else the
-  error is the relative error in the energy norm times the range of values of the quantity.
+  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the dual
+  solution, K z = dQ/du, the error by the mesh is a(e_u, e_z), the energy product of the errors of u
+  and z, by the space estimate eta: (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the error by the solver
+  is dQ/du . delta. Else the error is the relative error in the energy norm times the range of
+  values of the quantity.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
@@ -22,15 +23,20 @@ PetscErrorCode SbQuantitySetFromOptions(SbLedger l)
   q->node = -1;
   q->least = PETSC_MAX_REAL;
   q->most = PETSC_MIN_REAL;
-  if (!q->kind) PetscFunctionReturn(PETSC_SUCCESS);
-  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(SbOptionReals(&SbRunScope, "ledger_at", q->at));
+  if (!q->kind)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->kind == SB_QUANTITY_DISPLACEMENT)
+    PetscCall(SbOptionReals(&SbRunScope, "ledger_at", q->at));
   if (q->kind == SB_QUANTITY_REACTION)
     PetscCall(SbOptionString(&SbRunScope, "ledger_on", sizeof(q->on), q->on));
-  if (q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->kind == SB_QUANTITY_VOLUME)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReals(&SbRunScope, "ledger_direction", q->direction));
   length = PetscSqrtReal(SbDot3(q->direction, q->direction));
-  PetscCheck(length > 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-ledger_direction 0,0,0 is no direction");
-  for (int k = 0; k < 3; k++) q->direction[k] /= length;
+  PetscCheck(length > 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-ledger_direction 0,0,0 is no direction");
+  for (int k = 0; k < 3; k++)
+    q->direction[k] /= length;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -43,14 +49,18 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   PetscInt nprescribed = 0;
 
   PetscFunctionBeginUser;
-  if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(l->run->U, &q->weight));
   PetscCall(VecZeroEntries(q->weight));
   if (q->kind == SB_QUANTITY_DISPLACEMENT) {
-    PetscReal least = PETSC_MAX_REAL, all;
-    PetscInt first = PETSC_MAX_INT, winner;
+    PetscReal least = PETSC_MAX_REAL;
+    PetscReal all;
+    PetscInt first = PETSC_MAX_INT;
+    PetscInt winner;
 
-    /* the node nearest to the position on all ranks; of equally near ones that with the lowest number */
+    /* the node nearest to the position on all ranks; of equally near ones that with the lowest
+       number */
     for (int pass = 0; pass < 2; pass++) {
       for (PetscInt k = 0; k < s->nnode_owned; k++) {
         PetscReal r[3];
@@ -63,15 +73,19 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
           q->node = k;
         }
       }
-      if (!pass) PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, s->comm));
+      if (!pass)
+        PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, s->comm));
     }
     PetscCallMPI(MPI_Allreduce(&first, &winner, 1, MPIU_INT, MPI_MIN, s->comm));
-    if (first != winner) q->node = -1;
-    for (int j = 0; j < 3; j++) q->x[j] = q->node < 0 ? 0. : s->node_x[3 * q->node + j];
+    if (first != winner)
+      q->node = -1;
+    for (int j = 0; j < 3; j++)
+      q->x[j] = q->node < 0 ? 0. : s->node_x[3 * q->node + j];
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
   }
   for (PetscInt k = 0; k < m->nset; k++)
-    if (!strcmp(m->set[k].name, q->on)) q->set = SB_SET_BIT(k);
+    if (!strcmp(m->set[k].name, q->on))
+      q->set = SB_SET_BIT(k);
   PetscCall(VecGetArray(q->weight, &w));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int k = 0; k < 3; k++) {
@@ -79,16 +93,18 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
                                          ? i == q->node
                                          : (s->node_set[i] & q->set) && (s->fixed[i] & (1 << k)));
 
-      if (on) w[3 * i + k] = q->direction[k];
+      if (on)
+        w[3 * i + k] = q->direction[k];
       nprescribed += on;
     }
   }
   PetscCall(VecRestoreArray(q->weight, &w));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nprescribed, 1, MPIU_INT, MPI_SUM, m->comm));
-  PetscCheck(nprescribed > 0, m->comm, PETSC_ERR_USER_INPUT,
-             "-ledger_on '%s': no effect prescribes displacements on a set of that name, so there is no "
-             "reaction; name a set of a support or drive",
-             q->on);
+  PetscCheck(
+    nprescribed > 0, m->comm, PETSC_ERR_USER_INPUT,
+    "-ledger_on '%s': no effect prescribes displacements on a set of that name, so there is no "
+    "reaction; name a set of a support or drive",
+    q->on);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,11 +116,11 @@ PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to)
   PetscFunctionBeginUser;
   SbSubtract(a, to->quantity.x, d);
   if (to->quantity.kind == SB_QUANTITY_DISPLACEMENT && SbDot3(d, d) > 0.)
-    PetscCall(
-      SbWarning(to->run->model->comm,
-                "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest one, "
-                "%.3g m from it, stands for it. Vertices of the surface stay: choose one of them",
-                (double)a[0], (double)a[1], (double)a[2], (double)PetscSqrtReal(SbDot3(d, d))));
+    PetscCall(SbWarning(
+      to->run->model->comm,
+      "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest one, "
+      "%.3g m from it, stands for it. Vertices of the surface stay: choose one of them",
+      (double)a[0], (double)a[1], (double)a[2], (double)PetscSqrtReal(SbDot3(d, d))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,7 +144,8 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
   const PetscReal scale = l->stored > 0. ? (q->most - q->least) / PetscSqrtReal(l->stored) : 0.;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < SB_ERROR_COUNT; i++) q->error[i] = scale * SbLedgerError(l, i);
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    q->error[i] = scale * SbLedgerError(l, i);
   if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) {
     const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
     PetscReal left, energy, s, sums[2];
@@ -137,6 +154,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 
     PetscCall(VecDuplicate(step->U, &B));
     PetscCall(VecDuplicate(step->U, &Z));
+
     // right-hand side: dQ/du at free unknowns
     if (q->kind == SB_QUANTITY_REACTION)
       PetscCall(SbStiffnessTimes(l, step->t, step->U, q->weight, PETSC_FALSE, B));
@@ -149,8 +167,10 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
     q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
     PetscCall(SbProbeSolve(l, ADJOINT, B, Z, &its));
     PetscCall(VecDot(B, Z, &energy));
+
     /* reaction: add the displacement of the support itself; Z is rigid without another support */
-    if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
+    if (q->kind == SB_QUANTITY_REACTION)
+      PetscCall(VecAYPX(Z, -1., q->weight));
 
     /* error by the mesh: a(e_u, e_z) */
     q->error[SB_ERROR_SPACE] = 0.;

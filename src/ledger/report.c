@@ -1,15 +1,16 @@
 /*
   Table at the end of a run: errors and seconds of each source, and advice.
 
-  Cost of halving an error, as a factor on the time of the run. Mesh: edges of half the length (errors are
-  proportional to it; P2: to its square, so edges shorter by 2^(1/2)), hence more tets, and more iterations
-  where these grow with the mesh. Integrator of order p: steps shorter by 2^(1/p). Solves: the iterations that
-  halve the residual at the measured rate.
+  Cost of halving an error, as a factor on the time of the run. Mesh: edges of half the length
+  (errors are proportional to it; P2: to its square, so edges shorter by 2^(1/2)), hence more tets,
+  and more iterations where these grow with the mesh. Integrator of order p: steps shorter by
+  2^(1/p). Solves: the iterations that halve the residual at the measured rate.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
 
-#define WASTE 1e3 /* a source with an error smaller than the largest one by this factor is too accurate */
+#define WASTE \
+  1e3 /* a source with an error smaller than the largest one by this factor is too accurate */
 #define WIDTH 79
 
 #define ROOM 2048 /* length of the advice text */
@@ -19,12 +20,22 @@ typedef struct {
   PetscReal source[SB_ERROR_COUNT], setup, output, estimates, total;
 } Seconds;
 
-/* space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's iterations after
-   the first of a step; contact: search and active-set decisions; time: the rest of the loop. Estimates are
-   counted separately, with their residuals and solves. */
+/* space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's
+   iterations after the first of a step; contact: search and active-set decisions; time: the rest of
+   the loop. Estimates are counted separately, with their residuals and solves. */
 static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
 {
-  enum { ASSEMBLY, SOLVE, CONTACT, SEARCH, SETUP, OUTPUT, ESTIMATES, TOTAL, COUNT };
+  enum {
+    ASSEMBLY,
+    SOLVE,
+    CONTACT,
+    SEARCH,
+    SETUP,
+    OUTPUT,
+    ESTIMATES,
+    TOTAL,
+    COUNT
+  };
   const SbRun run = l->run;
   PetscReal phase[SB_PHASE_COUNT], t[COUNT], beyond;
 
@@ -38,19 +49,22 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   t[OUTPUT] = phase[SB_PHASE_OUTPUT];
   t[ESTIMATES] = l->seconds;
   t[TOTAL] = run->seconds_solve;
-  for (int i = 0; i < COUNT; i++) t[i] = PetscMax(t[i], 0.);
+  for (int i = 0; i < COUNT; i++)
+    t[i] = PetscMax(t[i], 0.);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, t, COUNT, MPIU_REAL, MPI_MAX, run->model->comm));
   beyond = run->newton_total > run->steps_total
              ? 1. - (PetscReal)PetscMax(run->steps_total, 1) / (PetscReal)run->newton_total
              : 0.;
-  *s = (Seconds){
-    .setup = t[SETUP], .output = t[OUTPUT], .estimates = t[ESTIMATES], .total = t[TOTAL] + t[SETUP]};
+  *s = (Seconds){.setup = t[SETUP],
+                 .output = t[OUTPUT],
+                 .estimates = t[ESTIMATES],
+                 .total = t[TOTAL] + t[SETUP]};
   s->source[SB_ERROR_SPACE] = (1. - beyond) * t[ASSEMBLY];
   s->source[SB_ERROR_LINEAR] = (1. - beyond) * t[SOLVE];
   s->source[SB_ERROR_NONLINEAR] = beyond * (t[ASSEMBLY] + t[SOLVE]);
   s->source[SB_ERROR_CONTACT] = t[CONTACT] + t[SEARCH];
-  s->source[SB_ERROR_TIME] =
-    PetscMax(0., t[TOTAL] - t[ASSEMBLY] - t[SOLVE] - t[CONTACT] - t[SEARCH] - t[OUTPUT] - t[ESTIMATES]);
+  s->source[SB_ERROR_TIME] = PetscMax(0., t[TOTAL] - t[ASSEMBLY] - t[SOLVE] - t[CONTACT] -
+                                            t[SEARCH] - t[OUTPUT] - t[ESTIMATES]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,7 +73,8 @@ static PetscReal together(SbLedger l)
 {
   PetscReal sum = 0.;
 
-  for (int i = 0; i < SB_ERROR_COUNT; i++) sum += PetscSqr(SbLedgerError(l, i));
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    sum += PetscSqr(SbLedgerError(l, i));
   return PetscSqrtReal(sum);
 }
 
@@ -68,7 +83,8 @@ static int largest(SbLedger l)
   int most = 0;
 
   for (int i = 1; i < SB_ERROR_COUNT; i++)
-    if (SbLedgerError(l, i) > SbLedgerError(l, most)) most = i;
+    if (SbLedgerError(l, i) > SbLedgerError(l, most))
+      most = i;
   return most;
 }
 
@@ -78,7 +94,8 @@ static PetscInt worst_body(SbLedger l)
   PetscInt worst = 0;
 
   for (PetscInt b = 1; b < l->run->model->nbody; b++)
-    if (l->space_error[b] > l->space_error[worst]) worst = b;
+    if (l->space_error[b] > l->space_error[worst])
+      worst = b;
   return worst;
 }
 
@@ -87,12 +104,14 @@ static PetscReal order_of_space(SbLedger l)
   return l->run->model->element[worst_body(l)]->nodes_per[1] ? 2. : 1.;
 }
 
-/* Factor on the seconds per tet when edges are halved: 8 (n^2) for factors, 2 if iterations grow, else 1. */
+/* Factor on the seconds per tet when edges are halved: 8 (n^2) for factors, 2 if iterations grow,
+   else 1. */
 static PetscReal growth(SbRun run)
 {
   const char *name = run->solver;
 
-  if (strstr(name, "cholmod") || strstr(name, "mumps") || strstr(name, "umfpack")) return 8.;
+  if (strstr(name, "cholmod") || strstr(name, "mumps") || strstr(name, "umfpack"))
+    return 8.;
   return strstr(name, "gamg") || strstr(name, "pressure") || strstr(name, "two_level") ? 1. : 2.;
 }
 
@@ -100,48 +119,58 @@ static PetscReal growth(SbRun run)
 static PetscReal cost(SbLedger l, const Seconds *s, int source)
 {
   const SbRun run = l->run;
-  const PetscReal total = PetscMax(s->total, 1e-9), solving = s->source[SB_ERROR_LINEAR] / total;
+  const PetscReal total = PetscMax(s->total, 1e-9);
+  const PetscReal solving = s->source[SB_ERROR_LINEAR] / total;
   const PetscReal digits = PetscLog2Real(1. / PetscMax(l->rtol > 0. ? l->rtol : 1e-5, 1e-14));
 
   switch (source) {
   case SB_ERROR_SPACE:
     /* explicit: twice as many steps, which the smallest tet bounds */
-    return PetscPowReal(8. * (run->J ? 1. + solving * (growth(run) - 1.) : 2.), 1. / order_of_space(l));
+    return PetscPowReal(8. * (run->J ? 1. + solving * (growth(run) - 1.) : 2.),
+                        1. / order_of_space(l));
   case SB_ERROR_TIME:
-    return 1. + (PetscPowReal(2., 1. / (PetscReal)PetscMax(l->order, 1)) - 1.) * (1. - s->setup / total);
+    return 1. +
+           (PetscPowReal(2., 1. / (PetscReal)PetscMax(l->order, 1)) - 1.) * (1. - s->setup / total);
   default:
     return 1. + (solving + s->source[SB_ERROR_NONLINEAR] / total) / digits;
   }
 }
 
-/* Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the same tets its
-   relative error is about half the square of the relative error r of a first-order element, for small r (bar
-   of docs/reports/quadratic_tets.md: 0.4 to 0.7 of it). So edges may be longer by r^(-1/2), and the run takes
-   c r^(3/2) times as long, c the ratio of matrix bytes per tet. */
+/* Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the
+   same tets its relative error is about half the square of the relative error r of a first-order
+   element, for small r (bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of it). So edges may be
+   longer by r^(-1/2), and the run takes c r^(3/2) times as long, c the ratio of matrix bytes per
+   tet. */
 static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
 {
   const SbModel m = l->run->model;
-  const PetscInt body = worst_body(l), *nodes = m->element[body]->nodes_per;
+  const PetscInt body = worst_body(l);
+  const PetscInt *nodes = m->element[body]->nodes_per;
   const SbMaterial law = m->material[body];
   const PetscReal r = l->error[SB_ERROR_SPACE] / PetscSqrtReal(l->stored);
   const PetscReal times = (nodes[0] ? 14. : nodes[2] ? 0.9 : 0.45) * r * PetscSqrtReal(r);
 
   /* not for P2 itself, nor for explicit runs, whose steps the smallest distance of nodes bounds */
-  if (nodes[1] || !l->run->J) return;
+  if (nodes[1] || !l->run->J)
+    return;
+
   /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
   if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * law->mu) {
-    SbAppend(ROOM, w,
-             "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
-             m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
+    SbAppend(
+      ROOM, w,
+      "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
+      m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
     return;
   }
+
   /* solutions are not smooth at the boundary of a contact area */
-  if (m->nbegin_step || m->npotential || times >= cost_of_half) return;
-  SbAppend(
-    ROOM, w,
-    "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it with edges of %.2g "
-    "times the length and %.2g times the time; not for shocks and sharp contact. ",
-    m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
+  if (m->nbegin_step || m->npotential || times >= cost_of_half)
+    return;
+  SbAppend(ROOM, w,
+           "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it "
+           "with edges of %.2g "
+           "times the length and %.2g times the time; not for shocks and sharp contact. ",
+           m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
 }
 
 static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
@@ -151,8 +180,10 @@ static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
     "the time step is the largest source: halving it takes steps of %.3g s",
     "Newton's method stops too early: halving its error takes a smaller -snes_rtol",
     "the linear solver is the largest source of error: halving it takes a smaller -ksp_rtol",
-    "contact is the largest source of error: a smaller -effect_..._barrier_width, or response projected",
-    "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
+    "contact is the largest source of error: a smaller -effect_..._barrier_width, or response "
+    "projected",
+    "rounding is the largest source of error: only other units or a smaller range of stiffnesses "
+    "helps"};
   const int most = largest(l);
   const SbRun run = l->run;
   PetscReal half; /* length of edges over the present one, or of steps, s, for half the error */
@@ -161,14 +192,17 @@ static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
     SbAppend(ROOM, w, "No error was found that could be distinguished from zero. ");
     return;
   }
-  SbAppend(ROOM, w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
+  SbAppend(ROOM, w, "Of an error of %.2g %%, ",
+           (double)(100. * together(l) / PetscSqrtReal(l->stored)));
   half = PetscPowReal(0.5, 1. / (most == SB_ERROR_TIME ? (PetscReal)l->order : order_of_space(l)));
-  if (most == SB_ERROR_TIME) half *= run->t_end / PetscMax(1, run->steps_total);
+  if (most == SB_ERROR_TIME)
+    half *= run->t_end / PetscMax(1, run->steps_total);
   SbAppend(ROOM, w, what[most], (double)half);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
     SbAppend(ROOM, w, ", and %.2g times the time", (double)cost(l, s, most));
   SbAppend(ROOM, w, ". ");
-  if (most == SB_ERROR_SPACE) say_quadratic(l, cost(l, s, most), w);
+  if (most == SB_ERROR_SPACE)
+    say_quadratic(l, cost(l, s, most), w);
 }
 
 /* Settings that are more accurate than needed, and cost time. */
@@ -182,18 +216,22 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
             {SB_ERROR_TIME, "-ts_dt"}};
   const PetscReal most = SbLedgerError(l, largest(l));
 
-  if (l->may_tune) return; /* the adaptive tolerance sets them */
+  if (l->may_tune)
+    return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = SbLedgerError(l, of[i].source);
     const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * PetscMax(s->total, 1e-9));
-    const PetscBool factorised = (PetscBool)(l->run->linear_total <= l->run->newton_total); /* no tolerance */
+    const PetscBool factorised =
+      (PetscBool)(l->run->linear_total <= l->run->newton_total); /* no tolerance */
 
-    if (!(e > 0.) || e * WASTE > most) continue;
-    if (of[i].source == SB_ERROR_TIME ? !l->run->model->dynamic : cheap || factorised) continue;
-    SbAppend(
-      ROOM, w,
-      "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
-      of[i].what, (double)(e / most), (double)(0.1 * most / e));
+    if (!(e > 0.) || e * WASTE > most)
+      continue;
+    if (of[i].source == SB_ERROR_TIME ? !l->run->model->dynamic : cheap || factorised)
+      continue;
+    SbAppend(ROOM, w,
+             "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as "
+             "large unnoticed. ",
+             of[i].what, (double)(e / most), (double)(0.1 * most / e));
   }
 }
 
@@ -201,9 +239,12 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
 static void report_accuracy(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
-  const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
+  const PetscReal mesh =
+    l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const SbModel m = l->run->model;
-  PetscReal volume = 0., n = 0., h;
+  PetscReal volume = 0.;
+  PetscReal n = 0.;
+  PetscReal h;
 
   /* size of the mesh: edge of a regular tet of the mean volume, m */
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -212,24 +253,26 @@ static void report_accuracy(SbLedger l, char w[ROOM])
   }
   h = PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
   if (l->accuracy > 0.) {
-    SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
+    SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy,
+             all <= l->accuracy ? "met" : "NOT met");
     if (mesh > 0.7 * l->accuracy)
-      SbAppend(
-        ROOM, w,
-        "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where errors fall with "
-        "%stheir size. ",
-        (double)(h * PetscPowReal(0.7 * l->accuracy / mesh, 1. / order_of_space(l))), (double)h,
-        order_of_space(l) > 1. ? "the square of " : "");
+      SbAppend(ROOM, w,
+               "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where "
+               "errors fall with "
+               "%stheir size. ",
+               (double)(h * PetscPowReal(0.7 * l->accuracy / mesh, 1. / order_of_space(l))),
+               (double)h, order_of_space(l) > 1. ? "the square of " : "");
     if (l->narrowed)
-      SbAppend(ROOM, w, "Widths of contact's barrier were made smaller for it %" PetscInt_FMT " times. ",
+      SbAppend(ROOM, w,
+               "Widths of contact's barrier were made smaller for it %" PetscInt_FMT " times. ",
                l->narrowed);
     if (l->mesh_bounds)
       SbAppend(ROOM, w, "Contact was left at a tenth of the mesh's error, which hides less. ");
     if (l->width_bounds)
-      SbAppend(
-        ROOM, w,
-        "Contact was left worse than its share: -effect_..._barrier_width is given, or rounding allows "
-        "no smaller one. ");
+      SbAppend(ROOM, w,
+               "Contact was left worse than its share: -effect_..._barrier_width is given, or "
+               "rounding allows "
+               "no smaller one. ");
   }
   if (l->budget > 0. && l->nstep) {
     SbAppend(ROOM, w,
@@ -238,8 +281,10 @@ static void report_accuracy(SbLedger l, char w[ROOM])
              (double)l->budget, l->nkept, l->nstep, (double)(l->total / (PetscReal)l->nstep),
              (double)l->longest, (double)l->rtol);
     if (l->total > l->budget * (PetscReal)l->nstep)
-      SbAppend(ROOM, w, "It is too small for this mesh: tets of about %.2g m (now %.2g m) would fit. ",
-               (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)), (double)h);
+      SbAppend(ROOM, w,
+               "It is too small for this mesh: tets of about %.2g m (now %.2g m) would fit. ",
+               (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)),
+               (double)h);
   }
 }
 
@@ -252,8 +297,10 @@ static PetscErrorCode print_line(SbLedger l, const Seconds *s, const char *name,
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(text), text, "%-11s", name);
-  if (error >= 0.) SbAppend(sizeof(text), text, " %10.2e %9.2e", (double)error, (double)relative);
-  if (quantity) SbAppend(sizeof(text), text, " %9.2e", (double)*quantity);
+  if (error >= 0.)
+    SbAppend(sizeof(text), text, " %10.2e %9.2e", (double)error, (double)relative);
+  if (quantity)
+    SbAppend(sizeof(text), text, " %9.2e", (double)*quantity);
   if (seconds >= 0.)
     SbAppend(sizeof(text), text, "%*s %9.3f %5.1f %%", 42 - (int)strlen(text), "", (double)seconds,
              (double)(100. * seconds / PetscMax(s->total, 1e-9)));
@@ -264,7 +311,8 @@ static PetscErrorCode print_line(SbLedger l, const Seconds *s, const char *name,
 PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
 {
   static const char *const notes[SB_ERROR_COUNT] = {
-    "residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""};
+    "residual, tangent", "steps",           "iterations after the first",
+    "linear solves",     "contact, search", ""};
   static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
   Seconds s;
   PetscMPIInt rank;
@@ -276,16 +324,18 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   const PetscReal *q;
 
   PetscFunctionBeginUser;
-  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l)
+    PetscFunctionReturn(PETSC_SUCCESS);
   m = l->run->model;
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   PetscCall(find_seconds(l, &s));
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
-  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rank)
+    PetscFunctionReturn(PETSC_SUCCESS);
   f = fopen(file, "w");
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot open %s for writing", file);
-  PetscCall(
-    PetscFPrintf(PETSC_COMM_SELF, f, "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f,
+                         "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
   for (int i = 0; i < SB_ERROR_COUNT; i++)
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", SbErrorNames[i],
                            (double)SbLedgerError(l, i), (double)(scale * SbLedgerError(l, i)),
@@ -297,13 +347,14 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, f,
                          "together,,%.17g,%.17g,,%.17g\nset-up,,,,,%.17g\noutput,,,,,%.17g\n"
                          "estimates,,,,,%.17g\n",
-                         (double)together(l), (double)(scale * together(l)), (double)s.total, (double)s.setup,
-                         (double)s.output, (double)s.estimates));
+                         (double)together(l), (double)(scale * together(l)), (double)s.total,
+                         (double)s.setup, (double)s.output, (double)s.estimates));
   PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot write %s", file);
-  if (quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  if (quiet)
+    PetscFunctionReturn(PETSC_SUCCESS);
   q = l->quantity.kind ? l->quantity.error : NULL;
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n", "error",
-                        "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n",
+                        "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
                         (double)l->stored));
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
     PetscCall(print_line(l, &s, SbErrorNames[i], SbLedgerError(l, i), q ? &q[i] : NULL,

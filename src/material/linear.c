@@ -1,7 +1,9 @@
 /*
-  Linear: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
+  Linear: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2
+  tr(eps)^2.
 
-  For small strains and small rotations only: a rotation by t has a strain cos(t) - 1. Constant tangent.
+  For small strains and small rotations only: a rotation by t has a strain cos(t) - 1. Constant
+  tangent.
 */
 #include "material_impl.h"
 
@@ -16,9 +18,11 @@ SB_INLINE void strain(const SbPack F[9], int l, PetscReal e[9])
   e[8] -= 1;
 }
 
-SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
+SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack psi)
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
@@ -32,20 +36,24 @@ SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack P[restrict 9])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
 
     strain(F, l, e);
     const PetscReal p = lambda * (e[0] + e[4] + e[8]);
-    for (int k = 0; k < 9; k++) P[k][l] = 2 * mu * e[k] + (k % 4 == 0 ? p : 0);
+    for (int k = 0; k < 9; k++)
+      P[k][l] = 2 * mu * e[k] + (k % 4 == 0 ? p : 0);
   }
 }
 
-SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
+SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                      SbPack p)
 {
-  for (int l = 0; l < SB_BATCH; l++) p[l] = -m->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
+  for (int l = 0; l < SB_BATCH; l++)
+    p[l] = -m->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
 }
 
 static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
@@ -53,7 +61,8 @@ static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPac
   (void)m;
   (void)F;
   for (int k = 0; k < 9; k++)
-    for (int l = 0; l < SB_BATCH; l++) R[k][l] = k % 4 == 0;
+    for (int l = 0; l < SB_BATCH; l++)
+      R[k][l] = k % 4 == 0;
 }
 
 static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
@@ -62,9 +71,11 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
   for (int i = 0; i < 9; i++) {
     for (int k = 0; k < 9; k++) {
       const int turned = 3 * (k % 3) + k / 3;
-      const PetscReal c = m->mu * ((i == k) + (i == turned)) + m->lambda * (i % 4 == 0 && k % 4 == 0);
+      const PetscReal c =
+        m->mu * ((i == k) + (i == turned)) + m->lambda * (i % 4 == 0 && k % 4 == 0);
 
-      for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] = c;
+      for (int l = 0; l < SB_BATCH; l++)
+        C[9 * i + k][l] = c;
     }
   }
 }

@@ -18,10 +18,12 @@ static const SbOption body_rows[] = {
 /* of laws with and without a warped tangent */
 static const SbOption tangents[] = {
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
-   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive definite); "
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive "
+   "definite); "
    "exact; exact_spd, exact with each cell projected to positive semi-definite"},
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
-   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, for CG"},
+   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, "
+   "for CG"},
 };
 
 static PetscErrorCode destroy_list(void)
@@ -31,13 +33,17 @@ static PetscErrorCode destroy_list(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial), const SbOption *tangent)
+PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial),
+                                  const SbOption *tangent)
 {
   PetscFunctionBeginUser;
-  if (!SbMaterialList) PetscCall(PetscRegisterFinalize(destroy_list));
+  if (!SbMaterialList)
+    PetscCall(PetscRegisterFinalize(destroy_list));
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
-  if (tangent) PetscCall(SbOptionsRegister("body", law, 1, tangent));
-  if (tangent) PetscCall(SbOptionsRegister("inclusion", law, 1, tangent));
+  if (tangent)
+    PetscCall(SbOptionsRegister("body", law, 1, tangent));
+  if (tangent)
+    PetscCall(SbOptionsRegister("inclusion", law, 1, tangent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,8 +59,8 @@ PetscErrorCode SbMaterialRegisterAll(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
-                                       SbMaterial *material)
+PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
+                                       PetscReal density, SbMaterial *material)
 {
   void (*create)(SbMaterial) = NULL;
   SbMaterial m;
@@ -104,7 +110,8 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 PetscErrorCode SbMaterialDestroy(SbMaterial *m)
 {
   PetscFunctionBeginUser;
-  if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*m)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,15 +136,18 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
   PetscCheck(kind != SB_TANGENT_WARPED || m->ops.spin, PETSC_COMM_SELF, PETSC_ERR_USER,
              "material law %s has no warped tangent: choose exact or exact_spd", m->law);
   m->tangent = kind;
-  if (m->ops.spin) m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.volumetric : NULL;
-  if (m->shear) PetscCall(SbMaterialSetTangent(m->shear, kind));
+  if (m->ops.spin)
+    m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.volumetric : NULL;
+  if (m->shear)
+    PetscCall(SbMaterialSetTangent(m->shear, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                        const SbPack H[restrict 9], SbPack dP[restrict 9])
 {
-  const PetscReal lambda = m->lambda, mu = m->mu;
+  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->mu;
   SbPack R[9];
 
   SbMaterialRotation(m, F, R);
@@ -149,6 +159,7 @@ SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPa
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);
     const PetscReal p = lambda * (b[0] + b[4] + b[8]);
-    for (int k = 0; k < 9; k++) dP[k][l] = mu * (h[k] + t[k]) + p * r[k];
+    for (int k = 0; k < 9; k++)
+      dP[k][l] = mu * (h[k] + t[k]) + p * r[k];
   }
 }

@@ -10,7 +10,8 @@ void SbMaterialCreate_StVK(SbMaterial m);
 void SbMaterialCreate_NeoHookean(SbMaterial m);
 
 /* r = R of a lane, S = sym(R^T F) as 00 01 02 11 12 22. */
-SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, PetscReal r[9], SbPack S[6])
+SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, PetscReal r[9],
+                               SbPack S[6])
 {
   PetscReal f[9], s[9];
 
@@ -26,18 +27,22 @@ SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, Pets
 }
 
 /*
-  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), negative eigenvalues set to zero.
+  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), negative eigenvalues set
+  to zero.
 
   Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;
     flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;
-    twist[k] = (psi_i + psi_j) / (s_i + s_j), eigenvalue of the rotation about axis k; psi_i = d psi / d s_i.
+    twist[k] = (psi_i + psi_j) / (s_i + s_j), eigenvalue of the rotation about axis k; psi_i = d psi
+    / d s_i.
 */
-void SbSpectralTangent(const SbPack U[9], const SbPack V[9], const SbPack hessian[6], const SbPack flip[3],
-                       const SbPack twist[3], SbPack C[81]);
+void SbSpectralTangent(const SbPack U[9], const SbPack V[9], const SbPack hessian[6],
+                       const SbPack flip[3], const SbPack twist[3], SbPack C[81]);
 
 /* C_(ij)(kl) = C_(kl)(ij) = c */
 SB_INLINE void SbTangentPut(const SbPack c, int ij, int kl, SbPack C[81])
 {
-  for (int l = 0; l < SB_BATCH; l++) C[9 * ij + kl][l] = c[l];
-  for (int l = 0; l < SB_BATCH; l++) C[9 * kl + ij][l] = c[l];
+  for (int l = 0; l < SB_BATCH; l++)
+    C[9 * ij + kl][l] = c[l];
+  for (int l = 0; l < SB_BATCH; l++)
+    C[9 * kl + ij][l] = c[l];
 }

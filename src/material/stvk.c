@@ -1,10 +1,13 @@
 /*
-  St. Venant-Kirchhoff: E = (F^T F - I)/2, psi = mu E : E + lambda/2 tr(E)^2, P = F (2 mu E + lambda tr(E) I).
+  St. Venant-Kirchhoff: E = (F^T F - I)/2, psi = mu E : E + lambda/2 tr(E)^2, P = F (2 mu E + lambda
+  tr(E) I).
 
-  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl, with
-  S = 2 mu E + lambda tr(E) I. In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)), for exact_spd.
+  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl,
+  with S = 2 mu E + lambda tr(E) I. In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)),
+  for exact_spd.
 
-  The law softens in compression and does not resist inversion (P = 0 at s = 0): for moderate strains only.
+  The law softens in compression and does not resist inversion (P = 0 at s = 0): for moderate
+  strains only.
 */
 #include "material_impl.h"
 
@@ -13,12 +16,15 @@ SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal 
 {
   SbPackGet(9, F, l, f);
   SbMatTransposeMul(f, f, e);
-  for (int k = 0; k < 9; k++) e[k] = (e[k] - (k % 4 == 0)) / 2;
+  for (int k = 0; k < 9; k++)
+    e[k] = (e[k] - (k % 4 == 0)) / 2;
 }
 
-SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
+SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                  SbPack psi)
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -32,20 +38,23 @@ SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack P[restrict 9])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9], p[9];
 
     green_strain(F, l, f, e);
     const PetscReal pressure = lambda * (e[0] + e[4] + e[8]);
-    for (int k = 0; k < 9; k++) e[k] = 2 * mu * e[k] + (k % 4 == 0 ? pressure : 0);
+    for (int k = 0; k < 9; k++)
+      e[k] = 2 * mu * e[k] + (k % 4 == 0 ? pressure : 0);
     SbMatMul(f, e, p);
     SbPackPut(9, p, l, P);
   }
 }
 
-SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
+SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack p)
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -58,12 +67,16 @@ SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
-    const PetscReal a = s[0][l], b = s[1][l], c = s[2][l], p = lambda * (a * a + b * b + c * c - 3) / 2 - mu;
+    const PetscReal a = s[0][l];
+    const PetscReal b = s[1][l];
+    const PetscReal c = s[2][l];
+    const PetscReal p = lambda * (a * a + b * b + c * c - 3) / 2 - mu;
 
     hessian[0][l] = p + (lambda + 3 * mu) * a * a;
     hessian[1][l] = lambda * a * b;
@@ -84,7 +97,8 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                    SbPack C[restrict 81])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->lambda;
   SbPack S[9], B[9]; /* B = mu F F^T */
 
   if (m->tangent == SB_TANGENT_EXACT_SPD) {
@@ -104,8 +118,12 @@ SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F
   }
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = ij; kl < 9; kl++) {
-      const int i = ij / 3, j = ij % 3, k = kl / 3, n = kl % 3;
-      const PetscReal same_row = i == k, same_column = j == n;
+      const int i = ij / 3;
+      const int j = ij % 3;
+      const int k = kl / 3;
+      const int n = kl % 3;
+      const PetscReal same_row = i == k;
+      const PetscReal same_column = j == n;
       SbPack c;
 
       for (int l = 0; l < SB_BATCH; l++) {
@@ -125,13 +143,15 @@ static void volumetric_stvk(const struct _p_SbMaterial *m, const SbPack F[9], Sb
 }
 
 /* d^2 theta/dF^2 is the identity. */
-static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p, SbPack C[81])
+static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                           SbPack C[81])
 {
   const PetscBool filter = (PetscBool)(m->tangent == SB_TANGENT_EXACT_SPD);
 
   (void)F;
   for (int k = 0; k < 9; k++)
-    for (int l = 0; l < SB_BATCH; l++) C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
+    for (int l = 0; l < SB_BATCH; l++)
+      C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
 }
 
 void SbMaterialCreate_StVK(SbMaterial m)

@@ -1,14 +1,14 @@
 /*
   check.c - validity checks of a body's mesh, before anything is computed on it.
 
-  Repaired and counted: unused vertices are removed; tets with negative orientation have two vertices swapped.
-  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the
-  stiffness matrix wrong. Counted: group triangles that are not a face of any tet; surface edges with more
-  than two facets, which connect parts of the body like hinges.
+  Repaired and counted: unused vertices are removed; tets with negative orientation have two
+  vertices swapped. Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would
+  make the mass or the stiffness matrix wrong. Counted: group triangles that are not a face of any
+  tet; surface edges with more than two facets, which connect parts of the body like hinges.
 
-  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its
-  coordinates: |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders
-  above the first term.
+  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of
+  its coordinates: |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are
+  nine orders above the first term.
 */
 #include "mesh_impl.h"
 
@@ -19,7 +19,8 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(im->nvert, &keep));
-  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++)
+    keep[im->item[3].vert[i]] = 1;
   SbImportDropVertices(im, keep);
   im->nunused = before - im->nvert;
   PetscCall(PetscFree(keep));
@@ -37,7 +38,8 @@ static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 
 PetscBool SbTetFlat(const PetscReal x[], const PetscInt v[4], PetscReal largest, PetscReal *det)
 {
-  const PetscReal L2 = longest_edge2(x, v), L = PetscSqrtReal(L2);
+  const PetscReal L2 = longest_edge2(x, v);
+  const PetscReal L = PetscSqrtReal(L2);
 
   *det = SbTetDeterminant(x, v);
   return (PetscBool) !(PetscAbsReal(*det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2);
@@ -47,7 +49,8 @@ PetscReal SbImportLargest(const SbImport *im)
 {
   PetscReal largest = 0;
 
-  for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
+  for (PetscInt i = 0; i < 3 * im->nvert; i++)
+    largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   return largest;
 }
 
@@ -76,6 +79,7 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
   PetscReal det;
 
   PetscFunctionBeginUser;
+
   // swap two vertices of inverted tets; a flat tet is an error
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscInt *v = im->item[3].vert + 4 * c;
@@ -85,11 +89,12 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
       for (int i = 0; i < 4; i++) {
         for (int j = 0; j < i; j++)
           PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                     "%s: tetrahedron %lld uses node %lld twice; remove it", im->where, (long long)number[c],
-                     (long long)im->vert_number[v[i]]);
+                     "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
+                     (long long)number[c], (long long)im->vert_number[v[i]]);
       }
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-              "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
+              "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the "
+              "mesh (gmsh: "
               "Mesh.Optimize = 1)",
               im->where, (long long)number[c], (double)PetscAbsReal(det) / 6,
               (double)PetscSqrtReal(longest_edge2(im->x, v)));
@@ -103,7 +108,9 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
     }
   }
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
-  /* cells with equal vertices share all four faces; with a third cell at one of them it is a face of three */
+
+  /* cells with equal vertices share all four faces; with a third cell at one of them it is a face
+     of three */
   if (faces->nshared) {
     const PetscInt *s = faces->shared;
 
@@ -117,8 +124,8 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
       if (!memcmp(vert[0], vert[1], sizeof(vert[0])))
         PetscCall(SbImportTwice(im, number[s[i]], number[s[(i + 1) % 3]]));
     }
-    PetscCall(
-      SbImportOverlap(im, (const int64_t[3]){number[s[0]], number[s[1]], number[s[2]]}, faces->nshared));
+    PetscCall(SbImportOverlap(im, (const int64_t[3]){number[s[0]], number[s[1]], number[s[2]]},
+                              faces->nshared));
   }
   for (PetscInt c = 0; c < faces->ncell; c++) {
     const PetscInt *n = faces->neighbour + 4 * c;
@@ -129,13 +136,15 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbBoundaryEdges(const SbImport *im, const SbFaces *faces, const PetscInt number[], PetscInt64 edge[])
+void SbBoundaryEdges(const SbImport *im, const SbFaces *faces, const PetscInt number[],
+                     PetscInt64 edge[])
 {
   for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
     const PetscInt *v = im->item[3].vert + 4 * (s / 4);
 
     for (int i = 0; faces->neighbour[s] < 0 && i < 3; i++) {
-      const PetscInt a = v[SbFaceVertex[s % 4][i]], b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
+      const PetscInt a = v[SbFaceVertex[s % 4][i]];
+      const PetscInt b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
 
       *edge++ = (PetscInt64)SbKeyOfPair(number ? number[a] : a, number ? number[b] : b);
     }
@@ -147,7 +156,8 @@ PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched)
   PetscFunctionBeginUser;
   PetscCall(PetscSortInt64(n, edge));
   for (PetscInt i = 0, m; i < n; i += m) {
-    for (m = 1; i + m < n && edge[i + m] == edge[i];) m++;
+    for (m = 1; i + m < n && edge[i + m] == edge[i];)
+      m++;
     *npinched += m > 2;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -161,9 +171,11 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
   PetscFunctionBeginUser;
   PetscCall(SbImportDropUnused(im));
   PetscCall(SbImportCheckCells(im, SbImportLargest(im), faces));
+
   // group triangles that are not a face of any tet
   for (PetscInt t = 0; t < im->item[2].n; t++)
     im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
+
   // on a closed surface each edge has two facets
   PetscCall(PetscMalloc1(3 * faces->nboundary, &edge));
   SbBoundaryEdges(im, faces, NULL, edge);

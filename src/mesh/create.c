@@ -1,30 +1,35 @@
-/* create.c - the mesh of a scenario, from the mesh files to the numbered local meshes of all ranks. */
+/* create.c - the mesh of a scenario, from the mesh files to the numbered local meshes of all
+   ranks. */
 #include "mesh_impl.h"
 #include "sbsurface.h"
 #include "sblog.h"
 
 const SbOption SbMeshRows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
-   "how the mesh is partitioned: METIS (small interfaces between ranks; computed on rank 0), recursive "
+   "how the mesh is partitioned: METIS (small interfaces between ranks; computed on rank 0), "
+   "recursive "
    "bisection (in parallel), auto: METIS up to 50,000 tets"},
   {"mesh_reading", SB_OPTION_CHOICE, 1, "", "auto", "auto|rank0|slabs",
-   "how several ranks read an .h5 mesh of supple-mesh: rank0, rank 0 reads it whole; slabs, every rank reads "
-   "a contiguous part of the arrays, so that memory per rank falls with the number of ranks; auto: slabs "
+   "how several ranks read an .h5 mesh of supple-mesh: rank0, rank 0 reads it whole; slabs, every "
+   "rank reads "
+   "a contiguous part of the arrays, so that memory per rank falls with the number of ranks; auto: "
+   "slabs "
    "from 50,000 tets on. Other meshes are read by rank 0"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
   {0},
 };
 
-PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
-                            SbMesh *mesh)
+PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset,
+                            SbSet set[], SbMesh *mesh)
 {
   SbMesh m;
   SbMergedMesh merged;
   SbLocalMesh local;
   SbReading reading;
   int partitioner;
-  PetscBool full, all = PETSC_FALSE;
+  PetscBool full;
+  PetscBool all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
@@ -35,28 +40,33 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  // repairs and warnings are always reported, once for copies of the same mesh; the statistics on request
+
+  // repairs and warnings are always reported, once for copies of the same mesh; the statistics on
+  // request
   for (PetscInt b = 0; b < nbody; b++) {
     const SbBody *p = &body[b];
-    const PetscBool again = (PetscBool)(b && p->copy_of[0] && !strcmp(p[-1].copy_of, p->copy_of) &&
-                                        !strcmp(p[-1].mesh, p->mesh) && !strcmp(p[-1].note, p->note));
+    const PetscBool again =
+      (PetscBool)(b && p->copy_of[0] && !strcmp(p[-1].copy_of, p->copy_of) &&
+                  !strcmp(p[-1].mesh, p->mesh) && !strcmp(p[-1].note, p->note));
 
     if (full)
-      PetscCall(PetscPrintf(comm,
-                            "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
-                            " boundary facets, volume %.6g m^3, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
-                            "%.4g) m, smallest dihedral angle %.3g degrees, largest radius ratio %.3g%s%s\n",
-                            p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
-                            (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
-                            (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
-                            p->note[0] ? "; " : "", p->note));
+      PetscCall(PetscPrintf(
+        comm,
+        "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
+        " boundary facets, volume %.6g m^3, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
+        "%.4g) m, smallest dihedral angle %.3g degrees, largest radius ratio %.3g%s%s\n",
+        p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
+        (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
+        (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
+        p->note[0] ? "; " : "", p->note));
     else if (p->note[0] && !p->in_memory && !again)
       PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
   }
   PetscCall(PetscNew(&m));
   *m = (struct _p_SbMesh){.comm = comm, .nbody = nbody, .body = body, .nset = nset, .set = set};
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
-  for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
+  for (PetscInt b = 0; b < nbody; b++)
+    all = (PetscBool)(all || body[b].other_nodes);
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
   PetscCall(SbMeshCurve(m, merged.ncurved, merged.curved, merged.edge_off));
@@ -71,11 +81,13 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   SbMesh m = *mesh;
 
   PetscFunctionBeginUser;
-  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscSFDestroy(&m->cell_sf));
   PetscCall(PetscSFDestroy(&m->vert_sf));
   PetscCall(PetscFree5(m->gvert, m->vert_orig, m->vert_body, m->vert_set, m->x));
-  PetscCall(PetscFree6(m->cell, m->cell_orig, m->cell_body, m->cell_material, m->cell_set, m->face_set));
+  PetscCall(
+    PetscFree6(m->cell, m->cell_orig, m->cell_body, m->cell_material, m->cell_set, m->face_set));
   PetscCall(PetscFree(m->edge_off));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,13 +1,14 @@
 /*
-  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of
-  cells of other ranks (ghosts).
+  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and
+  copies of cells of other ranks (ghosts).
 
-  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs
-  it. A distributed directory tells which ranks have a vertex: rank r keeps the r-th block of original vertex
-  numbers. Vertices that are shared by the same set of ranks are sorted along the longest axis of their
-  bounding box and divided among these ranks in equal contiguous parts: all of them compute the same owners,
-  the load is balanced, and the parts are compact, so that there are few ghosts. Then each rank sends copies
-  of its cells to the owners of their vertices.
+  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank
+  that needs it. A distributed directory tells which ranks have a vertex: rank r keeps the r-th
+  block of original vertex numbers. Vertices that are shared by the same set of ranks are sorted
+  along the longest axis of their bounding box and divided among these ranks in equal contiguous
+  parts: all of them compute the same owners, the load is balanced, and the parts are compact, so
+  that there are few ghosts. Then each rank sends copies of its cells to the owners of their
+  vertices.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
@@ -35,14 +36,19 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
 
   PetscFunctionBeginUser;
   *to = (SbLocalMesh){0};
-  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell are there
+
+  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell
+  // are there
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
-  PetscCall(
-    PetscCalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
-  for (PetscInt i = 0; i < route->nsend; i++) order[route->position[i]] = i;
-  for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
+  PetscCall(PetscCalloc4(route->nsend, &order, from->nvert, &position, route->size, &count,
+                         from->nvert, &mark));
+  for (PetscInt i = 0; i < route->nsend; i++)
+    order[route->position[i]] = i;
+  for (PetscInt v = 0; v < from->nvert; v++)
+    mark[v] = -1;
   for (PetscInt k = 0; k < route->nsend; k++) {
-    const PetscInt i = order[k], *v = from->cell + 4 * (size_t)(which ? which[i] : i);
+    const PetscInt i = order[k];
+    const PetscInt *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
     for (int a = 0; a < 4; a++) {
       if (mark[v[a]] != dest[i]) {
@@ -64,12 +70,14 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
       to->cell[i] += vertices.rfirst[r];
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list.item, from->vertex, &to->vertex));
-  if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list.item, from->owner, &to->owner));
+  if (owned)
+    PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list.item, from->owner, &to->owner));
   PetscCall(SbRouteDestroy(&vertices));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Original numbers with which n records begin, and the permutation that sorts these in ascending order. */
+/* Original numbers with which n records begin, and the permutation that sorts these in ascending
+   order. */
 static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, PetscInt number[],
                                 PetscInt order[])
 {
@@ -95,21 +103,26 @@ typedef struct {
 } Border;
 
 /* Shared vertices of this rank with the ranks that have them, from the directory. */
-static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
+static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local,
+                                    Border *border)
 {
   const PetscInt n = local->nvert;
   const PetscSFNode *home;
-  PetscInt nroot = PETSC_DECIDE, nlist = 0, *orig, *start, *begin, *end;
+  PetscInt nroot = PETSC_DECIDE;
+  PetscInt nlist = 0;
+  PetscInt *orig, *start, *begin, *end;
   PetscMPIInt *holder;
   PetscSFNode *list;
   PetscSF forest, lists;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc3(n, &orig, n, &begin, n, &end));
-  for (PetscInt v = 0; v < n; v++) orig[v] = local->vertex[v].orig;
+  for (PetscInt v = 0; v < n; v++)
+    orig[v] = local->vertex[v].orig;
   PetscCall(PetscSplitOwnership(comm, &nroot, &Nvert));
   PetscCall(SbForestCreate(comm, nroot, n, orig, &forest));
   PetscCall(SbForestRanks(forest, &start, &holder));
+
   /* each of the ranks that have a vertex gets the whole list of them */
   PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, start, begin));
   PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, start + 1, end));
@@ -123,12 +136,15 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(PetscSFGetGraph(forest, NULL, NULL, NULL, &home));
   border->n = nlist = 0;
   for (PetscInt v = 0; v < n; v++) {
-    if (end[v] == begin[v] + 1) continue;
+    if (end[v] == begin[v] + 1)
+      continue;
     border->vert[border->n++] = (Shared){v, orig[v], end[v] - begin[v], border->rank + nlist, 0};
-    for (PetscInt k = begin[v]; k < end[v]; k++) list[nlist++] = (PetscSFNode){home[v].rank, k};
+    for (PetscInt k = begin[v]; k < end[v]; k++)
+      list[nlist++] = (PetscSFNode){home[v].rank, k};
   }
   PetscCall(PetscSFCreate(comm, &lists));
-  PetscCall(PetscSFSetGraph(lists, start[nroot], nlist, NULL, PETSC_COPY_VALUES, list, PETSC_OWN_POINTER));
+  PetscCall(
+    PetscSFSetGraph(lists, start[nroot], nlist, NULL, PETSC_COPY_VALUES, list, PETSC_OWN_POINTER));
   PetscCall(SbForestBroadcast(lists, 1, MPI_INT, holder, border->rank));
   PetscCall(PetscSFDestroy(&lists));
   PetscCall(PetscSFDestroy(&forest));
@@ -140,21 +156,27 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
 
 static int compare_ranks(const void *a, const void *b)
 {
-  const Shared *p = (const Shared *)a, *q = (const Shared *)b;
+  const Shared *p = (const Shared *)a;
+  const Shared *q = (const Shared *)b;
 
-  if (p->n != q->n) return p->n < q->n ? -1 : 1;
+  if (p->n != q->n)
+    return p->n < q->n ? -1 : 1;
   for (PetscInt i = 0; i < p->n; i++)
-    if (p->rank[i] != q->rank[i]) return p->rank[i] < q->rank[i] ? -1 : 1;
+    if (p->rank[i] != q->rank[i])
+      return p->rank[i] < q->rank[i] ? -1 : 1;
   return 0;
 }
 
 static int compare_shared(const void *a, const void *b)
 {
-  const Shared *p = (const Shared *)a, *q = (const Shared *)b;
+  const Shared *p = (const Shared *)a;
+  const Shared *q = (const Shared *)b;
   const int ranks = compare_ranks(a, b);
 
-  if (ranks) return ranks;
-  if (p->along != q->along) return p->along < q->along ? -1 : 1;
+  if (ranks)
+    return ranks;
+  if (p->along != q->along)
+    return p->along < q->along ? -1 : 1;
   return (p->orig > q->orig) - (p->orig < q->orig);
 }
 
@@ -165,12 +187,17 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscInt *shared, *mark;
 
   PetscFunctionBeginUser;
+
   // position of each vertex in border->vert, -1: not shared
   PetscCall(PetscMalloc2(local->nvert, &shared, size, &mark));
-  for (PetscInt v = 0; v < local->nvert; v++) shared[v] = -1;
-  for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
+  for (PetscInt v = 0; v < local->nvert; v++)
+    shared[v] = -1;
+  for (PetscInt i = 0; i < border->n; i++)
+    shared[border->vert[i].vert] = i;
+
   // a cell goes once to each rank that owns one of its vertices (`all`: that has one)
-  for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
+  for (PetscMPIInt r = 0; r < size; r++)
+    mark[r] = -1;
   for (PetscInt c = 0; c < local->ncell_owned; c++) {
     mark[me] = c;
     for (int a = 0; a < 4; a++) {
@@ -180,7 +207,8 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
       for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
         const PetscMPIInt r = all ? s->rank[k] : local->owner[v];
 
-        if (mark[r] != c) PetscCall(SbRouteAdd(list, c, r));
+        if (mark[r] != c)
+          PetscCall(SbRouteAdd(list, c, r));
         mark[r] = c;
       }
     }
@@ -194,7 +222,9 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
 {
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
-  PetscInt *orig, *number, *order, *position, n = 0, nvert;
+  PetscInt *orig, *number, *order, *position;
+  PetscInt n = 0;
+  PetscInt nvert;
   SbRouteList copies = {0};
   SbRoute route;
   SbLocalMesh owned, ghost;
@@ -205,6 +235,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   whole.ncell = whole.ncell_owned = w->ncell;
   whole.nvert = w->nvert;
+
   // partition the mesh, and take over its arrays, on one rank without a copy
   PetscCall(PetscMalloc1(w->ncell, &dest));
   PetscCall(SbPartition(comm, type, w, dest));
@@ -218,19 +249,23 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(PetscCalloc1(local->nvert, &local->owner));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   // each cell goes to its owner
   PetscCall(SbRouteCreate(comm, w->ncell, NULL, dest, &route));
   PetscCall(send_cells(&whole, PETSC_FALSE, &route, &owned));
   PetscCall(SbRouteDestroy(&route));
   PetscCall(SbLocalMeshDestroy(&whole));
-  // sort owned cells and their vertices by original number; a vertex may have come from several ranks
+
+  // sort owned cells and their vertices by original number; a vertex may have come from several
+  // ranks
   *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
-  PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
-                         &order, owned.nvert, &position));
+  PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number,
+                         PetscMax(owned.nvert, owned.ncell), &order, owned.nvert, &position));
   PetscCall(ascending(owned.nvert, sizeof(*owned.vertex), owned.vertex, number, order));
   PetscCall(PetscMalloc1(owned.nvert, &local->vertex));
   for (PetscInt i = 0; i < owned.nvert; i++) {
-    if (!n || local->vertex[n - 1].orig != number[order[i]]) local->vertex[n++] = owned.vertex[order[i]];
+    if (!n || local->vertex[n - 1].orig != number[order[i]])
+      local->vertex[n++] = owned.vertex[order[i]];
     position[order[i]] = n - 1;
   }
   local->nvert = nvert = n;
@@ -245,34 +280,45 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   }
   PetscCall(PetscFree3(number, order, position));
   PetscCall(SbLocalMeshDestroy(&owned));
+
   // owners of the shared vertices
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
   PetscCall(border_create(comm, w->Nvert, local, &border));
+
   // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
-  for (PetscInt v = 0; v < local->nvert; v++) local->owner[v] = rank;
-  if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
+  for (PetscInt v = 0; v < local->nvert; v++)
+    local->owner[v] = rank;
+  if (border.n)
+    qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
   for (PetscInt i = 0; i < border.n; i += n) {
     Shared *s = border.vert + i;
     PetscReal box[6];
     int axis;
 
-    for (n = 1; i + n < border.n && !compare_ranks(s, s + n);) n++;
+    for (n = 1; i + n < border.n && !compare_ranks(s, s + n);)
+      n++;
     SbBoxClear(box);
-    for (PetscInt k = 0; k < n; k++) SbBoxAdd(box, local->vertex[s[k].vert].x);
+    for (PetscInt k = 0; k < n; k++)
+      SbBoxAdd(box, local->vertex[s[k].vert].x);
     axis = SbBoxLongest(box);
-    for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
+    for (PetscInt k = 0; k < n; k++)
+      s[k].along = local->vertex[s[k].vert].x[axis];
     qsort(s, (size_t)n, sizeof(Shared), compare_shared);
-    for (PetscInt k = 0; k < n; k++) local->owner[s[k].vert] = s[k].rank[(PetscInt64)k * s[k].n / n];
+    for (PetscInt k = 0; k < n; k++)
+      local->owner[s[k].vert] = s[k].rank[(PetscInt64)k * s[k].n / n];
   }
   PetscCall(list_copies(local, &border, all, rank, size, &copies));
   PetscCall(PetscFree2(border.vert, border.rank));
   PetscCall(SbRouteCreate(comm, copies.n, copies.item, copies.rank, &route));
   PetscCall(send_cells(local, PETSC_TRUE, &route, &ghost));
   PetscCall(SbRouteDestroy(&route));
+
   // append the ghost cells, and those of their vertices that this rank does not have
   n = nvert;
-  PetscCall(PetscMalloc4(nvert, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert, &position));
-  for (PetscInt v = 0; v < nvert; v++) orig[v] = local->vertex[v].orig;
+  PetscCall(
+    PetscMalloc4(nvert, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert, &position));
+  for (PetscInt v = 0; v < nvert; v++)
+    orig[v] = local->vertex[v].orig;
   PetscCall(ascending(ghost.nvert, sizeof(*ghost.vertex), ghost.vertex, number, order));
   PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
   PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
@@ -280,7 +326,8 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     const PetscInt v = order[i];
 
     PetscCall(PetscFindInt(number[v], nvert, orig, &position[v]));
-    if (position[v] >= 0) continue;
+    if (position[v] >= 0)
+      continue;
     if (n == nvert || local->vertex[n - 1].orig != number[v]) {
       local->vertex[n] = ghost.vertex[v];
       local->owner[n++] = ghost.owner[v];
@@ -293,7 +340,8 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
   PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
   PetscCall(PetscArraycpy(local->data + n, ghost.data, ghost.ncell));
-  for (PetscInt i = 0; i < 4 * ghost.ncell; i++) local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
+  for (PetscInt i = 0; i < 4 * ghost.ncell; i++)
+    local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
   PetscCall(PetscFree4(orig, number, order, position));
   PetscCall(SbLocalMeshDestroy(&ghost));
   PetscFunctionReturn(PETSC_SUCCESS);

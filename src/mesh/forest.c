@@ -26,14 +26,17 @@ PetscErrorCode SbForestRanks(PetscSF forest, PetscInt **start, PetscMPIInt **use
   PetscCall(PetscSFComputeDegreeBegin(forest, &degree));
   PetscCall(PetscSFComputeDegreeEnd(forest, &degree));
   PetscCall(PetscCalloc1(nroot + 1, start));
-  for (PetscInt v = 0; v < nroot; v++) (*start)[v + 1] = (*start)[v] + degree[v];
+  for (PetscInt v = 0; v < nroot; v++)
+    (*start)[v + 1] = (*start)[v] + degree[v];
   PetscCall(PetscMalloc1((*start)[nroot], user));
   PetscCall(PetscMalloc1(nleaf, &mine));
-  for (PetscInt i = 0; i < nleaf; i++) mine[i] = rank;
+  for (PetscInt i = 0; i < nleaf; i++)
+    mine[i] = rank;
   PetscCall(PetscSFGatherBegin(forest, MPI_INT, mine, *user));
   PetscCall(PetscSFGatherEnd(forest, MPI_INT, mine, *user));
   PetscCall(PetscFree(mine));
-  for (PetscInt v = 0; v < nroot; v++) PetscCall(PetscSortMPIInt(degree[v], *user + (*start)[v]));
+  for (PetscInt v = 0; v < nroot; v++)
+    PetscCall(PetscSortMPIInt(degree[v], *user + (*start)[v]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -49,7 +52,8 @@ static PetscErrorCode create_type(PetscInt n, MPI_Datatype one, MPI_Datatype *ty
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbForestReduce(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf, void *root)
+PetscErrorCode SbForestReduce(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf,
+                              void *root)
 {
   MPI_Datatype type;
 
@@ -61,7 +65,8 @@ PetscErrorCode SbForestReduce(PetscSF sf, PetscInt n, MPI_Datatype one, const vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbForestBroadcast(PetscSF sf, PetscInt n, MPI_Datatype one, const void *root, void *leaf)
+PetscErrorCode SbForestBroadcast(PetscSF sf, PetscInt n, MPI_Datatype one, const void *root,
+                                 void *leaf)
 {
   MPI_Datatype type;
 

@@ -1,9 +1,10 @@
 /*
-  memory_mesh.c - import of a mesh in memory, which is on rank 0: after re-meshing, or from a checkpoint.
+  memory_mesh.c - import of a mesh in memory, which is on rank 0: after re-meshing, or from a
+  checkpoint.
 
-  Such a mesh has no groups: members of sets that are groups are stored as bits. Sets that are shapes are
-  evaluated again on the new mesh, except the tets of inclusions, which keep their material even where a new
-  tet crosses the shape.
+  Such a mesh has no groups: members of sets that are groups are stored as bits. Sets that are
+  shapes are evaluated again on the new mesh, except the tets of inclusions, which keep their
+  material even where a new tet crosses the shape.
 */
 #include "mesh_impl.h"
 
@@ -15,8 +16,8 @@ PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri,
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&g));
   *g = (SbMemoryMesh){.nvert = nvert, .ncell = ncell, .ntri = ntri, .nedge = nedge};
-  PetscCall(PetscCalloc6(3 * (size_t)nvert, &g->x, 4 * (size_t)ncell, &g->cell, 3 * (size_t)ntri, &g->tri,
-                         nvert, &g->vert_set, ntri, &g->tri_set, ncell, &g->cell_set));
+  PetscCall(PetscCalloc6(3 * (size_t)nvert, &g->x, 4 * (size_t)ncell, &g->cell, 3 * (size_t)ntri,
+                         &g->tri, nvert, &g->vert_set, ntri, &g->tri_set, ncell, &g->cell_set));
   PetscCall(PetscCalloc2(2 * (size_t)nedge, &g->edge, 3 * (size_t)nedge, &g->edge_off));
   *in_memory = g;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -27,7 +28,8 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
   SbMemoryMesh *g = *in_memory;
 
   PetscFunctionBeginUser;
-  if (!g) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!g)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree6(g->x, g->cell, g->tri, g->vert_set, g->tri_set, g->cell_set));
   PetscCall(PetscFree2(g->edge, g->edge_off));
   PetscCall(PetscFree(*in_memory));
@@ -39,10 +41,13 @@ PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory)
   SbMemoryMesh head = {.nvert = -1};
 
   PetscFunctionBeginUser;
-  if (*in_memory) head = **in_memory;
+  if (*in_memory)
+    head = **in_memory;
   PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
-  if (head.nvert < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!*in_memory) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, in_memory));
+  if (head.nvert < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*in_memory)
+    PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, in_memory));
   (*in_memory)->mass = head.mass;
   (*in_memory)->bound = head.bound;
   (*in_memory)->step = head.step;
@@ -80,12 +85,16 @@ void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *m)
   uint64_t inclusions = 0;
   PetscInt slots[2];
 
-  for (PetscInt k = 0; k < body->ninclusion; k++) inclusions |= SB_SET_BIT(body->inclusion[k].set);
-  for (PetscInt v = 0; v < g->nvert; v++) m->vert[v] |= g->vert_set[v];
-  for (PetscInt c = 0; c < g->ncell; c++) m->cell[c] = (m->cell[c] & ~inclusions) | g->cell_set[c];
+  for (PetscInt k = 0; k < body->ninclusion; k++)
+    inclusions |= SB_SET_BIT(body->inclusion[k].set);
+  for (PetscInt v = 0; v < g->nvert; v++)
+    m->vert[v] |= g->vert_set[v];
+  for (PetscInt c = 0; c < g->ncell; c++)
+    m->cell[c] = (m->cell[c] & ~inclusions) | g->cell_set[c];
   for (PetscInt t = 0; t < g->ntri; t++) {
     const PetscInt n = SbFacesFind(faces, g->tri + 3 * (size_t)t, slots);
 
-    for (PetscInt k = 0; k < n; k++) m->face[slots[k]] |= g->tri_set[t];
+    for (PetscInt k = 0; k < n; k++)
+      m->face[slots[k]] |= g->tri_set[t];
   }
 }

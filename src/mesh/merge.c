@@ -1,15 +1,16 @@
 /*
-  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers
-  bodies one after the other.
+  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets,
+  numbers bodies one after the other.
 
-  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab
-  (slab.c). An error on one rank is caught, sent to all ranks and raised by all of them, so that no rank waits
-  for one that has failed.
+  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one
+  slab (slab.c). An error on one rank is caught, sent to all ranks and raised by all of them, so
+  that no rank waits for one that has failed.
 
-  Peak memory of a run is reached while a mesh is read: arrays are freed before the next ones are allocated.
+  Peak memory of a run is reached while a mesh is read: arrays are freed before the next ones are
+  allocated.
 
-  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of
-  their files.
+  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the
+  order of their files.
 */
 #include "mesh_impl.h"
 
@@ -54,9 +55,11 @@ static PetscErrorCode merge(PetscInt nbody, SbImport im[], SbPart part[], SbMerg
     }
     PetscCall(PetscArraycpy(w->remote + q->remote0, q->remote, q->nremote));
     PetscCall(SbFacesDestroy(&q->faces));
-    for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im[b].item[d]));
+    for (int d = 0; d < 4; d++)
+      PetscCall(SbItemsFree(&im[b].item[d]));
     im[b].item[3].n = ncell; /* the count is used below */
-    for (PetscInt c = 0; c < ncell; c++) w->ncurved += q->masks.cell[c] & SB_CURVED ? 1 : 0;
+    for (PetscInt c = 0; c < ncell; c++)
+      w->ncurved += q->masks.cell[c] & SB_CURVED ? 1 : 0;
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
@@ -71,35 +74,39 @@ static PetscErrorCode merge(PetscInt nbody, SbImport im[], SbPart part[], SbMerg
 
       *p = (SbCellData){.orig = q->orig_cell + q->first + c, .body = b, .set = q->masks.cell[c]};
       PetscCall(PetscArraycpy(p->face, q->masks.face + 4 * c, 4));
-      if (p->set & SB_CURVED) w->curved[ncurved++] = p->orig;
+      if (p->set & SB_CURVED)
+        w->curved[ncurved++] = p->orig;
     }
-    PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)before, q->edge_off, 18 * (size_t)(ncurved - before)));
+    PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)before, q->edge_off,
+                            18 * (size_t)(ncurved - before)));
     PetscCall(PetscFree(part[b].edge_off));
     for (PetscInt v = 0; v < im[b].nvert; v++) {
       const PetscReal *x = im[b].x + 3 * v;
 
-      w->vertex[q->vert0 + v] =
-        (SbVertexData){q->orig_vert + (q->orig ? q->orig[v] : v), b, q->masks.vert[v], {x[0], x[1], x[2]}};
+      w->vertex[q->vert0 + v] = (SbVertexData){
+        q->orig_vert + (q->orig ? q->orig[v] : v), b, q->masks.vert[v], {x[0], x[1], x[2]}};
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbody, SbBody body[],
-                            PetscInt nset, SbSet set[], SbImport *shared, SbImport im[], SbPart part[],
-                            SbMergedMesh *w)
+                            PetscInt nset, SbSet set[], SbImport *shared, SbImport im[],
+                            SbPart part[], SbMergedMesh *w)
 {
   SbCaughtError caught = {0, ""};
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  for (PetscInt k = 0; k < nset; k++) set[k].nvert = set[k].nfacet = set[k].ncell = 0;
+  for (PetscInt k = 0; k < nset; k++)
+    set[k].nvert = set[k].nfacet = set[k].ncell = 0;
   for (PetscInt b = 0; b < nbody; b++) {
     if (slabs[b]) {
       PetscCall(SbSlabPrepare(comm, w->ncell, nbody, body, b, nset, set, &im[b], &part[b]));
     } else {
-      if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, shared, &im[b], &part[b]));
+      if (!rank)
+        SB_CATCH(&caught, prepare(nbody, body, b, nset, set, shared, &im[b], &part[b]));
       PetscCall(SbCaughtRaise(comm, &caught));
     }
     PetscCall(PetscFree2(part[b].faces.start, part[b].faces.face)); /* neighbours are known */
@@ -110,8 +117,10 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
     w->nvert += im[b].nvert;
     w->nremote += part[b].nremote;
   }
-  if (!rank) SB_CATCH(&caught, SbSetsCheck(nbody, body, im, nset, set));
+  if (!rank)
+    SB_CATCH(&caught, SbSetsCheck(nbody, body, im, nset, set));
   PetscCall(SbCaughtRaise(comm, &caught));
+
   // broadcast bodies and sets of rank 0; pointers to meshes in memory are local to each rank
   PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
   for (PetscInt b = 0; b < nbody; b++) {
@@ -119,9 +128,11 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
 
     PetscCallMPI(MPI_Bcast(&body[b], (int)sizeof(*body), MPI_BYTE, 0, comm));
     body[b].in_memory = own;
-    PetscCheck(w->Ncell <= PETSC_MAX_INT / 8 - body[b].ncell && w->Nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
+    PetscCheck(w->Ncell <= PETSC_MAX_INT / 8 - body[b].ncell &&
+                 w->Nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
                comm, PETSC_ERR_USER_INPUT,
-               "body '%s': all bodies together have more tets than this build can number", body[b].name);
+               "body '%s': all bodies together have more tets than this build can number",
+               body[b].name);
     part[b].orig_vert = w->Nvert;
     part[b].orig_cell = w->Ncell;
     w->Nvert += body[b].nvert;
@@ -134,7 +145,8 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *w)
 {
-  SbImport *im, shared = {0};
+  SbImport *im;
+  SbImport shared = {0};
   SbPart *part;
   PetscBool *slabs;
   PetscErrorCode ierr;
@@ -144,11 +156,13 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(w, sizeof(*w)));
   PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
+
   // bodies that are read in slabs, decided on rank 0
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt b = 0; b < nbody; b++) {
-    if (size == 1 || rank || reading == SB_READING_RANK0) continue;
+    if (size == 1 || rank || reading == SB_READING_RANK0)
+      continue;
     SbImportSlabs(&body[b], &ncell);
     slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));
   }
@@ -164,7 +178,8 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
     PetscCall(PetscFree(part[b].remote));
   }
   PetscCall(PetscFree3(im, part, slabs));
-  if (ierr) PetscCall(SbMergedMeshDestroy(w));
+  if (ierr)
+    PetscCall(SbMergedMeshDestroy(w));
   PetscFunctionReturn(ierr);
 }
 

@@ -1,7 +1,7 @@
 /*
-  mesh_impl.h - shared declarations of src/mesh/: import of a body, edges and shape of its cells, its sets,
-  the merged mesh of all bodies. A body is on rank 0, or in slabs on all ranks, until distribute.c sends the
-  cells to their owners.
+  mesh_impl.h - shared declarations of src/mesh/: import of a body, edges and shape of its cells,
+  its sets, the merged mesh of all bodies. A body is on rank 0, or in slabs on all ranks, until
+  distribute.c sends the cells to their owners.
 */
 #pragma once
 #include <petscsf.h>
@@ -24,7 +24,8 @@ PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
 /* Largest absolute coordinate, m. */
 PetscReal SbImportLargest(const SbImport *import);
-/* Orients cells, builds faces; `largest`: coordinate, m. Errors: flat, duplicate tets, faces of three. */
+/* Orients cells, builds faces; `largest`: coordinate, m. Errors: flat, duplicate tets, faces of
+   three. */
 PetscErrorCode SbImportCheckCells(SbImport *import, PetscReal largest, SbFaces *faces);
 /* Raise these two errors: file numbers of the tets, number of faces with more than two tets. */
 PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
@@ -34,8 +35,10 @@ PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], 
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
-/* Size and shape of the cells of all ranks of comm: sets those of the "found" fields. Collective. */
-PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *import, const SbFaces *faces, SbBody *body);
+/* Size and shape of the cells of all ranks of comm: sets those of the "found" fields.
+   Collective. */
+PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *import, const SbFaces *faces,
+                               SbBody *body);
 /* Writes repairs and warnings to the note of the body, whose number of parts is known. */
 void SbImportNote(const SbImport *import, SbBody *body);
 /* Connected parts: parent[nvert] is the lowest vertex of the part that each vertex belongs to. */
@@ -55,50 +58,56 @@ typedef struct {
   uint64_t *face; /* [ncell][4] */
 } SbMasks;
 /* Marks boundary faces and the members of all sets in body b; allocates the arrays. */
-PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *masks);
+PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody,
+                          const SbBody body[], PetscInt b, PetscInt nset, const SbSet set[],
+                          SbMasks *masks);
 /* Bits of the sets that are groups, for each tag set: bits[ntags]. */
-void SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
-                const SbSet set[], uint64_t bits[]);
-/* Adds the numbers of vertices, boundary facets and cells of each set, summed over all ranks. Collective. */
-PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
-                           SbSet set[]);
+void SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b,
+                PetscInt nset, const SbSet set[], uint64_t bits[]);
+/* Adds the numbers of vertices, boundary facets and cells of each set, summed over all ranks.
+   Collective. */
+PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks,
+                           PetscInt nset, SbSet set[]);
 /*
-  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the body's volume;
-  other elements get a note. The cells are those of all ranks of comm. Collective.
+  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the
+  body's volume; other elements get a note. The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian is not
-  positive; with cell NULL such cells are counted in the note of the body.
+  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian
+  is not positive; with cell NULL such cells are counted in the note of the body.
 */
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off);
-/* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices;
-   zero for straight and missing edges. Returns whether one is curved. Not collective. */
-PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[], PetscReal off[18]);
-/* Brings off[n][6][3] of the cells orig[n] (original numbers) to the ranks that have them. Collective. */
+/* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1
+   vertices; zero for straight and missing edges. Returns whether one is curved. Not collective. */
+PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[],
+                          PetscReal off[18]);
+/* Brings off[n][6][3] of the cells orig[n] (original numbers) to the ranks that have them.
+   Collective. */
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
 /* Adds the members of sets that are groups, for a mesh in memory. */
 void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* Raises an error for a set without members; the message lists the existing groups. */
-PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
-                           const SbSet set[]);
+PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[],
+                           PetscInt nset, const SbSet set[]);
 
 /* route.c: see sbmesh.h */
 
-/* A growing list of items that go to other ranks, zeroed at first; its arrays become those of a route. */
+/* A growing list of items that go to other ranks, zeroed at first; its arrays become those of a
+   route. */
 typedef struct {
   PetscInt n, room[2];
   PetscInt *item;    /* [n] */
   PetscMPIInt *rank; /* [n] */
 } SbRouteList;
 PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank);
-/* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller. Collective. */
+/* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller.
+   Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
 /* Rank that sent the received record i. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
-/* forest.c: ranks that have leaves of each root, user[start[k]] to user[start[k + 1] - 1] ascending;
-   the caller frees both. Collective. */
+/* forest.c: ranks that have leaves of each root, user[start[k]] to user[start[k + 1] - 1]
+   ascending; the caller frees both. Collective. */
 PetscErrorCode SbForestRanks(PetscSF forest, PetscInt **start, PetscMPIInt **user);
 
 /* merge.c, partition.c, distribute.c, order.c, number.c */
@@ -114,8 +123,8 @@ typedef struct {
   uint64_t set, face[4];
 } SbCellData;
 
-/* Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A
-   vertex of cells on several ranks is stored on each of them with the same data. */
+/* Merged mesh of all bodies before it is distributed: some cells on each rank, with all their
+   vertices. A vertex of cells on several ranks is stored on each of them with the same data. */
 typedef struct {
   PetscInt Nvert, Ncell; /* global counts */
   PetscInt nvert, ncell;
@@ -135,7 +144,8 @@ typedef enum {
   SB_READING_RANK0, /* rank 0 reads everything */
   SB_READING_SLABS  /* each rank reads a slab, if the format supports it */
 } SbReading;
-/* Reads, checks and merges all bodies; sets their "found" fields and those of the sets. Collective. */
+/* Reads, checks and merges all bodies; sets their "found" fields and those of the sets.
+   Collective. */
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *merged);
 
@@ -143,17 +153,21 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
 typedef struct {
   SbFaces faces; /* neighbour ncell + k is remote[k] */
   SbMasks masks;
-  PetscInt first;                 /* original number of the first cell, from the body's first one */
-  PetscInt orig_vert, orig_cell;  /* original numbers of the body's first vertex and cell */
-  PetscInt vert0, cell0, remote0; /* numbers of its first vertex, cell and remote cell on this rank */
-  PetscInt *orig;                 /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
-  PetscReal *edge_off;            /* [][6][3] of cells with SB_CURVED */
+  PetscInt first;                /* original number of the first cell, from the body's first one */
+  PetscInt orig_vert, orig_cell; /* original numbers of the body's first vertex and cell */
+  PetscInt vert0, cell0,
+    remote0;           /* numbers of its first vertex, cell and remote cell on this rank */
+  PetscInt *orig;      /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
+  PetscReal *edge_off; /* [][6][3] of cells with SB_CURVED */
   PetscInt nremote;
-  PetscSFNode *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
+  PetscSFNode
+    *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
 } SbPart;
-/* slab.c: reads and prepares body b in slabs; `before`: cells of earlier bodies on this rank. Collective. */
-PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
-                             PetscInt nset, SbSet set[], SbImport *import, SbPart *part);
+/* slab.c: reads and prepares body b in slabs; `before`: cells of earlier bodies on this rank.
+   Collective. */
+PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[],
+                             PetscInt b, PetscInt nset, SbSet set[], SbImport *import,
+                             SbPart *part);
 PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
 
 typedef enum {
@@ -162,9 +176,11 @@ typedef enum {
   SB_PARTITION_BISECTION
 } SbPartitioner;
 /* Owner rank of each cell: part[ncell]. Collective. */
-PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged, PetscMPIInt part[]);
+PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged,
+                           PetscMPIInt part[]);
 
-/* Mesh before renumbering: owned cells, then ghosts; their vertices, then others; by original number. */
+/* Mesh before renumbering: owned cells, then ghosts; their vertices, then others; by original
+   number. */
 typedef struct {
   PetscInt ncell_owned, ncell, nvert;
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
@@ -174,11 +190,12 @@ typedef struct {
 } SbLocalMesh;
 
 PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *local);
-/* Distributes the merged mesh, of which only the curved cells remain. `all`: ghosts are all cells that share
-   a vertex with an owned cell, else those with an owned vertex. Collective. */
+/* Distributes the merged mesh, of which only the curved cells remain. `all`: ghosts are all cells
+   that share a vertex with an owned cell, else those with an owned vertex. Collective. */
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
                             SbLocalMesh *local);
 /* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
-/* Reverse Cuthill-McKee order: order[i] is the vertex with new number i. Cell vertices of -1 are ignored. */
+/* Reverse Cuthill-McKee order: order[i] is the vertex with new number i. Cell vertices of -1 are
+   ignored. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);

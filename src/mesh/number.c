@@ -1,24 +1,27 @@
 /*
   number.c - local and global numbering of the distributed mesh.
 
-  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers
-  count the owned vertices of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts;
-  each sorted by body, inclusion, curved or straight, and lowest local vertex, so that a loop over cells
-  accesses vertices nearly in order.
+  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global
+  numbers count the owned vertices of rank 0, then those of rank 1 and so on. Cells: owned ones
+  first, then ghosts; each sorted by body, inclusion, curved or straight, and lowest local vertex,
+  so that a loop over cells accesses vertices nearly in order.
 */
 #include "mesh_impl.h"
 
-/* Inclusion of its body that a cell belongs to: 0 for the bulk, else its position in the list plus one. */
+/* Inclusion of its body that a cell belongs to: 0 for the bulk, else its position in the list plus
+   one. */
 static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
   const SbBody *body = &mesh->body[cell->body];
 
   for (PetscInt k = 0; k < body->ninclusion; k++)
-    if (cell->set & SB_SET_BIT(body->inclusion[k].set)) return k + 1;
+    if (cell->set & SB_SET_BIT(body->inclusion[k].set))
+      return k + 1;
   return 0;
 }
 
-/* Star forest from items of this rank, number[nowned], to copies on others, which follow in the arrays. */
+/* Star forest from items of this rank, number[nowned], to copies on others, which follow in the
+   arrays. */
 static PetscErrorCode create_forest(MPI_Comm comm, PetscInt N, PetscInt nowned, PetscInt n,
                                     const PetscInt number[], PetscSF *sf)
 {
@@ -33,8 +36,8 @@ static PetscErrorCode create_forest(MPI_Comm comm, PetscInt N, PetscInt nowned, 
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, N, 1, &blocks));
-  PetscCall(PetscSFCreateByMatchingIndices(blocks, nowned, number, NULL, 0, n - nowned, number + nowned, NULL,
-                                           nowned, NULL, sf));
+  PetscCall(PetscSFCreateByMatchingIndices(blocks, nowned, number, NULL, 0, n - nowned,
+                                           number + nowned, NULL, nowned, NULL, sf));
   PetscCall(PetscLayoutDestroy(&blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -45,7 +48,9 @@ static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], S
   PetscInt *order, *key, *some, *at, *start;
 
   PetscFunctionBeginUser;
-  // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or straight
+
+  // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or
+  // straight
   PetscCall(PetscMalloc2(p->ncell, &order, p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
@@ -57,18 +62,20 @@ static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], S
   for (PetscInt i = 0; i < p->ncell; i++) {
     const PetscInt c = some[i];
 
-    key[i] = 2 * ((SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
-                  inclusion_of(mesh, &p->data[c])) +
-             (p->data[c].set & SB_CURVED ? 1 : 0);
+    key[i] =
+      2 * ((SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
+           inclusion_of(mesh, &p->data[c])) +
+      (p->data[c].set & SB_CURVED ? 1 : 0);
   }
   PetscCall(SbBucketByKey(p->ncell, key, 4 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
-  for (PetscInt i = 0; i < p->ncell; i++) order[i] = some[at[i]];
+  for (PetscInt i = 0; i < p->ncell; i++)
+    order[i] = some[at[i]];
   PetscCall(PetscFree(some));
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(start));
-  PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig, mesh->ncell,
-                         &mesh->cell_body, mesh->ncell, &mesh->cell_material, mesh->ncell, &mesh->cell_set,
-                         4 * (size_t)mesh->ncell, &mesh->face_set));
+  PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig,
+                         mesh->ncell, &mesh->cell_body, mesh->ncell, &mesh->cell_material,
+                         mesh->ncell, &mesh->cell_set, 4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const SbCellData *data = &p->data[order[c]];
     const PetscInt inclusion = inclusion_of(mesh, data);
@@ -90,25 +97,33 @@ static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], S
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
 {
   PetscInt *local, *compact, *back, *cell, *order, *ghost, *orig, *global;
-  PetscInt n = 0, mine[2], sum[2] = {0, 0};
+  PetscInt n = 0;
+  PetscInt mine[2];
+  PetscInt sum[2] = {0, 0};
   PetscMPIInt rank;
   PetscSF sf;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
   PetscCall(PetscMalloc4(p->nvert, &local, p->nvert, &ghost, p->nvert, &orig, p->nvert, &global));
+
   // local numbers of owned vertices
-  PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
+  PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert,
+                         &order));
   for (PetscInt v = 0; v < p->nvert; v++) {
     compact[v] = -1;
-    if (p->owner[v] != rank) continue;
+    if (p->owner[v] != rank)
+      continue;
     back[n] = v;
     compact[v] = n++;
   }
-  for (PetscInt i = 0; i < 4 * p->ncell; i++) cell[i] = compact[p->cell[i]];
+  for (PetscInt i = 0; i < 4 * p->ncell; i++)
+    cell[i] = compact[p->cell[i]];
   PetscCall(SbOrderRCM(n, p->ncell, cell, order));
-  for (PetscInt i = 0; i < n; i++) local[back[order[i]]] = i;
+  for (PetscInt i = 0; i < n; i++)
+    local[back[order[i]]] = i;
   PetscCall(PetscFree4(compact, back, cell, order));
+
   // counts, and global numbers of owned vertices
   mesh->nvert_owned = n;
   mesh->nvert = p->nvert;
@@ -121,6 +136,7 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   PetscCallMPI(MPI_Allreduce(mine, sum, 2, MPIU_INT, MPI_SUM, mesh->comm));
   mesh->Nvert = sum[0];
   mesh->Ncell = sum[1];
+
   // ghost vertices get the global numbers of their original ones, and local numbers in this order
   for (PetscInt v = 0, m = mesh->nvert_owned; v < p->nvert; v++) {
     const PetscInt at = p->owner[v] == rank ? local[v] : m++;
@@ -133,10 +149,13 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, global, global));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscSortIntWithArray(p->nvert - n, global + n, ghost + n));
-  for (PetscInt i = n; i < p->nvert; i++) local[ghost[i]] = i;
+  for (PetscInt i = n; i < p->nvert; i++)
+    local[ghost[i]] = i;
+
   // vertex arrays in the new order
   PetscCall(PetscMalloc5(mesh->nvert, &mesh->gvert, mesh->nvert, &mesh->vert_orig, mesh->nvert,
-                         &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert, &mesh->x));
+                         &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert,
+                         &mesh->x));
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     const PetscInt l = local[v];
 
@@ -150,8 +169,8 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
   PetscCall(fill_cells(p, local, mesh));
   PetscCall(PetscFree4(local, ghost, orig, global));
   PetscCall(SbLocalMeshDestroy(p));
-  PetscCall(
-    create_forest(mesh->comm, mesh->Ncell, mesh->ncell_owned, mesh->ncell, mesh->cell_orig, &mesh->cell_sf));
+  PetscCall(create_forest(mesh->comm, mesh->Ncell, mesh->ncell_owned, mesh->ncell, mesh->cell_orig,
+                          &mesh->cell_sf));
   PetscCall(create_forest(mesh->comm, mesh->Nvert, n, mesh->nvert, mesh->gvert, &mesh->vert_sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

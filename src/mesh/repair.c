@@ -1,36 +1,43 @@
 /*
-  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it,
-  if possible.
+  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run
+  accepts it, if possible.
 
-  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex
-  twice are dropped (they have collapsed and leave no gap); duplicate tets are dropped, and their groups go to
-  the first one; flat tets are dropped and counted, and each one with a neighbour at every face leaves a slit
-  of zero width, counted too; inverted tets are reoriented; group triangles and lines that have collapsed, are
-  duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be
-  repaired: the check of a run reports them.
+  In this order: vertices within a tolerance are merged into the first of them; tets that then use a
+  vertex twice are dropped (they have collapsed and leave no gap); duplicate tets are dropped, and
+  their groups go to the first one; flat tets are dropped and counted, and each one with a neighbour
+  at every face leaves a slit of zero width, counted too; inverted tets are reoriented; group
+  triangles and lines that have collapsed, are duplicates or are no face of a tet are dropped, and
+  so are unused vertices. Overlapping tets cannot be repaired: the check of a run reports them.
 */
 #include "mesh_impl.h"
 
-/* Replaces each vertex in items by the first vertex within the tolerance; the others become unused. */
+/* Replaces each vertex in items by the first vertex within the tolerance; the others become
+   unused. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
   PetscReal box[6], diagonal;
   PetscInt *map;
 
   PetscFunctionBeginUser;
-  if (!im->nvert) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!im->nvert)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbBoxClear(box);
-  for (PetscInt v = 0; v < im->nvert; v++) SbBoxAdd(box, im->x + 3 * v);
+  for (PetscInt v = 0; v < im->nvert; v++)
+    SbBoxAdd(box, im->x + 3 * v);
   diagonal = SbBoxDiagonal(box);
   done->merge_tolerance = tolerance < 0 ? 1e-9 * diagonal : tolerance;
-  if (done->merge_tolerance == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (done->merge_tolerance == 0 || !(diagonal > 0))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(im->nvert, &map));
   PetscCall(SbWeld(im->nvert, im->x, done->merge_tolerance, PETSC_FALSE, map));
-  for (PetscInt v = 0; v < im->nvert; v++) done->nwelded += map[v] != v;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    done->nwelded += map[v] != v;
   for (int d = 0; d < 4; d++)
-    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) im->item[d].vert[i] = map[im->item[d].vert[i]];
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++)
+      im->item[d].vert[i] = map[im->item[d].vert[i]];
   for (PetscInt i = 0; i < im->nmiddle.n; i++) {
-    const PetscInt a = map[im->middle[i].end[0]], b = map[im->middle[i].end[1]];
+    const PetscInt a = map[im->middle[i].end[0]];
+    const PetscInt b = map[im->middle[i].end[1]];
 
     im->middle[i].end[0] = PetscMin(a, b);
     im->middle[i].end[1] = PetscMax(a, b);
@@ -50,8 +57,10 @@ static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
     PetscBool twice = PETSC_FALSE;
 
     for (int a = 1; a <= dim; a++)
-      for (int b = 0; b < a; b++) twice = (PetscBool)(twice || v[a] == v[b]);
-    if (!twice) SbItemsMove(item, dim, kept++, i);
+      for (int b = 0; b < a; b++)
+        twice = (PetscBool)(twice || v[a] == v[b]);
+    if (!twice)
+      SbItemsMove(item, dim, kept++, i);
   }
   *ndropped += item->n - kept;
   item->n = kept;
@@ -61,9 +70,14 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
 {
   SbFaces faces = {0};
   PetscErrorCode ierr;
-  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2], kept = 0;
+  PetscInt turned;
+  PetscInt nitem = im->item[0].n + im->item[1].n + im->item[2].n;
+  PetscInt ndropped = 0;
+  PetscInt slots[2];
+  PetscInt kept = 0;
   PetscBool *flat;
-  SbItems *item = &im->item[3], *tri = &im->item[2];
+  SbItems *item = &im->item[3];
+  SbItems *tri = &im->item[2];
   const PetscReal largest = SbImportLargest(im);
   PetscReal det, off;
 
@@ -76,6 +90,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
     drop_collapsed(im, d, &ndropped);
     PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
   }
+
   // flat tets; one with a neighbour at every face leaves a slit
   PetscCall(PetscMalloc1(item->n, &flat));
   for (PetscInt c = 0; c < item->n; c++) {
@@ -88,29 +103,35 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
       const PetscInt *n = faces.neighbour + 4 * c;
 
       done->nslit += flat[c] && n[0] >= 0 && n[1] >= 0 && n[2] >= 0 && n[3] >= 0;
-      if (!flat[c]) SbItemsMove(item, 3, kept++, c);
+      if (!flat[c])
+        SbItemsMove(item, 3, kept++, c);
     }
     item->n = kept;
     PetscCall(SbFacesDestroy(&faces));
   }
   PetscCall(PetscFree(flat));
-  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance "
-             "and the scale of the file",
-             im->where);
+  PetscCheck(
+    im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance "
+    "and the scale of the file",
+    im->where);
   turned = im->nreoriented;
   ierr = SbImportCheck(im, &faces);
   done->nturned = im->nreoriented - turned;
   done->nunused = im->nunused - done->nwelded;
+
   // triangles that are not a face of any tet
   kept = 0;
   for (PetscInt i = 0; i < tri->n && !ierr; i++)
-    if (SbFacesFind(&faces, tri->vert + 3 * i, slots)) SbItemsMove(tri, 2, kept++, i);
-  if (!ierr) tri->n = kept;
+    if (SbFacesFind(&faces, tri->vert + 3 * i, slots))
+      SbItemsMove(tri, 2, kept++, i);
+  if (!ierr)
+    tri->n = kept;
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
   PetscCall(SbImportMiddles(im, NULL, &off)); /* curved edges of the remaining tets */
-  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = v + 1;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    im->vert_number[v] = v + 1;
   done->nitem = nitem - im->item[0].n - im->item[1].n - im->item[2].n;
   im->nunused = im->nreoriented = im->nlost = 0;
   PetscFunctionReturn(PETSC_SUCCESS);

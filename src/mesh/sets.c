@@ -1,12 +1,12 @@
 /*
   sets.c - named sets: their definition, and their members (vertices, facets, cells) as bit masks.
 
-  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets
-  with all four. The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains
-  the nodes of a curved or rotated side. A group of points or curves contains vertices; a group of surfaces
-  contains its triangles (interior ones as faces of both tets) and their vertices; a group of volumes contains
-  its tets, their vertices and their boundary facets. Groups with equal names and different dimensions are one
-  set.
+  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and
+  the tets with all four. The tolerance is 1e-6 times the diagonal of the body's bounding box, so
+  that a plane contains the nodes of a curved or rotated side. A group of points or curves contains
+  vertices; a group of surfaces contains its triangles (interior ones as faces of both tets) and
+  their vertices; a group of volumes contains its tets, their vertices and their boundary facets.
+  Groups with equal names and different dimensions are one set.
 */
 #include "mesh_impl.h"
 
@@ -23,7 +23,9 @@ static const struct {
   [SB_SET_BODY] = {"body", "body:NAME", 0, 0},
   [SB_SET_BOUNDARY] = {"boundary", "boundary", -1, -1},
 };
-enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
+enum {
+  NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes)
+};
 
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 {
@@ -35,15 +37,18 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 
   PetscFunctionBeginUser;
   for (i = 0; i < NSHAPE; i++)
-    if (strlen(shapes[i].name) == n && !strncmp(shapes[i].name, text, n)) break;
+    if (strlen(shapes[i].name) == n && !strncmp(shapes[i].name, text, n))
+      break;
   if (i == NSHAPE) {
     const char *names[NSHAPE];
     char all[512], word[64];
 
-    for (int k = 0; k < NSHAPE; k++) names[k] = shapes[k].name;
+    for (int k = 0; k < NSHAPE; k++)
+      names[k] = shapes[k].name;
     (void)snprintf(word, sizeof(word), "%.*s", (int)n, text);
     SbSuggestName(word, NSHAPE, names, sizeof(all), all);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option,
+            text, all);
   }
   set->shape = (SbSetShape)i;
   set->group[0] = 0;
@@ -54,12 +59,15 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
     good = (PetscBool)(colon && colon[1] && strlen(colon + 1) < sizeof(set->group));
   else
     good = (PetscBool)(colon && SbParseNumbers(colon + 1, shapes[i].most, p) >= shapes[i].least);
-  PetscCheck(good, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
-  if (shapes[i].least == 0) PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
+  PetscCheck(good, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text,
+             shapes[i].form);
+  if (shapes[i].least == 0)
+    PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
+
   // normalise plane normals (and distances); an empty shape is an error
-  PetscCheck(set->shape != SB_SET_BOX || (p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5]), PETSC_COMM_SELF,
-             PETSC_ERR_USER_INPUT, "%s '%s': the first corner must lie below the second in x, y and z",
-             option, text);
+  PetscCheck(set->shape != SB_SET_BOX || (p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5]),
+             PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s '%s': the first corner must lie below the second in x, y and z", option, text);
   PetscCheck(set->shape != SB_SET_SPHERE || p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s '%s': the radius must be above 0 m", option, text);
   if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
@@ -69,7 +77,8 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
                "%s '%s': the normal must have a length above 0", option, text);
     PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s '%s': the tolerance must not be below 0 m", option, text);
-    for (int k = 0; k < 4; k++) p[k] /= length;
+    for (int k = 0; k < 4; k++)
+      p[k] /= length;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -82,7 +91,8 @@ static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
   switch (set->shape) {
   case SB_SET_BOX:
     for (int i = 0; i < 3; i++)
-      if (x[i] < p[i] - slack || x[i] > p[3 + i] + slack) return PETSC_FALSE;
+      if (x[i] < p[i] - slack || x[i] > p[3 + i] + slack)
+        return PETSC_FALSE;
     return PETSC_TRUE;
   case SB_SET_PLANE:
     return (PetscBool)(PetscAbsReal(SbDot3(p, x) - p[3]) <= PetscMax(p[4], slack));
@@ -112,41 +122,52 @@ static PetscBool is_named(const SbGroup *group, const char *name)
 {
   const char *p = group->name;
 
-  for (; *p && (*p == *name || (*p == ' ' && *name == '_')); p++) name++;
+  for (; *p && (*p == *name || (*p == ' ' && *name == '_')); p++)
+    name++;
   return (PetscBool)(!*p && !*name);
 }
 
 void SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
                 const SbSet set[], uint64_t bits[])
 {
-  for (PetscInt t = 0; t < im->ntags; t++) bits[t] = 0;
+  for (PetscInt t = 0; t < im->ntags; t++)
+    bits[t] = 0;
   for (PetscInt k = 0; k < nset; k++) {
     const char *name = set[k].shape == SB_SET_GROUP ? group_in_body(&set[k], nbody, body, b) : NULL;
 
     for (PetscInt t = 0; name && t < im->ntags; t++)
       for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++)
-        if (is_named(&im->group[im->tags_group[i]], name)) bits[t] |= SB_SET_BIT(k);
+        if (is_named(&im->group[im->tags_group[i]], name))
+          bits[t] |= SB_SET_BIT(k);
   }
 }
 
 static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
 {
-  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
+  for (PetscInt k = 0; mask && k < nset; k++)
+    count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
 }
 
-PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
+PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody,
+                          const SbBody body[], PetscInt b, PetscInt nset, const SbSet set[],
+                          SbMasks *m)
 {
-  uint64_t *bits, all = 0, hull = 0;
+  uint64_t *bits;
+  uint64_t all = 0;
+  uint64_t hull = 0;
   PetscInt slots[2];
   const PetscReal slack = 1e-6 * SbBoxDiagonal(body[b].bbox);
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc3(im->nvert, &m->vert, im->item[3].n, &m->cell, 4 * (size_t)im->item[3].n, &m->face));
-  // shapes, bodies, the boundary; `all`: bits of sets that contain the whole body, `hull`: its boundary
+  PetscCall(PetscCalloc3(im->nvert, &m->vert, im->item[3].n, &m->cell, 4 * (size_t)im->item[3].n,
+                         &m->face));
+
+  // shapes, bodies, the boundary; `all`: bits of sets that contain the whole body, `hull`: its
+  // boundary
   for (PetscInt k = 0; k < nset; k++) {
-    if (set[k].shape == SB_SET_BODY && (!strcmp(set[k].group, body[b].name) ||
-                                        (body[b].copy_of[0] && !strcmp(set[k].group, body[b].copy_of))))
+    if (set[k].shape == SB_SET_BODY &&
+        (!strcmp(set[k].group, body[b].name) ||
+         (body[b].copy_of[0] && !strcmp(set[k].group, body[b].copy_of))))
       all |= SB_SET_BIT(k);
     else if (set[k].shape == SB_SET_BOUNDARY)
       hull |= SB_SET_BIT(k);
@@ -166,13 +187,17 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
           SB_ON_BOUNDARY | hull | all | (m->vert[v[w[0]]] & m->vert[v[w[1]]] & m->vert[v[w[2]]]);
     }
   }
-  for (PetscInt v = 0; v < im->nvert; v++) m->vert[v] |= all;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    m->vert[v] |= all;
   for (PetscInt s = 0; hull && s < 4 * im->item[3].n; s++) {
-    if (faces->neighbour[s] >= 0) continue;
-    for (int i = 0; i < 3; i++) m->vert[im->item[3].vert[4 * (s / 4) + SbFaceVertex[s % 4][i]]] |= hull;
+    if (faces->neighbour[s] >= 0)
+      continue;
+    for (int i = 0; i < 3; i++)
+      m->vert[im->item[3].vert[4 * (s / 4) + SbFaceVertex[s % 4][i]]] |= hull;
   }
   PetscCall(PetscMalloc1(im->ntags, &bits));
   SbSetsBits(im, nbody, body, b, nset, set, bits);
+
   // members of groups: vertices, faces of tets, tets with their boundary faces
   for (int d = 0; d < 4; d++) {
     const SbItems *item = &im->item[d];
@@ -180,36 +205,46 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
     for (PetscInt i = 0; i < item->n; i++) {
       const uint64_t bit = bits[item->tags[i]];
 
-      if (!bit) continue;
-      for (int k = 0; k <= d; k++) m->vert[item->vert[(d + 1) * i + k]] |= bit;
+      if (!bit)
+        continue;
+      for (int k = 0; k <= d; k++)
+        m->vert[item->vert[(d + 1) * i + k]] |= bit;
       if (d == 2) {
         const PetscInt n = SbFacesFind(faces, item->vert + 3 * i, slots);
 
-        for (PetscInt k = 0; k < n; k++) m->face[slots[k]] |= bit;
+        for (PetscInt k = 0; k < n; k++)
+          m->face[slots[k]] |= bit;
       } else if (d == 3) {
         m->cell[i] |= bit;
-        for (int f = 0; f < 4; f++) m->face[4 * i + f] |= faces->neighbour[4 * i + f] < 0 ? bit : 0;
+        for (int f = 0; f < 4; f++)
+          m->face[4 * i + f] |= faces->neighbour[4 * i + f] < 0 ? bit : 0;
       }
     }
   }
   PetscCall(PetscFree(bits));
-  if (body[b].in_memory) SbMemoryMeshMark(&body[b], faces, m);
+  if (body[b].in_memory)
+    SbMemoryMeshMark(&body[b], faces, m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset,
-                           SbSet set[])
+PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *m,
+                           PetscInt nset, SbSet set[])
 {
   PetscInt *count;
 
   PetscFunctionBeginUser;
-  if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!nset)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(3 * nset, &count));
-  for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, count);
-  for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, count + 2);
+  for (PetscInt v = 0; v < nvert; v++)
+    count_bits(m->vert[v], nset, count);
+  for (PetscInt c = 0; c < ncell; c++)
+    count_bits(m->cell[c], nset, count + 2);
   for (PetscInt s = 0; s < 4 * ncell; s++)
-    if (m->face[s] & SB_ON_BOUNDARY) count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, count + 1);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(3 * nset), MPIU_INT, MPI_SUM, comm));
+    if (m->face[s] & SB_ON_BOUNDARY)
+      count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, count + 1);
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(3 * nset), MPIU_INT, MPI_SUM, comm));
   for (PetscInt k = 0; k < nset; k++) {
     set[k].nvert += count[3 * k];
     set[k].nfacet += count[3 * k + 1];
@@ -223,12 +258,16 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
 static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbImport import[],
                                   const SbSet *set)
 {
-  const char **names, *wanted = strchr(set->group, '.') ? strchr(set->group, '.') + 1 : set->group;
-  char groups[1024] = "", near[256];
-  PetscInt n = 0, exists = 0;
+  const char **names;
+  const char *wanted = strchr(set->group, '.') ? strchr(set->group, '.') + 1 : set->group;
+  char groups[1024] = "";
+  char near[256];
+  PetscInt n = 0;
+  PetscInt exists = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < nbody; b++) n += import[b].ngroup;
+  for (PetscInt b = 0; b < nbody; b++)
+    n += import[b].ngroup;
   PetscCall(PetscMalloc1(n, &names));
   n = 0;
   for (PetscInt b = 0; b < nbody; b++) {
@@ -241,54 +280,65 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
   }
   SbSuggestNames(wanted, n, names, sizeof(near), near);
   PetscCall(PetscFree(names));
+
   // "liver: wall, ligament; stone: none"
   for (PetscInt b = 0; b < nbody; b++) {
     const SbImport *im = &import[b];
 
-    SbAppend(sizeof(groups), groups, "%s%s: %s", b ? "; " : "", body[b].name, im->ngroup ? "" : "none");
+    SbAppend(sizeof(groups), groups, "%s%s: %s", b ? "; " : "", body[b].name,
+             im->ngroup ? "" : "none");
     for (PetscInt g = 0; g < im->ngroup; g++) {
       PetscBool known = PETSC_FALSE;
 
       for (PetscInt h = 0; h < g; h++)
         known = (PetscBool)(known || !strcmp(im->group[h].name, im->group[g].name));
-      if (!known) SbAppend(sizeof(groups), groups, "%s%s", g ? ", " : "", im->group[g].name);
+      if (!known)
+        SbAppend(sizeof(groups), groups, "%s%s", g ? ", " : "", im->group[g].name);
     }
   }
-  PetscCheck(!exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "set '%s': the physical group '%s' holds no vertex, facet or tet of the mesh; the mesh and its "
-             "groups do not belong together",
-             set->name, set->group);
+  PetscCheck(
+    !exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "set '%s': the physical group '%s' holds no vertex, facet or tet of the mesh; the mesh and its "
+    "groups do not belong together",
+    set->name, set->group);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "set '%s': there is no physical group '%s'%s%s%s; groups by body: %s", set->name, set->group,
-          near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", groups);
+          "set '%s': there is no physical group '%s'%s%s%s; groups by body: %s", set->name,
+          set->group, near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", groups);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
-                           const SbSet set[])
+PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[],
+                           PetscInt nset, const SbSet set[])
 {
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < nset; k++) {
     PetscReal box[6];
 
-    if (set[k].nvert || set[k].nfacet || set[k].ncell) continue;
-    if (set[k].shape == SB_SET_GROUP) PetscCall(empty_group(nbody, body, import, &set[k]));
+    if (set[k].nvert || set[k].nfacet || set[k].ncell)
+      continue;
+    if (set[k].shape == SB_SET_GROUP)
+      PetscCall(empty_group(nbody, body, import, &set[k]));
     if (set[k].shape == SB_SET_BODY) {
       const char **names;
       char near[256];
 
       PetscCall(PetscMalloc1(nbody, &names));
-      for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
+      for (PetscInt b = 0; b < nbody; b++)
+        names[b] = body[b].name;
       SbSuggestNames(set[k].group, nbody, names, sizeof(near), near);
       PetscCall(PetscFree(names));
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
-              set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s",
+              set[k].name, set[k].group, near[0] ? "; did you mean " : "", near,
+              near[0] ? "?" : "");
     }
+
     // a shape outside the bodies
     SbBoxClear(box);
-    for (PetscInt b = 0; b < nbody; b++) SbBoxMerge(box, body[b].bbox);
+    for (PetscInt b = 0; b < nbody; b++)
+      SbBoxMerge(box, body[b].bbox);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-            "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
+            "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) "
+            "to (%.6g, "
             "%.6g, %.6g) m",
             set[k].name, shapes[set[k].shape].name, (double)box[0], (double)box[1], (double)box[2],
             (double)box[3], (double)box[4], (double)box[5]);

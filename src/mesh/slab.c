@@ -1,18 +1,19 @@
 /*
-  slab.c - parallel import of one body: each rank reads a slab, that is a block of the file's tets and one of
-  its vertices.
+  slab.c - parallel import of one body: each rank reads a slab, that is a block of the file's tets
+  and one of its vertices.
 
-  Rendezvous algorithm: vertices are assigned to home ranks by blocks of their numbers. The home rank of a
-  vertex has its position and knows the ranks whose tets use it; there unused vertices are found and vertex
-  data of several ranks is combined. A face between tets of two ranks is matched at the home rank of its
-  lowest vertex; so are the edges of the surface. A group triangle or a curved edge goes to the home rank of
-  its lowest vertex and from there to all ranks that use this vertex, one of which has the tet. Each rank
-  finds its connected parts; rank 0 joins them by their shared vertices.
+  Rendezvous algorithm: vertices are assigned to home ranks by blocks of their numbers. The home
+  rank of a vertex has its position and knows the ranks whose tets use it; there unused vertices are
+  found and vertex data of several ranks is combined. A face between tets of two ranks is matched at
+  the home rank of its lowest vertex; so are the edges of the surface. A group triangle or a curved
+  edge goes to the home rank of its lowest vertex and from there to all ranks that use this vertex,
+  one of which has the tet. Each rank finds its connected parts; rank 0 joins them by their shared
+  vertices.
 
-  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0 joins
-  (few, unless the tets of the file are in random order) and 4 bytes for each vertex number between the lowest
-  and the highest one of its tets. The result is the same as that of a serial import (merge.c) on any number
-  of ranks; volumes may differ by rounding.
+  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0
+  joins (few, unless the tets of the file are in random order) and 4 bytes for each vertex number
+  between the lowest and the highest one of its tets. The result is the same as that of a serial
+  import (merge.c) on any number of ranks; volumes may differ by rounding.
 */
 #include "mesh_impl.h"
 
@@ -52,41 +53,49 @@ static inline PetscInt first_vertex(const void *record, size_t unit, PetscInt i)
 }
 
 /* Sends records of `unit` bytes to the home ranks of the vertices with which they begin. */
-static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *route,
-                                void *received)
+static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const void *record,
+                                SbRoute *route, void *received)
 {
   PetscMPIInt *dest;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(n, &dest));
-  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, first_vertex(record, unit, i));
+  for (PetscInt i = 0; i < n; i++)
+    dest[i] = home(s, first_vertex(record, unit, i));
   PetscCall(SbRouteCreate(s->comm, n, NULL, dest, route));
   PetscCall(SbRouteSend(route, unit, NULL, record, received));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Positions and original numbers of the vertices of this rank's tets; ranks that use each of its block. */
+/* Positions and original numbers of the vertices of this rank's tets; ranks that use each of its
+   block. */
 static PetscErrorCode ask_home_ranks(Slab *s)
 {
   SbImport *im = s->im;
   const PetscInt *nuser;
-  PetscInt n = 0, before;
+  PetscInt n = 0;
+  PetscInt before;
 
   PetscFunctionBeginUser;
   PetscCall(SbForestCreate(s->comm, s->nkept, im->nvert, s->used, &s->vert));
   PetscCall(SbForestRanks(s->vert, &s->start, &s->user));
   PetscCall(PetscSFComputeDegreeBegin(s->vert, &nuser));
   PetscCall(PetscSFComputeDegreeEnd(s->vert, &nuser));
+
   // original numbers of used vertices
-  for (PetscInt v = 0; v < s->nkept; v++) n += nuser[v] > 0;
+  for (PetscInt v = 0; v < s->nkept; v++)
+    n += nuser[v] > 0;
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
   before -= n;
   im->nunused = s->nkept - n;
   PetscCall(PetscCalloc2(s->nkept, &s->number, s->nkept, &s->mask));
-  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = nuser[v] > 0 ? before++ : -1;
+  for (PetscInt v = 0; v < s->nkept; v++)
+    s->number[v] = nuser[v] > 0 ? before++ : -1;
+
   // vertex arrays of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
-  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = s->used[v] + 1;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    im->vert_number[v] = s->used[v] + 1;
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
   PetscCall(SbForestBroadcast(s->vert, 3, MPIU_REAL, s->x, im->x));
   PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, s->number, s->part->orig));
@@ -98,8 +107,8 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* A face that may be between tets of two ranks, and the tet across it. */
 typedef struct {
   PetscInt vert[3], at; /* ascending; slot at the sender, position in the received array */
-  PetscInt cell;        /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
-  int64_t number;       /* file number of the tet */
+  PetscInt cell;  /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
+  int64_t number; /* file number of the tet */
 } Face;
 typedef struct {
   PetscInt rank, cell;
@@ -109,7 +118,9 @@ typedef struct {
 /* Finds pairs of equal faces among those received, and the cell across each face. */
 static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face[], Across across[])
 {
-  PetscInt nshared = 0, first = -1, m;
+  PetscInt nshared = 0;
+  PetscInt first = -1;
+  PetscInt m;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < route->nrecv; i++) {
@@ -120,10 +131,12 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
   for (PetscInt i = 0; i < route->nrecv; i += m) {
     const Face *f = face + i;
 
-    for (m = 1; i + m < route->nrecv && !memcmp(f->vert, f[m].vert, sizeof(f->vert));) m++;
+    for (m = 1; i + m < route->nrecv && !memcmp(f->vert, f[m].vert, sizeof(f->vert));)
+      m++;
     if (m == 2)
       for (int k = 0; k < 2; k++)
-        across[f[k].at] = (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
+        across[f[k].at] =
+          (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
     else if (m > 2 && !nshared++)
       first = i;
   }
@@ -143,15 +156,18 @@ static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const Face face[], con
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nsend, &s->part->remote));
   for (PetscInt i = 0; i < nsend; i++) {
-    if (across[i].rank < 0 || across[i].rank == s->rank) continue;
+    if (across[i].rank < 0 || across[i].rank == s->rank)
+      continue;
     faces->neighbour[face[i].at] = s->im->item[3].n + n;
     s->part->remote[n++] = (PetscSFNode){across[i].rank, across[i].cell};
     faces->nboundary--;
   }
   s->part->nremote = n;
   for (PetscInt i = 3; i < nsend; i++) {
-    if (face[i].at != face[i - 3].at + 3 || face[i].at % 4 != 3) continue;
-    if (across[i].rank < 0 || across[i].rank == s->rank) continue;
+    if (face[i].at != face[i - 3].at + 3 || face[i].at % 4 != 3)
+      continue;
+    if (across[i].rank < 0 || across[i].rank == s->rank)
+      continue;
     if (across[i].number == across[i - 1].number && across[i].number == across[i - 2].number &&
         across[i].number == across[i - 3].number)
       PetscCall(SbImportTwice(s->im, s->im->item[3].number[face[i].at / 4], across[i].number));
@@ -159,17 +175,21 @@ static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const Face face[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Matches all faces with three shared vertices, also those of two local tets, to find a third one. */
+/* Matches all faces with three shared vertices, also those of two local tets, to find a third
+   one. */
 static PetscErrorCode join_faces(Slab *s, PetscInt before)
 {
   const SbItems *tets = &s->im->item[3];
   SbCaughtError caught = {0, ""};
-  PetscInt n = 0, room = 0;
+  PetscInt n = 0;
+  PetscInt room = 0;
   SbRoute route;
-  Face *face = NULL, *got;
+  Face *face = NULL;
+  Face *got;
   Across *across, *result;
 
   PetscFunctionBeginUser;
+
   // faces with three shared vertices, sent to the home rank of the lowest one
   for (PetscInt i = 0; i < 4 * tets->n; i++) {
     PetscInt v[3];
@@ -179,17 +199,22 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       v[k] = tets->vert[4 * (i / 4) + SbFaceVertex[i % 4][k]];
       all = (PetscBool)(all && s->nuser[v[k]] > 1);
     }
-    if (!all) continue;
+    if (!all)
+      continue;
     PetscCall(PetscSortInt(3, v));
     PetscCall(SbReserve(n + 1, sizeof(*face), &room, &face));
-    face[n++] = (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, i, before + i / 4, tets->number[i / 4]};
+    face[n++] =
+      (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, i, before + i / 4, tets->number[i / 4]};
   }
+
   // home ranks match the faces and reply with the cell across
   PetscCall(send_home(s, n, sizeof(Face), face, &route, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
   SB_CATCH(&caught, match_faces(s, &route, got, across));
   PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
-  if (!caught.code) SB_CATCH(&caught, link_faces(s, n, face, result));
+  if (!caught.code)
+    SB_CATCH(&caught, link_faces(s, n, face, result));
+
   // an error of one rank is raised on all ranks
   PetscCall(PetscFree(got));
   PetscCall(PetscFree2(across, result));
@@ -203,12 +228,16 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
   const SbImport *im = s->im;
-  PetscInt *part, *got, n, first, total, npair = 0, kept = 0, *parent;
+  PetscInt *part, *got, n, first, total;
+  PetscInt npair = 0;
+  PetscInt kept = 0;
+  PetscInt *parent;
   PetscInt64 *pair, *all;
   PetscMPIInt *dest;
   SbRoute route;
 
   PetscFunctionBeginUser;
+
   /* parts of this rank, numbered across all ranks */
   PetscCall(PetscMalloc3(im->nvert, &part, s->start[s->nkept], &got, s->start[s->nkept], &pair));
   SbImportJoin(im, part, &n);
@@ -216,7 +245,9 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCall(sum(s, 1, &total));
   first -= n;
-  for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
+  for (PetscInt v = 0; v < im->nvert; v++)
+    part[v] = part[v] == v ? first++ : part[part[v]];
+
   /* pairs of parts that share a vertex, each pair once */
   PetscCall(PetscSFGatherBegin(s->vert, MPIU_INT, part, got));
   PetscCall(PetscSFGatherEnd(s->vert, MPIU_INT, part, got));
@@ -225,14 +256,17 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
       pair[npair++] = (PetscInt64)SbKeyOfPair(got[k - 1], got[k]);
   PetscCall(PetscSortInt64(npair, pair));
   for (PetscInt i = 0; i < npair; i++)
-    if (!kept || pair[i] != pair[kept - 1]) pair[kept++] = pair[i];
+    if (!kept || pair[i] != pair[kept - 1])
+      pair[kept++] = pair[i];
+
   // rank 0 joins the parts of all ranks by union-find
   PetscCall(PetscCalloc1(kept, &dest));
   PetscCall(SbRouteCreate(s->comm, kept, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(*pair), NULL, pair, &all));
   *npart = total;
   PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
-  for (PetscInt p = 0; p < total && !s->rank; p++) parent[p] = p;
+  for (PetscInt p = 0; p < total && !s->rank; p++)
+    parent[p] = p;
   for (PetscInt i = 0; i < route.nrecv; i++)
     *npart -= SbUnionJoin(parent, (PetscInt)(all[i] >> 32), (PetscInt)(all[i] & 0xffffffff));
   PetscCall(PetscFree(parent));
@@ -243,35 +277,46 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds set bits of items to the masks of their vertices at the home ranks, unless one of these is unused. */
+/* Adds set bits of items to the masks of their vertices at the home ranks, unless one of these is
+   unused. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
   PetscSF forest;
   uint64_t *mark;
-  PetscInt n = 0, *vert, *number;
+  PetscInt n = 0;
+  PetscInt *vert, *number;
 
   PetscFunctionBeginUser;
+
   // vertices of all items
-  for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
+  for (int d = 0; d < 3; d++)
+    n += (d + 1) * im->item[d].n;
   PetscCall(PetscMalloc3(n, &vert, n, &mark, n, &number));
   n = 0;
   for (int d = 0; d < 3; d++)
-    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) vert[n++] = im->item[d].vert[i];
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++)
+      vert[n++] = im->item[d].vert[i];
+
   // their numbers, from the home ranks: -1 if no tet uses them
   PetscCall(SbForestCreate(s->comm, s->nkept, n, vert, &forest));
   PetscCall(SbForestBroadcast(forest, 1, MPIU_INT, s->number, number));
+
   // mark the vertices of items whose vertices are all used; then drop points and lines
   n = 0;
   for (int d = 0; d < 3; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
       PetscBool all = PETSC_TRUE;
 
-      for (int k = 0; k <= d; k++) all = (PetscBool)(all && number[n + k] >= 0);
-      for (int k = 0; k <= d; k++) mark[n++] = all ? bits[im->item[d].tags[i]] : 0;
+      for (int k = 0; k <= d; k++)
+        all = (PetscBool)(all && number[n + k] >= 0);
+      for (int k = 0; k <= d; k++)
+        mark[n++] = all ? bits[im->item[d].tags[i]] : 0;
     }
-    if (d < 2) im->item[d].n = 0;
+    if (d < 2)
+      im->item[d].n = 0;
   }
+
   // combine the marks of all ranks at the home ranks
   PetscCall(PetscSFReduceBegin(forest, MPI_UINT64_T, mark, s->mask, MPI_BOR));
   PetscCall(PetscSFReduceEnd(forest, MPI_UINT64_T, mark, s->mask, MPI_BOR));
@@ -286,18 +331,20 @@ typedef struct {
   SbMiddle middle;
 } Item;
 
-/* Sends group triangles and curved edges to the home ranks of their lowest vertices, and from there to all
-   ranks that use these; the ranks whose tets have them keep them. */
+/* Sends group triangles and curved edges to the home ranks of their lowest vertices, and from there
+   to all ranks that use these; the ranks whose tets have them keep them. */
 static PetscErrorCode find_items(Slab *s)
 {
   SbImport *im = s->im;
   SbItems *tri = &im->item[2];
-  const PetscInt ntri = tri->n, nmine = ntri + im->nmiddle.n;
+  const PetscInt ntri = tri->n;
+  const PetscInt nmine = ntri + im->nmiddle.n;
   SbCaughtError caught = {0, ""};
   SbRouteList list = {0};
   SbRoute there, on;
   Item *mine, *got, *in;
-  PetscInt total = im->nmiddle.n, slots[2];
+  PetscInt total = im->nmiddle.n;
+  PetscInt slots[2];
   PetscBool *found, *answered, *any, *anywhere;
   PetscReal largest = 0;
 
@@ -319,12 +366,15 @@ static PetscErrorCode find_items(Slab *s)
   for (PetscInt i = 0; i < there.nrecv; i++) {
     const PetscInt v = got[i].vert[0] - s->rows.first;
 
-    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) PetscCall(SbRouteAdd(&list, i, s->user[k]));
+    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++)
+      PetscCall(SbRouteAdd(&list, i, s->user[k]));
   }
   PetscCall(SbRouteCreate(s->comm, list.n, list.item, list.rank, &on));
   PetscCall(SbRouteSend(&on, sizeof(*got), on.which, got, &in));
+
   // edges of this rank's tets; triangles take part without ends
-  PetscCall(PetscCalloc4(on.nrecv, &found, on.nsend, &answered, there.nrecv, &any, nmine, &anywhere));
+  PetscCall(
+    PetscCalloc4(on.nrecv, &found, on.nsend, &answered, there.nrecv, &any, nmine, &anywhere));
   PetscCall(PetscFree(im->middle));
   PetscCall(PetscMalloc1(on.nrecv, &im->middle));
   im->nmiddle = (SbCount){total ? on.nrecv : 0, on.nrecv};
@@ -332,27 +382,36 @@ static PetscErrorCode find_items(Slab *s)
     const int n = in[i].tags < 0 ? 2 : 3;
 
     for (int k = 0; k < n; k++)
-      PetscCall(PetscFindInt(in[i].vert[k], im->nvert, s->used, &in[i].vert[k])); /* below 0: not here */
+      PetscCall(
+        PetscFindInt(in[i].vert[k], im->nvert, s->used, &in[i].vert[k])); /* below 0: not here */
     im->middle[i] = in[i].middle;
-    for (int k = 0; k < 2; k++) im->middle[i].end[k] = n == 2 ? in[i].vert[k] : -1;
+    for (int k = 0; k < 2; k++)
+      im->middle[i].end[k] = n == 2 ? in[i].vert[k] : -1;
   }
   SB_CATCH(&caught, SbImportMiddles(im, found, &largest));
+
   // triangles that are faces of this rank's tets
   tri->n = 0;
   for (PetscInt i = 0; i < on.nrecv; i++) {
     const PetscInt *v = in[i].vert;
 
-    if (in[i].tags < 0) continue;
-    found[i] = (PetscBool)(v[0] >= 0 && v[1] >= 0 && v[2] >= 0 && SbFacesFind(&s->part->faces, v, slots));
-    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
+    if (in[i].tags < 0)
+      continue;
+    found[i] =
+      (PetscBool)(v[0] >= 0 && v[1] >= 0 && v[2] >= 0 && SbFacesFind(&s->part->faces, v, slots));
+    if (found[i])
+      PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
   }
+
   // whether some rank has found each; an edge in the file that no tet has is an error
   PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
-  for (PetscInt i = 0; i < on.nsend; i++) any[on.which[i]] |= answered[i];
+  for (PetscInt i = 0; i < on.nsend; i++)
+    any[on.which[i]] |= answered[i];
   PetscCall(SbRouteReply(&there, sizeof(PetscBool), any, anywhere));
   for (PetscInt i = 0; i < nmine; i++) {
     im->nlost += i < ntri && !anywhere[i];
-    if (i >= ntri && !anywhere[i] && !caught.code) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i].middle));
+    if (i >= ntri && !anywhere[i] && !caught.code)
+      SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i].middle));
   }
   PetscCall(PetscFree4(found, answered, any, anywhere));
   PetscCall(PetscFree(mine));
@@ -373,7 +432,10 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbCaughtError caught = {0, ""};
   PetscReal largest;
   SbItems *tets = &im->item[3];
-  PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
+  PetscInt low = PETSC_MAX_INT;
+  PetscInt high = -1;
+  PetscInt n = 0;
+  PetscInt *map;
   PetscInt64 *edge, *got;
   SbMasks *m = &s->part->masks;
   uint64_t *bits;
@@ -384,6 +446,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SB_CATCH(&caught, SbImportSlab(&body[b], s->rank, s->size, im, &s->rows));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   s->part->first = tets->n ? (PetscInt)tets->number[0] - 1 : 0;
+
   // vertices used by this rank's tets, ascending; renumber the tets
   for (PetscInt i = 0; i < 4 * tets->n; i++) {
     low = PetscMin(low, tets->vert[i]);
@@ -397,12 +460,15 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(PetscMalloc2(n, &s->used, n, &s->nuser));
   n = 0;
   for (PetscInt v = low; v <= high; v++) {
-    if (!map[v - low]) continue;
+    if (!map[v - low])
+      continue;
     s->used[n] = v;
     map[v - low] = n++;
   }
-  for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
+  for (PetscInt i = 0; i < 4 * tets->n; i++)
+    tets->vert[i] = map[tets->vert[i] - low];
   PetscCall(PetscFree(map));
+
   /* the vertices that were read are this rank's block */
   s->nkept = im->nvert;
   s->x = im->x;
@@ -420,18 +486,22 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(SbImportMeasure(s->comm, im, &s->part->faces, &body[b]));
   body[b].nvert = s->rows.N - im->nunused;
   PetscCall(count_parts(s, &body[b].npart));
-  // surface edges with more than two facets; the home rank of the lower vertex has all facets of an edge
+
+  // surface edges with more than two facets; the home rank of the lower vertex has all facets of an
+  // edge
   n = 3 * s->part->faces.nboundary;
   PetscCall(PetscMalloc1(n, &edge));
   PetscCall(PetscMalloc1(n, &dest));
   SbBoundaryEdges(im, &s->part->faces, s->used, edge);
-  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
+  for (PetscInt i = 0; i < n; i++)
+    dest[i] = home(s, (PetscInt)(edge[i] >> 32));
   PetscCall(SbRouteCreate(s->comm, n, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(*edge), NULL, edge, &got));
   PetscCall(PetscFree(edge));
   PetscCall(SbCountPinched(route.nrecv, got, &im->npinched));
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));
+
   // members of sets: groups of points, lines and triangles, then shapes and groups of tets
   PetscCall(PetscMalloc1(im->ntags, &bits));
   SbSetsBits(im, nbody, body, b, nset, set, bits);
@@ -439,11 +509,13 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(PetscFree(bits));
   PetscCall(find_items(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
+
   // combine the set bits of shared vertices over all ranks; count vertices at their home ranks
   PetscCall(PetscSFReduceBegin(s->vert, MPI_UINT64_T, m->vert, s->mask, MPI_BOR));
   PetscCall(PetscSFReduceEnd(s->vert, MPI_UINT64_T, m->vert, s->mask, MPI_BOR));
   PetscCall(SbForestBroadcast(s->vert, 1, MPI_UINT64_T, s->mask, m->vert));
-  PetscCall(SbSetsCount(s->comm, s->nkept, tets->n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
+  PetscCall(
+    SbSetsCount(s->comm, s->nkept, tets->n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));
   SbImportNote(im, &body[b]);
@@ -451,8 +523,8 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
-                             PetscInt nset, SbSet set[], SbImport *im, SbPart *part)
+PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[],
+                             PetscInt b, PetscInt nset, SbSet set[], SbImport *im, SbPart *part)
 {
   Slab s = {.comm = comm, .im = im, .part = part};
   PetscErrorCode ierr;

@@ -2,8 +2,8 @@
   deck.c - mesh from nodes, elements and sets listed by labels in any order: all are collected, then
   converted.
 
-  Common part of the Abaqus, Nastran and universal file readers. A set may refer to nodes, elements and sets
-  that are defined later, hence its members are found after the whole file has been read.
+  Common part of the Abaqus, Nastran and universal file readers. A set may refer to nodes, elements
+  and sets that are defined later, hence its members are found after the whole file has been read.
 */
 #include "meshio_impl.h"
 
@@ -29,7 +29,8 @@ PetscErrorCode SbDeckAddElement(SbDeck *d, const SbDeckElement *element)
 {
   PetscFunctionBeginUser;
   if (d->unique && SbNumbersFind(&d->im->elements, element->label) >= 0)
-    SB_SCAN_ERROR(&d->im->scan, "element %lld is given twice; %s", (long long)element->label, d->cure);
+    SB_SCAN_ERROR(&d->im->scan, "element %lld is given twice; %s", (long long)element->label,
+                  d->cure);
   PetscCall(SbNumbersAdd(&d->im->elements, element->label));
   d->im->count[element->type]++;
   PetscCall(SbImportGrow(d->im, &d->nelement, sizeof(*element), &d->element));
@@ -56,6 +57,7 @@ PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, PetscInt other, int64_t f
   SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
 
   PetscFunctionBeginUser;
+
   /* merge consecutive labels into one range, unless messages need the line of each label */
   if (before && !d->strict && other < 0 && before->set < 0 && before->step == 1 && step == 1 &&
       first == before->last + 1)
@@ -73,10 +75,12 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
   SbImport *im = d->im;
   const SbNumbers *numbers = set->of_nodes ? &im->nodes : &im->elements;
   const int64_t length = (r->last - r->first) / r->step + 1;
-  const PetscBool all = (PetscBool)(length > numbers->n); /* then test nodes or elements, not labels */
+  const PetscBool all =
+    (PetscBool)(length > numbers->n); /* then test nodes or elements, not labels */
   const int64_t n = all ? numbers->n : length;
 
   PetscFunctionBeginUser;
+
   /* nested sets could multiply the members of a damaged file: limit the number */
   im->scan.token = r->at;
   d->nlooked += n;
@@ -91,12 +95,15 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
 
     if (all) {
       label = numbers->number[i];
-      if (label < r->first || label > r->last || (label - r->first) % r->step) continue;
+      if (label < r->first || label > r->last || (label - r->first) % r->step)
+        continue;
     } else
       at = SbNumbersFind(numbers, label);
     if (at < 0 && d->strict && set->of_nodes)
-      SB_SCAN_ERROR(&im->scan, "group '%s' lists node %lld, which is not there", set->name, (long long)label);
-    if (at < 0) continue;
+      SB_SCAN_ERROR(&im->scan, "group '%s' lists node %lld, which is not there", set->name,
+                    (long long)label);
+    if (at < 0)
+      continue;
     PetscCall(SbImportGrow(im, &d->nfound, sizeof(*d->found), &d->found));
     d->found[d->nfound.n - 1] = at;
   }
@@ -138,32 +145,40 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));
+
   // simplices, with the groups of their properties
   for (PetscInt e = 0; e < d->nelement.n; e++) {
     SbDeckElement *element = &d->element[e];
     const int dim = SbGmshTypes[element->type].dim;
     const PetscBool ten = (PetscBool)(element->type == SB_GMSH_TET10);
-    PetscInt vert[10] = {0}, tags = 0;
+    PetscInt vert[10] = {0};
+    PetscInt tags = 0;
 
     element->item = -1;
-    if (!SbGmshIsSimplex(element->type)) continue;
+    if (!SbGmshIsSimplex(element->type))
+      continue;
     im->scan.token = element->at;
     for (int k = 0; k < (ten ? 10 : dim + 1); k++) {
       const PetscInt v = SbNumbersFind(&im->nodes, element->node[k]);
 
       vert[SbGmshNode(k)] = v;
-      if (v < 0 && (k < 4 || element->node[k] || d->strict)) // Nastran may omit nodes of straight edges
-        SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
-                      (long long)element->node[k]);
+      if (v < 0 &&
+          (k < 4 || element->node[k] || d->strict)) // Nastran may omit nodes of straight edges
+        SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there",
+                      (long long)element->label, (long long)element->node[k]);
     }
-    if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
+    if (element->property >= 0)
+      PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
     element->item = im->item[dim].n;
     PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
-    if (ten) PetscCall(SbImportAddMiddles(im, vert));
+    if (ten)
+      PetscCall(SbImportAddMiddles(im, vert));
   }
+
   // sets become groups of their members; each node of a set becomes a point item
   PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
-  for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    point[v] = -1;
   for (PetscInt s = 0; s < d->nset.n; s++) {
     PetscCall(SbDeckFind(d, s));
     for (PetscInt i = 0; i < d->nfound.n; i++) {
@@ -172,7 +187,8 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 
       if (!d->set[s].of_nodes) {
         dim = SbGmshTypes[d->element[at].type].dim;
-        if (d->element[at].item < 0) continue;
+        if (d->element[at].item < 0)
+          continue;
       } else if (point[at] < 0) {
         point[at] = im->item[0].n;
         PetscCall(SbImportAddItem(im, 0, &at, 0, im->vert_number[at]));

@@ -1,17 +1,21 @@
 /*
   gmsh_library.c - loads the gmsh library at run time, in a child process.
 
-  The library is found by its versioned file name: the arguments of gmshInitialize() changed in 4.9. It prints
-  nothing; its logger keeps the messages, and the last error (or warning) becomes part of ours.
+  The library is found by its versioned file name: the arguments of gmshInitialize() changed in 4.9.
+  It prints nothing; its logger keeps the messages, and the last error (or warning) becomes part of
+  ours.
 */
 #include <dlfcn.h>
 #include <stddef.h>
 #include "meshio_impl.h"
 
-enum { OLDEST = 8, NEWEST = 30 }; /* minor versions: 4.8 to 4.30 */
+enum {
+  OLDEST = 8,
+  NEWEST = 30
+}; /* minor versions: 4.8 to 4.30 */
 
-/* RTLD_DEEPBIND: a gmsh with its own METIS and other libraries must use those, not the ones of this program.
-   The address sanitizer forbids it. */
+/* RTLD_DEEPBIND: a gmsh with its own METIS and other libraries must use those, not the ones of this
+   program. The address sanitizer forbids it. */
 #if defined(__has_feature)
   #if __has_feature(address_sanitizer)
     #define SANITIZED /* as clang tells it */
@@ -44,10 +48,12 @@ static void last_line(const SbGmsh *g, const char *level, size_t size, char text
   for (size_t i = 0; !error && i < n; i++) {
     const char *line = strncmp(log[i], level, strlen(level)) ? NULL : log[i] + strlen(level);
 
-    if (line) (void)snprintf(text, size, "%s", line + strspn(line, " :"));
+    if (line)
+      (void)snprintf(text, size, "%s", line + strspn(line, " :"));
   }
   for (char *p = text; *p; p++)
-    if (*p == '\n') *p = ' ';
+    if (*p == '\n')
+      *p = ' ';
 }
 
 PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
@@ -56,7 +62,8 @@ PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
 
   PetscFunctionBeginUser;
   last_line(g, "Error", sizeof(text), text);
-  if (!text[0]) last_line(g, "Warning", sizeof(text), text);
+  if (!text[0])
+    last_line(g, "Warning", sizeof(text), text);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: gmsh failed: %s (%s)", g->where,
           text[0] ? text : "no reason given", function);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -67,23 +74,31 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
   SbGmsh g = {.where = job->where};
   void *library = NULL, *start, (*before_9)(int, char **, int, int *),
        (*from_9)(int, char **, int, int, int *);
-  char name[64], why[256] = "";
+  char name[64];
+  char why[256] = "";
   const char *message;
-  int minor = NEWEST + 1, error = 1;
+  int minor = NEWEST + 1;
+  int error = 1;
 
   PetscFunctionBeginUser;
+
   // the newest installed version
   while (!library && minor > OLDEST) {
     (void)snprintf(name, sizeof(name), "libgmsh.so.4.%d", --minor);
     library = dlopen(name, BIND);
-    /* the error of an installed library with a missing dependency is more useful than "not found" */
+
+    /* the error of an installed library with a missing dependency is more useful than "not
+       found" */
     message = library ? NULL : dlerror();
-    if (message && !strstr(message, name)) (void)snprintf(why, sizeof(why), "; %s", message);
+    if (message && !strstr(message, name))
+      (void)snprintf(why, sizeof(why), "; %s", message);
   }
-  PetscCheck(library, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the "
-             "package gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
-             g.where, OLDEST, why);
+  PetscCheck(
+    library, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the "
+    "package gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
+    g.where, OLDEST, why);
+
   // look up the functions of the library by name
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
     void *address = dlsym(library, functions[i].name);
@@ -93,6 +108,7 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
                functions[i].name);
     memcpy((char *)&g + functions[i].offset, &address, sizeof(address));
   }
+
   // initialise the library: no output, one thread, an empty model
   start = dlsym(library, "gmshInitialize");
   if (start && minor < 9) {
@@ -102,8 +118,8 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
     memcpy(&from_9, &start, sizeof(start));
     (*from_9)(0, NULL, 0, 0, &error);
   }
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_LIB, "%s: gmshInitialize() of version 4.%d failed", g.where,
-             minor);
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_LIB, "%s: gmshInitialize() of version 4.%d failed",
+             g.where, minor);
   SB_GMSH(&g, OptionSetNumber, "General.Terminal", 0);
   SB_GMSH(&g, OptionSetNumber, "General.NumThreads", 1);
   SB_GMSH(&g, OptionSetNumber, "General.Verbosity", 4);

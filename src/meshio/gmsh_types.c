@@ -42,16 +42,17 @@ PetscErrorCode SbImportCheckTypes(const SbImport *im)
 {
   PetscFunctionBeginUser;
   for (int t = 1; t < SB_GMSH_NTYPES; t++) {
-    const char *advice =
-      strstr(SbGmshTypes[t].name, "tetra")
-        ? "supple takes tets of 4 or 10 nodes (gmsh: Mesh.ElementOrder = 1 or 2)"
-        : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, Recombine off)";
+    const char *advice = strstr(SbGmshTypes[t].name, "tetra")
+                           ? "supple takes tets of 4 or 10 nodes (gmsh: Mesh.ElementOrder = 1 or 2)"
+                           : "supple simulates tetrahedra only: split them (gmsh: "
+                             "Mesh.SubdivisionAlgorithm = 0, Recombine off)";
 
     PetscCheck(t == SB_GMSH_TET || t == SB_GMSH_TET10 || SbGmshTypes[t].dim < 3 || !im->count[t],
                PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: holds %lld %s; %s", im->where,
                (long long)im->count[t], SbGmshTypes[t].name, advice);
   }
-  if (im->count[SB_GMSH_TET] || im->count[SB_GMSH_TET10] || (im->surface && im->count[SB_GMSH_TRIANGLE]))
+  if (im->count[SB_GMSH_TET] || im->count[SB_GMSH_TET10] ||
+      (im->surface && im->count[SB_GMSH_TRIANGLE]))
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int t = 1; t < SB_GMSH_NTYPES; t++)
     PetscCheck(SbGmshTypes[t].dim < 2 || !im->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,

@@ -3,7 +3,8 @@
 
   A new format needs one file with one SbReader and one row in the table below.
 
-  Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the origin.
+  Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the
+  origin.
 */
 #include <strings.h>
 #include "meshio_impl.h"
@@ -15,41 +16,55 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
   char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
+
   // rotation about an axis; exact for multiples of 90 degrees about the coordinate axes
   if (body->rotate[3] != 0) {
     const PetscReal *w = body->rotate;
-    const PetscReal angle = body->rotate[3] * PETSC_PI / 180,
-                    length = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    PetscReal c = PetscCosReal(angle), s = PetscSinReal(angle), a[3];
+    const PetscReal angle = body->rotate[3] * PETSC_PI / 180;
+    const PetscReal length = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    PetscReal c = PetscCosReal(angle);
+    PetscReal s = PetscSinReal(angle);
+    PetscReal a[3];
 
-    PetscCheck(length > 0 && isfinite(length) && isfinite(angle), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "body '%s': rotation by %g degrees about (%g, %g, %g): the axis must have a length above zero",
+    PetscCheck(length > 0 && isfinite(length) && isfinite(angle), PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT,
+               "body '%s': rotation by %g degrees about (%g, %g, %g): the axis must have a length "
+               "above zero",
                body->name, (double)w[3], (double)w[0], (double)w[1], (double)w[2]);
-    if (PetscAbsReal(c) < 1e-15) c = 0;
-    if (PetscAbsReal(s) < 1e-15) s = 0;
-    for (int i = 0; i < 3; i++) a[i] = w[i] / length;
+    if (PetscAbsReal(c) < 1e-15)
+      c = 0;
+    if (PetscAbsReal(s) < 1e-15)
+      s = 0;
+    for (int i = 0; i < 3; i++)
+      a[i] = w[i] / length;
     for (int i = 0; i < 3; i++) {
-      for (int j = 0; j < 3; j++) R[i][j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
+      for (int j = 0; j < 3; j++)
+        R[i][j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
       R[i][(i + 1) % 3] -= s * a[(i + 2) % 3];
       R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
     }
   }
   for (PetscInt m = 0; m < im->nmiddle.n; m++) {
-    PetscReal *off = im->middle[m].off, y[3];
+    PetscReal *off = im->middle[m].off;
+    PetscReal y[3];
 
-    for (int i = 0; i < 3; i++) y[i] = im->scale * off[i];
-    for (int i = 0; i < 3; i++) off[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2];
+    for (int i = 0; i < 3; i++)
+      y[i] = im->scale * off[i];
+    for (int i = 0; i < 3; i++)
+      off[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2];
   }
   for (PetscInt v = 0; v < im->nvert; v++) {
-    PetscReal *x = im->x + 3 * v, y[3];
+    PetscReal *x = im->x + 3 * v;
+    PetscReal y[3];
 
-    for (int i = 0; i < 3; i++) y[i] = im->scale * x[i];
+    for (int i = 0; i < 3; i++)
+      y[i] = im->scale * x[i];
     for (int i = 0; i < 3; i++) {
       x[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2] + body->translate[i];
       PetscCheck(isfinite(x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s: node %lld leaves the range of numbers when scaled by %g; check %s and %s", im->where,
-                 (long long)im->vert_number[v], (double)body->scale, SbImportOption(im, "scale", scale),
-                 SbImportOption(im, "translate", translate));
+                 "%s: node %lld leaves the range of numbers when scaled by %g; check %s and %s",
+                 im->where, (long long)im->vert_number[v], (double)body->scale,
+                 SbImportOption(im, "scale", scale), SbImportOption(im, "translate", translate));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,8 +94,8 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
   PetscInt none;
 
   PetscFunctionBeginUser;
-  (void)snprintf(im->where, sizeof(im->where), "%s%s%s%s", body->name[0] ? "body '" : "", body->name,
-                 body->name[0] ? "': " : "", body->mesh);
+  (void)snprintf(im->where, sizeof(im->where), "%s%s%s%s", body->name[0] ? "body '" : "",
+                 body->name, body->name[0] ? "': " : "", body->mesh);
   PetscCall(PetscStrncpy(im->body, body->name, sizeof(im->body)));
   im->step = body->mesh_step;
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
@@ -92,7 +107,8 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
 /* Reads the mesh of a body, without placing it. */
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
-  char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
+  char known[256] = "";
+  char node[PETSC_MAX_PATH_LEN + 8];
   const char *dot = strrchr(body->mesh, '.');
   SbReader read = strncmp(body->mesh, "box:", 4) ? NULL : SbImportRead_Box;
   PetscBool tetgen = PETSC_TRUE;
@@ -102,16 +118,20 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
   PetscFunctionBeginUser;
   PetscCall(begin(body, im));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers) && !read; i++) {
-    if (dot && !strcasecmp(dot, readers[i].extension)) read = readers[i].read;
+    if (dot && !strcasecmp(dot, readers[i].extension))
+      read = readers[i].read;
     SbAppend(sizeof(known), known, "%s%s", i ? " " : "", readers[i].extension);
   }
+
   // a name without a known ending may be what TetGen's files have in common
   (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
-  if (!read) PetscCall(PetscTestFile(node, 'r', &tetgen));
-  PetscCheck(tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: '%s' is a mesh of no known kind; give a file that ends in %s (or the name of TetGen's "
-             "files without an ending), or box:lx,ly,lz:n",
-             im->where, body->mesh, known);
+  if (!read)
+    PetscCall(PetscTestFile(node, 'r', &tetgen));
+  PetscCheck(
+    tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: '%s' is a mesh of no known kind; give a file that ends in %s (or the name of TetGen's "
+    "files without an ending), or box:lx,ly,lz:n",
+    im->where, body->mesh, known);
   PetscCall((read ? read : SbImportRead_TetGen)(body->mesh, im));
   given = im->nmiddle.n;
   PetscCall(SbImportMiddles(im, NULL, &largest));
@@ -138,7 +158,8 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
     PetscCall(PetscMemcpy(*part[i].array, array, part[i].bytes));
   }
   to->nmiddle.capacity = from->nmiddle.n;
-  for (int d = 0; d < 4; d++) to->item[d].capacity = from->item[d].n;
+  for (int d = 0; d < 4; d++)
+    to->item[d].capacity = from->item[d].n;
   to->capacity[0] = from->ngroup;
   to->capacity[1] = from->ntags + 1;
   to->capacity[2] = from->tags_start[from->ntags];
@@ -146,7 +167,8 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *im)
+PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared,
+                                SbImport *im)
 {
   PetscFunctionBeginUser;
   if (!body->copy_of[0] || !strncmp(body->mesh, "box:", 4)) {
@@ -156,9 +178,9 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
 
   /* the first copy of a body keeps the unplaced mesh for the next ones; memcmp(): padding is 0 */
   // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
-  if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
-      before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||
-      before->scale != body->scale) {
+  if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) ||
+      strcmp(before->mesh, body->mesh) || before->mesh_step != body->mesh_step ||
+      memcmp(&before->tet, &body->tet, sizeof(body->tet)) || before->scale != body->scale) {
     // NOLINTEND(bugprone-suspicious-memory-comparison)
     PetscCall(SbImportDestroy(shared));
     PetscCall(read_body(body, shared));
@@ -178,7 +200,8 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
+PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *im,
+                            SbSlabRows *rows)
 {
   PetscFunctionBeginUser;
   PetscCall(begin(body, im));

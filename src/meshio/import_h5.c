@@ -1,20 +1,21 @@
 /*
-  import_h5.c - reader of HDF5: supple's own meshes (layout in write_h5.c) and the output of a run, fields.h5.
+  import_h5.c - reader of HDF5: supple's own meshes (layout in write_h5.c) and the output of a run,
+  fields.h5.
 
-  Both have /mesh/x and /mesh/cells. A mesh has groups; in the output of a run each body, /mesh/body, becomes
-  a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into
-  which they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points
-  (-output_discontinuous), /mesh/vertices is the vertex of each point: positions are averaged there. For a
-  given step, its displacement is added.
+  Both have /mesh/x and /mesh/cells. A mesh has groups; in the output of a run each body,
+  /mesh/body, becomes a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets,
+  /mesh/cells has the linear tets into which they are subdivided, and /mesh/parent the P2 tet of
+  each. If each tet of the output has its own points (-output_discontinuous), /mesh/vertices is the
+  vertex of each point: positions are averaged there. For a given step, its displacement is added.
 
   An .xmf file refers to the .h5 file of the mesh.
 
   Of a mesh file a block of rows of each array under /mesh may be read: in parallel one by each rank
   (mesh/slab.c).
 
-  Files are not trusted: shape and type of every array and the range of every index are checked, and no array
-  is allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
-  compressed by others, at most a thousand times that).
+  Files are not trusted: shape and type of every array and the range of every index are checked, and
+  no array is allocated that is larger than the file can hold (uncompressed, as written here, at
+  most the file size; compressed by others, at most a thousand times that).
 */
 #include <stdlib.h>
 #include <strings.h>
@@ -23,9 +24,9 @@
 typedef struct {
   SbImport *im;
   hid_t file;
-  size_t bytes;          /* file size in bytes */
-  char frame[64];        /* HDF5 group of the wanted step; "": rest positions */
-  char mesh[32];         /* path that replaces "/mesh" in names: "/mesh", after re-meshing "/mesh_000123" */
+  size_t bytes;   /* file size in bytes */
+  char frame[64]; /* HDF5 group of the wanted step; "": rest positions */
+  char mesh[32]; /* path that replaces "/mesh" in names: "/mesh", after re-meshing "/mesh_000123" */
   PetscInt part, nparts; /* block to read, and number of blocks; nparts 0: all rows */
   PetscInt nvert;        /* number of vertices in the file */
 } File;
@@ -80,17 +81,21 @@ static PetscErrorCode open_array(const File *f, Array *a)
   PetscFunctionBeginUser;
   path_of(f, a->name, path);
   a->set = is_there(f, a->name) ? H5Dopen2(f->file, path, H5P_DEFAULT) : -1;
-  if (a->set < 0) H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", a->name);
+  if (a->set < 0)
+    H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", a->name);
   a->type = H5Dget_type(a->set);
   a->width = H5Tget_size(a->type);
   space = H5Dget_space(a->set);
   ndim = H5Sget_simple_extent_ndims(space);
-  if (ndim == 1 || ndim == 2) (void)H5Sget_simple_extent_dims(space, size, NULL);
+  if (ndim == 1 || ndim == 2)
+    (void)H5Sget_simple_extent_dims(space, size, NULL);
   (void)H5Sclose(space);
   plist = H5Dget_create_plist(a->set);
   packed = (PetscBool)(plist >= 0 && H5Pget_nfilters(plist) > 0);
-  if (plist >= 0) (void)H5Pclose(plist);
-  if (H5Tget_class(a->type) != a->klass || (a->klass == H5T_STRING && H5Tis_variable_str(a->type) > 0))
+  if (plist >= 0)
+    (void)H5Pclose(plist);
+  if (H5Tget_class(a->type) != a->klass ||
+      (a->klass == H5T_STRING && H5Tis_variable_str(a->type) > 0))
     H5_ERROR(f, "%s does not hold %s", a->name,
              a->klass == H5T_FLOAT     ? "real numbers"
              : a->klass == H5T_INTEGER ? "whole numbers"
@@ -99,12 +104,17 @@ static PetscErrorCode open_array(const File *f, Array *a)
     H5_ERROR(f, "%s has %d dimensions and %llu columns; expected %llu columns", a->name, ndim,
              (unsigned long long)size[1], (unsigned long long)a->ncomp);
   if (size[0] > (hsize_t)PETSC_MAX_INT / 8)
-    H5_ERROR(f, "%s has %llu rows, more than this build can number", a->name, (unsigned long long)size[0]);
+    H5_ERROR(f, "%s has %llu rows, more than this build can number", a->name,
+             (unsigned long long)size[0]);
+
   // an array larger than the file can hold is an error, before anything is allocated
   want = (double)size[0] * (double)a->ncomp * (double)a->width;
   if (want > (packed ? 1000. : 1.) * (double)f->bytes)
-    H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %zu bytes of the file hold; it is damaged",
-             a->name, (unsigned long long)size[0], (unsigned long long)a->ncomp, f->bytes);
+    H5_ERROR(
+      f,
+      "%s announces %llu x %llu numbers, more than the %zu bytes of the file hold; it is damaged",
+      a->name, (unsigned long long)size[0], (unsigned long long)a->ncomp, f->bytes);
+
   // rows of the block
   a->rows = (SbSlabRows){(PetscInt)size[0], (PetscInt)size[0], 0};
   a->n = size[0];
@@ -120,8 +130,11 @@ static PetscErrorCode open_array(const File *f, Array *a)
 static PetscErrorCode read_values(const File *f, const Array *a, void *values)
 {
   const hid_t whole = a->bound >= 0 && sizeof(PetscInt) == 4 ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;
-  const hid_t type = a->klass == H5T_FLOAT ? H5T_NATIVE_DOUBLE : a->klass == H5T_INTEGER ? whole : a->type;
-  const hsize_t first[2] = {(hsize_t)a->rows.first, 0}, n[2] = {a->n, a->ncomp};
+  const hid_t type = a->klass == H5T_FLOAT     ? H5T_NATIVE_DOUBLE
+                     : a->klass == H5T_INTEGER ? whole
+                                               : a->type;
+  const hsize_t first[2] = {(hsize_t)a->rows.first, 0};
+  const hsize_t n[2] = {a->n, a->ncomp};
   herr_t status = 0;
 
   PetscFunctionBeginUser;
@@ -130,17 +143,20 @@ static PetscErrorCode read_values(const File *f, const Array *a, void *values)
     const hid_t in_memory = H5Screate_simple(H5Sget_simple_extent_ndims(in_file), n, NULL);
 
     status = H5Sselect_hyperslab(in_file, H5S_SELECT_SET, first, NULL, n, NULL);
-    if (status >= 0) status = H5Dread(a->set, type, in_memory, in_file, H5P_DEFAULT, values);
+    if (status >= 0)
+      status = H5Dread(a->set, type, in_memory, in_file, H5P_DEFAULT, values);
     (void)H5Sclose(in_file);
     (void)H5Sclose(in_memory);
   }
-  if (status < 0) H5_ERROR(f, "%s cannot be read; the file is damaged, write or copy it again", a->name);
+  if (status < 0)
+    H5_ERROR(f, "%s cannot be read; the file is damaged, write or copy it again", a->name);
   for (size_t i = 0; i < (size_t)(a->n * a->ncomp) && a->klass != H5T_STRING; i++) {
     const size_t row = (size_t)a->rows.first + i / (size_t)a->ncomp + 1;
 
     if (a->klass == H5T_FLOAT && !isfinite(((PetscReal *)values)[i]))
       H5_ERROR(f, "%s holds no finite number in row %zu", a->name, row);
-    if (a->klass == H5T_FLOAT || a->bound < 0) continue;
+    if (a->klass == H5T_FLOAT || a->bound < 0)
+      continue;
     if (((PetscInt *)values)[i] < 0 || ((PetscInt *)values)[i] >= a->bound)
       H5_ERROR(f, "%s holds %lld in row %zu; it must be from 0 to %lld", a->name,
                (long long)((PetscInt *)values)[i], row, (long long)a->bound - 1);
@@ -150,14 +166,16 @@ static PetscErrorCode read_values(const File *f, const Array *a, void *values)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens and reads an array into scratch memory. n: number of rows that it must have; -1: any, returned. */
+/* Opens and reads an array into scratch memory. n: number of rows that it must have; -1: any,
+   returned. */
 static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *values)
 {
   PetscFunctionBeginUser;
   PetscCall(open_array(f, a));
   if (*n >= 0 && *n != (PetscInt)a->n)
-    H5_ERROR(f, "%s has %lld rows; %lld are needed to fit /mesh/cells, /mesh/x or what else it describes",
-             a->name, (long long)a->n, (long long)*n);
+    H5_ERROR(
+      f, "%s has %lld rows; %lld are needed to fit /mesh/cells, /mesh/x or what else it describes",
+      a->name, (long long)a->n, (long long)*n);
   *n = (PetscInt)a->n;
   *(void **)values = NULL;
   PetscCall(SbImportScratch(f->im, (size_t)(a->n * a->ncomp) * PetscMax(a->width, 8), values));
@@ -166,37 +184,47 @@ static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *val
 }
 
 /* Reads an array of integers in [0, bound), as PetscInt; bound -1: any, as int64_t. */
-static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp, int64_t bound, PetscInt *n,
-                                 void *values)
+static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp, int64_t bound,
+                                 PetscInt *n, void *values)
 {
-  return read_array(f, &(Array){.name = name, .klass = H5T_INTEGER, .ncomp = ncomp, .bound = bound}, n,
-                    values);
+  return read_array(f, &(Array){.name = name, .klass = H5T_INTEGER, .ncomp = ncomp, .bound = bound},
+                    n, values);
 }
 
 /* Reads the simplices of one dimension, without groups. */
 static PetscErrorCode read_items(const File *f, int dim, const char *name)
 {
   SbItems *item = &f->im->item[dim];
-  Array a = {
-    .name = name, .klass = H5T_INTEGER, .ncomp = (hsize_t)dim + 1, .bound = f->nvert, .block = PETSC_TRUE};
+  Array a = {.name = name,
+             .klass = H5T_INTEGER,
+             .ncomp = (hsize_t)dim + 1,
+             .bound = f->nvert,
+             .block = PETSC_TRUE};
 
   PetscFunctionBeginUser;
   PetscCall(open_array(f, &a));
   PetscCall(SbImportSetItems(f->im, dim, (PetscInt)a.n));
   PetscCall(read_values(f, &a, item->vert));
-  for (PetscInt i = 0; i < item->n; i++) item->number[i] += a.rows.first;
+  for (PetscInt i = 0; i < item->n; i++)
+    item->number[i] += a.rows.first;
   PetscCall(PetscArrayzero(item->tags, item->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the curved edges: vertices, and offsets of the edge nodes from the midpoints; layout 2 only. */
+/* Reads the curved edges: vertices, and offsets of the edge nodes from the midpoints; layout 2
+   only. */
 static PetscErrorCode read_curved(const File *f, int layout)
 {
   SbImport *im = f->im;
-  Array edges = {
-    .name = "/mesh/curved_edges", .klass = H5T_INTEGER, .ncomp = 2, .bound = f->nvert, .block = PETSC_TRUE};
+  Array edges = {.name = "/mesh/curved_edges",
+                 .klass = H5T_INTEGER,
+                 .ncomp = 2,
+                 .bound = f->nvert,
+                 .block = PETSC_TRUE};
   Array off = {.name = "/mesh/edge_offsets", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
-  PetscInt n = -1, noff = -1, *end;
+  PetscInt n = -1;
+  PetscInt noff = -1;
+  PetscInt *end;
   PetscReal *x;
 
   PetscFunctionBeginUser;
@@ -204,10 +232,13 @@ static PetscErrorCode read_curved(const File *f, int layout)
     const char *name = k ? off.name : edges.name;
 
     if (is_there(f, name) != (layout == 2))
-      H5_ERROR(f, "is a mesh of layout %d and has %s %s; layout 2 has it, layout 1 has not; write it again",
-               layout, layout == 2 ? "no array" : "the array", name);
+      H5_ERROR(
+        f,
+        "is a mesh of layout %d and has %s %s; layout 2 has it, layout 1 has not; write it again",
+        layout, layout == 2 ? "no array" : "the array", name);
   }
-  if (layout == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  if (layout == 1)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_array(f, &edges, &n, &end));
   PetscCall(read_array(f, &off, &noff, &x));
   if (edges.rows.N != off.rows.N)
@@ -216,11 +247,13 @@ static PetscErrorCode read_curved(const File *f, int layout)
   PetscCall(PetscMalloc1(n, &im->middle));
   im->nmiddle = (SbCount){n, n};
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt a = end[2 * i], b = end[2 * i + 1], row = edges.rows.first + i + 1;
+    const PetscInt a = end[2 * i];
+    const PetscInt b = end[2 * i + 1];
+    const PetscInt row = edges.rows.first + i + 1;
 
     if (a == b)
-      H5_ERROR(f, "%s holds %lld twice in row %lld; an edge has two vertices", edges.name, (long long)a,
-               (long long)row);
+      H5_ERROR(f, "%s holds %lld twice in row %lld; an edge has two vertices", edges.name,
+               (long long)a, (long long)row);
     im->middle[i] = (SbMiddle){.end = {PetscMin(a, b), PetscMax(a, b)},
                                .node = -1 - row,
                                .off = {x[3 * i], x[3 * i + 1], x[3 * i + 2]}};
@@ -231,13 +264,20 @@ static PetscErrorCode read_curved(const File *f, int layout)
 /* Groups of a mesh file. */
 static PetscErrorCode read_own(const File *f)
 {
-  PetscInt nset, *map = NULL, *set, ngroup = -1, nmember = -1, nstart = -1, *group = NULL, *member, *start,
-                 *dim;
+  PetscInt nset;
+  PetscInt *map = NULL;
+  PetscInt *set;
+  PetscInt ngroup = -1;
+  PetscInt nmember = -1;
+  PetscInt nstart = -1;
+  PetscInt *group = NULL;
+  PetscInt *member, *start, *dim;
   int64_t *number;
   char *title;
   Array text = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
 
   PetscFunctionBeginUser;
+
   // group[] and map[]: numbers of the file's groups and tag sets in the import
   PetscCall(read_array(f, &text, &ngroup, &title));
   PetscCall(read_table(f, "/groups/dim", 1, 4, &ngroup, &dim));
@@ -254,12 +294,14 @@ static PetscErrorCode read_own(const File *f)
   PetscCall(read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start));
   nset = PetscMax(nstart - 1, 0);
   PetscCall(SbImportScratch(f->im, (size_t)nset * sizeof(*map), &map));
-  for (PetscInt i = 0; i < nmember; i++) member[i] = group[member[i]];
+  for (PetscInt i = 0; i < nmember; i++)
+    member[i] = group[member[i]];
   for (PetscInt t = 0; t < nset; t++) {
     if (start[t] > start[t + 1])
-      H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged", (long long)start[t],
-               (long long)start[t + 1]);
-    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &map[t]));
+      H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged",
+               (long long)start[t], (long long)start[t + 1]);
+    PetscCall(
+      SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &map[t]));
   }
   for (int d = 0; d < 4; d++) {
     SbItems *item = &f->im->item[d];
@@ -268,10 +310,13 @@ static PetscErrorCode read_own(const File *f)
 
     (void)snprintf(items, sizeof(items), "/mesh/%ss", SbH5Items[d]);
     (void)snprintf(tags, sizeof(tags), "/mesh/%s_tags", SbH5Items[d]);
-    if (d < 3 && !is_there(f, items)) continue;
-    if (d < 3) PetscCall(read_items(f, d, items));
+    if (d < 3 && !is_there(f, items))
+      continue;
+    if (d < 3)
+      PetscCall(read_items(f, d, items));
     PetscCall(read_array(f, &a, &item->n, &set));
-    for (PetscInt i = 0; i < item->n; i++) item->tags[i] = map[set[i]];
+    for (PetscInt i = 0; i < item->n; i++)
+      item->tags[i] = map[set[i]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -283,7 +328,8 @@ static herr_t visit_frame(hid_t where, const char *name, const H5L_info_t *info,
   const int64_t step = strtoll(name, NULL, 10);
 
   (void)where, (void)info;
-  if (!s->n++) s->first = step;
+  if (!s->n++)
+    s->first = step;
   s->first = PetscMin(s->first, step);
   if (s->wanted == step || (s->wanted < 0 && (s->n == 1 || step >= s->last)))
     (void)snprintf(s->found, sizeof(s->found), "/step/%.20s/%.20s", s->hundred, name);
@@ -296,7 +342,8 @@ static herr_t visit_hundred(hid_t where, const char *name, const H5L_info_t *inf
   const hid_t group = H5Gopen2(where, name, H5P_DEFAULT);
 
   (void)info;
-  if (group < 0) return 0;
+  if (group < 0)
+    return 0;
   ((SbH5Frames *)ctx)->hundred = name;
   (void)H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, visit_frame, ctx);
   (void)H5Gclose(group);
@@ -313,7 +360,8 @@ void SbH5FindFrame(hid_t file, SbH5Frames *frames)
 /* Opens an attribute; negative if there is none. */
 static hid_t open_attribute(hid_t file, const char *object, const char *name)
 {
-  if (H5Aexists_by_name(file, object, name, H5P_DEFAULT) <= 0) return -1;
+  if (H5Aexists_by_name(file, object, name, H5P_DEFAULT) <= 0)
+    return -1;
   return H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
 }
 
@@ -323,23 +371,28 @@ static int number_of(hid_t file, const char *object, const char *name)
   const hid_t attribute = open_attribute(file, object, name);
   int value = 0;
 
-  if (attribute >= 0 && H5Aread(attribute, H5T_NATIVE_INT, &value) < 0) value = 0;
-  if (attribute >= 0) (void)H5Aclose(attribute);
+  if (attribute >= 0 && H5Aread(attribute, H5T_NATIVE_INT, &value) < 0)
+    value = 0;
+  if (attribute >= 0)
+    (void)H5Aclose(attribute);
   return value;
 }
 
 PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 {
-  const hid_t attribute = open_attribute(file, mesh, "bodies"),
-              type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+  const hid_t attribute = open_attribute(file, mesh, "bodies");
+  const hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
   const PetscBool text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
                                      H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(text ? H5Tget_size(type) + 1 : 1, names));
-  if (text) (void)H5Aread(attribute, type, *names);
-  if (type >= 0) (void)H5Tclose(type);
-  if (attribute >= 0) (void)H5Aclose(attribute);
+  if (text)
+    (void)H5Aread(attribute, type, *names);
+  if (type >= 0)
+    (void)H5Tclose(type);
+  if (attribute >= 0)
+    (void)H5Aclose(attribute);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -347,13 +400,18 @@ PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
-  PetscInt *body, nbody = 0, *tags;
+  PetscInt *body;
+  PetscInt nbody = 0;
+  PetscInt *tags;
   char *names, *name, *rest;
 
   PetscFunctionBeginUser;
-  if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!is_there(f, "/mesh/body"))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, &im->item[3].n, &body));
-  for (PetscInt c = 0; c < im->item[3].n; c++) nbody = PetscMax(nbody, body[c] + 1);
+  for (PetscInt c = 0; c < im->item[3].n; c++)
+    nbody = PetscMax(nbody, body[c] + 1);
+
   // names of the bodies; old files have none
   PetscCall(SbH5BodyNames(f->file, f->mesh, &names));
   rest = names;
@@ -365,18 +423,21 @@ static PetscErrorCode read_bodies(const File *f)
     (void)snprintf(plain, sizeof(plain), "body_%d", (int)b + 1);
     PetscCall(SbImportTagsAlone(im, 3, b + 1, name && name[0] ? name : plain, &tags[b]));
   }
-  for (PetscInt c = 0; c < im->item[3].n; c++) im->item[3].tags[c] = tags[body[c]];
+  for (PetscInt c = 0; c < im->item[3].n; c++)
+    im->item[3].tags[c] = tags[body[c]];
   PetscCall(PetscFree(tags));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point
-   of the file; NULL: identity. */
+/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of
+   each point of the file; NULL: identity. */
 static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
 {
   SbItems *item = &f->im->item[3];
-  PetscInt n = -1, *parent, last = -1;
+  PetscInt n = -1;
+  PetscInt *parent;
+  PetscInt last = -1;
   int64_t *node;
 
   PetscFunctionBeginUser;
@@ -390,7 +451,8 @@ static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
     }
     item->n = last + 1;
   }
-  if (n != item->n) H5_ERROR(f, "/mesh/cells10 does not fit /mesh/cells; the file is damaged");
+  if (n != item->n)
+    H5_ERROR(f, "/mesh/cells10 does not fit /mesh/cells; the file is damaged");
   for (PetscInt c = 0; c < n; c++) {
     PetscInt vert[10];
 
@@ -416,6 +478,7 @@ static PetscErrorCode read_output(const File *f)
   PetscInt *at = NULL;
 
   PetscFunctionBeginUser;
+
   // positions at the wanted step
   if (f->frame[0]) {
     char name[96];
@@ -424,27 +487,33 @@ static PetscErrorCode read_output(const File *f)
     (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
     if (!is_there(f, name))
       H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
-    PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &im->nvert, &u));
-    for (PetscInt i = 0; i < 3 * im->nvert; i++) im->x[i] += u[i];
+    PetscCall(
+      read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &im->nvert, &u));
+    for (PetscInt i = 0; i < 3 * im->nvert; i++)
+      im->x[i] += u[i];
   }
   if (is_there(f, "/mesh/vertices")) {
     const PetscInt n = im->item[3].n;
-    PetscInt *vertex, *share, nvert = 0;
+    PetscInt *vertex, *share;
+    PetscInt nvert = 0;
     PetscReal *x;
 
     // merge the points of each vertex, at their mean position
     PetscCall(read_table(f, "/mesh/vertices", 4, im->nvert, &im->item[3].n, &vertex));
-    for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
+    for (PetscInt i = 0; i < 4 * n; i++)
+      nvert = PetscMax(nvert, vertex[i] + 1);
     PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
     PetscCall(SbImportScratch(im, (size_t)f->nvert * sizeof(*at), &at));
     PetscCall(PetscArrayzero(at, f->nvert));
     for (PetscInt i = 0; i < 4 * n; i++) {
-      for (int k = 0; k < 3; k++) x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
+      for (int k = 0; k < 3; k++)
+        x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
       share[vertex[i]]++;
       at[im->item[3].vert[i]] = vertex[i];
     }
     for (PetscInt v = 0; v < nvert; v++) {
-      for (int k = 0; k < 3; k++) im->x[3 * v + k] = share[v] ? x[3 * v + k] / share[v] : 0;
+      for (int k = 0; k < 3; k++)
+        im->x[3 * v + k] = share[v] ? x[3 * v + k] / share[v] : 0;
       im->vert_number[v] = v + 1;
     }
     PetscCall(PetscArraycpy(im->item[3].vert, vertex, 4 * n));
@@ -452,7 +521,8 @@ static PetscErrorCode read_output(const File *f)
     PetscCall(PetscFree2(x, share));
   }
   PetscCall(read_bodies(f));
-  if (is_there(f, "/mesh/cells10") || is_there(f, "/mesh/parent")) PetscCall(read_quadratic(f, at));
+  if (is_there(f, "/mesh/cells10") || is_there(f, "/mesh/parent"))
+    PetscCall(read_quadratic(f, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -462,14 +532,16 @@ static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, v
   char *text = (char *)ctx;
 
   (void)where, (void)info;
-  if (strlen(text) < 160) SbAppend(256, text, "%s%.60s", text[0] ? ", " : "", name);
+  if (strlen(text) < 160)
+    SbAppend(256, text, "%s%.60s", text[0] ? ", " : "", name);
   return 0;
 }
 
 static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
-  const int layout = number_of(f->file, "/", "supple_mesh"); /* version; 0 for the output of a run */
+  const int layout =
+    number_of(f->file, "/", "supple_mesh"); /* version; 0 for the output of a run */
   Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
   SbH5Frames s = {.wanted = f->im->step};
   char content[256] = "";
@@ -480,40 +552,46 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
     H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", layout);
   if (!is_there(f, "/mesh/x") || !is_there(f, "/mesh/cells")) {
     (void)H5Literate(f->file, H5_INDEX_NAME, H5_ITER_INC, NULL, list_name, content);
-    H5_ERROR(
-      f,
-      "holds no mesh: /mesh/x and /mesh/cells are missing%s%s; give an .h5 mesh of supple-mesh, or the "
-      "fields.h5 of a run",
-      content[0] ? "; it holds " : "", content);
+    H5_ERROR(f,
+             "holds no mesh: /mesh/x and /mesh/cells are missing%s%s; give an .h5 mesh of "
+             "supple-mesh, or the "
+             "fields.h5 of a run",
+             content[0] ? "; it holds " : "", content);
   }
+
   // HDF5 group of the wanted step
   if (im->step) {
     if (!is_there(f, "/step"))
       H5_ERROR(f, "holds a mesh, no steps of a run; leave out the step %lld", (long long)s.wanted);
     SbH5FindFrame(f->file, &s);
-    if (!s.n) H5_ERROR(f, "has no step yet");
+    if (!s.n)
+      H5_ERROR(f, "has no step yet");
     if (!s.found[0])
       H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",
                (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
     (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
     number = number_of(f->file, f->frame, "mesh");
-    if (number) (void)snprintf(f->mesh, sizeof(f->mesh), "/mesh_%06d", number);
+    if (number)
+      (void)snprintf(f->mesh, sizeof(f->mesh), "/mesh_%06d", number);
   }
   PetscCall(open_array(f, &x));
   PetscCall(SbImportSetVertices(im, (PetscInt)x.n));
   PetscCall(read_values(f, &x, im->x));
   *rows = x.rows;
   f->nvert = rows->N;
-  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = rows->first + v + 1;
+  for (PetscInt v = 0; v < im->nvert; v++)
+    im->vert_number[v] = rows->first + v + 1;
   PetscCall(read_items(f, 3, "/mesh/cells"));
   PetscCall(layout ? read_own(f) : read_output(f));
-  if (layout) PetscCall(read_curved(f, layout));
+  if (layout)
+    PetscCall(read_curved(f, layout));
   if (!im->item[3].n && !f->nparts && !(im->surface && im->item[2].n))
     H5_ERROR(f, "holds no tetrahedra; mesh the volume (supple-mesh tet)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
+PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *im,
+                               SbSlabRows *rows)
 {
   File f = {.im = im, .file = -1, .mesh = "/mesh", .part = k, .nparts = n};
   PetscErrorCode ierr;
@@ -522,23 +600,26 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
   FILE *file;
 
   PetscFunctionBeginUser;
+
   // error: missing file, not an HDF5 file, or truncated
   access = H5Pcreate(H5P_FILE_ACCESS);
   PetscCall(SbScanOpenFile(f.im->where, path, &file, &f.bytes));
   (void)fclose(file);
-  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* HDF5's error stack is replaced by one line of ours */
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL,
+                     NULL); /* HDF5's error stack is replaced by one line of ours */
   is_hdf5 = H5Fis_hdf5(path);
   (void)H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* with all objects, also after an error */
   f.file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
   (void)H5Pclose(access);
   if (is_hdf5 <= 0)
-    H5_ERROR(&f, "is no HDF5 file (%zu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
-             f.bytes);
-  if (f.file < 0)
     H5_ERROR(
-      &f,
-      "HDF5 cannot open it (%zu bytes); it is truncated, damaged or being written: write or copy it again",
+      &f, "is no HDF5 file (%zu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
       f.bytes);
+  if (f.file < 0)
+    H5_ERROR(&f,
+             "HDF5 cannot open it (%zu bytes); it is truncated, damaged or being written: write or "
+             "copy it again",
+             f.bytes);
   ierr = read_mesh(&f, rows);
   (void)H5Fclose(f.file);
   PetscFunctionReturn(ierr);
@@ -560,35 +641,41 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   hssize_t n;
 
   *ncell = 0;
-  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5")) return;
+  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
+    return;
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (file < 0) return;
+  if (file < 0)
+    return;
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;
   space = H5Dget_space(set);
   n = H5Sget_simple_extent_npoints(space); /* negative without the array */
-  if (n > 0 && n <= PETSC_MAX_INT / 2) *ncell = (PetscInt)(n / 4);
+  if (n > 0 && n <= PETSC_MAX_INT / 2)
+    *ncell = (PetscInt)(n / 4);
   (void)H5Sclose(space);
   (void)H5Dclose(set);
   (void)H5Fclose(file);
 }
 
-/* Reads the .h5 file to which the first array of an .xmf refers, relative to the folder of the .xmf. */
+/* Reads the .h5 file to which the first array of an .xmf refers, relative to the folder of the
+   .xmf. */
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *im)
 {
   static const char mark[] = ".h5:/mesh/";
-  const char *slash = strrchr(path, '/'), *begin;
+  const char *slash = strrchr(path, '/');
+  const char *begin;
   SbScan *s = &im->scan;
   char h5[2 * PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
   if (!SbScanFind(s, mark))
-    SB_SCAN_ERROR(s, "names no mesh in an .h5 file; supple reads the .xmf of its own output and meshes");
+    SB_SCAN_ERROR(
+      s, "names no mesh in an .h5 file; supple reads the .xmf of its own output and meshes");
   for (begin = s->at; begin > s->data && !strchr(" \t\r\n>\"", begin[-1]); begin--) {
   }
-  (void)snprintf(h5, sizeof(h5), "%.*s%.*s", slash && *begin != '/' ? (int)(slash + 1 - path) : 0, path,
-                 (int)(s->at + 3 - begin), begin);
+  (void)snprintf(h5, sizeof(h5), "%.*s%.*s", slash && *begin != '/' ? (int)(slash + 1 - path) : 0,
+                 path, (int)(s->at + 3 - begin), begin);
   PetscCall(SbImportRead_H5(h5, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,11 @@
 /*
-  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software",
-  P. Frey, INRIA RT-0253, 2001), also written by mmg, CGAL and FreeFEM.
+  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization
+  software", P. Frey, INRIA RT-0253, 2001), also written by mmg, CGAL and FreeFEM.
 
-  A keyword is followed by a count and that many lines of numbers, the last one a reference: N gives the group
-  volume_N, surface_N or curve_N, 0 none except for tets. A # begins a comment. Other keywords (Corners,
-  Ridges, Normals, Required...) are skipped with their numbers. Errors: binary files (.meshb), volume elements
-  other than tets of 4 or 10 nodes.
+  A keyword is followed by a count and that many lines of numbers, the last one a reference: N gives
+  the group volume_N, surface_N or curve_N, 0 none except for tets. A # begins a comment. Other
+  keywords (Corners, Ridges, Normals, Required...) are skipped with their numbers. Errors: binary
+  files (.meshb), volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -21,12 +21,14 @@ static const struct {
 static PetscErrorCode read_elements(SbImport *im, int type)
 {
   SbScan *s = &im->scan;
-  const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
+  const int dim = SbGmshTypes[type].dim;
+  const int nnode = SbGmshTypes[type].nnode;
   int64_t n, point, reference;
   PetscInt vert[10];
 
   PetscFunctionBeginUser;
-  if (!im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
+  if (!im->x)
+    SB_SCAN_ERROR(s, "elements before the section Vertices");
   PetscCall(SbScanCount(s, SbGmshTypes[type].name, 2 * nnode, 2 * nnode, &n));
   for (int64_t i = 0; i < n; i++) {
     PetscInt tags = 0;
@@ -34,9 +36,10 @@ static PetscErrorCode read_elements(SbImport *im, int type)
     for (int k = 0; k < nnode; k++) {
       PetscCall(SbScanText(s, "vertex of an element", &point));
       if (point < 1 || point > im->nvert)
-        SB_SCAN_ERROR(s, "element %lld uses vertex %lld of %lld", (long long)i + 1, (long long)point,
-                      (long long)im->nvert);
-      if (k < 10) vert[SbGmshNode(k)] = (PetscInt)(point - 1);
+        SB_SCAN_ERROR(s, "element %lld uses vertex %lld of %lld", (long long)i + 1,
+                      (long long)point, (long long)im->nvert);
+      if (k < 10)
+        vert[SbGmshNode(k)] = (PetscInt)(point - 1);
     }
     PetscCall(SbScanText(s, "reference of an element", &reference));
     if (SbGmshIsSimplex(type) && (reference || dim == 3))
@@ -57,6 +60,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   PetscCall(SbScanOpen(im->where, path, s));
   s->comment = '#';
   SbScanNext(s);
+
   // a neutral file of Netgen, which has the same extension, begins with a number
   if (s->at < s->end && isdigit((unsigned char)*s->at)) {
     PetscCall(PetscFree(s->data));
@@ -65,16 +69,22 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   }
   (void)SbScanWord(s, sizeof(word), word);
   if (strcmp(word, "MeshVersionFormatted"))
-    SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
+    SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit",
+                  word);
   for (;;) {
     // skip other sections: go to the next word that is not a number
     for (SbScanNext(s); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s))
-      while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-    if (!SbScanWord(s, sizeof(word), word)) SB_SCAN_ENDS(s, "a section, or '%s',", "End");
-    if (!strcmp(word, "End")) break;
+      while (s->at < s->end && !isspace((unsigned char)*s->at))
+        s->at++;
+    if (!SbScanWord(s, sizeof(word), word))
+      SB_SCAN_ENDS(s, "a section, or '%s',", "End");
+    if (!strcmp(word, "End"))
+      break;
+
     // coordinates and a reference, which is ignored
     if (!strcmp(word, "Vertices")) {
-      if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
+      if (im->x)
+        SB_SCAN_ERROR(s, "second section Vertices");
       PetscCall(SbScanCount(s, "vertices", 8, 8, &n));
       PetscCall(SbImportSetVertices(im, (PetscInt)n));
       for (PetscInt v = 0; v < n; v++) {
@@ -84,10 +94,12 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     }
     if (!strcmp(word, "Dimension")) {
       PetscCall(SbScanText(s, "dimension", &dimension));
-      if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
+      if (dimension != 3)
+        SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
     }
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++)
-      if (!strcmp(word, elements[i].word)) PetscCall(read_elements(im, elements[i].type));
+      if (!strcmp(word, elements[i].word))
+        PetscCall(read_elements(im, elements[i].type));
   }
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,11 +1,12 @@
 /*
-  import_unv.c - universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477:
-  groups).
+  import_unv.c - universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements,
+  2429 to 2477: groups).
 
-  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates
-  (units and coordinate systems are ignored); tets, triangles, lines. An element belongs to the group
-  volume_N, surface_N or curve_N of its physical property N, and to the named groups that list it. Groups of
-  nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
+  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their
+  coordinates (units and coordinate systems are ignored); tets, triangles, lines. An element belongs
+  to the group volume_N, surface_N or curve_N of its physical property N, and to the named groups
+  that list it. Groups of nodes are kept too. Errors: volume elements other than tets of 4 or 10
+  nodes.
 */
 #include "meshio_impl.h"
 
@@ -25,7 +26,8 @@ static PetscBool is_mark(const SbScan *s)
 {
   const char *p = s->at + strspn(s->at, " \t");
 
-  if (strncmp(p, "-1", 2)) return PETSC_FALSE;
+  if (strncmp(p, "-1", 2))
+    return PETSC_FALSE;
   p += 2 + strspn(p + 2, " \t\r\v\f");
   return (PetscBool)(*p == '\n' || p == s->end);
 }
@@ -35,21 +37,26 @@ static PetscErrorCode read_element(SbDeck *d)
   static const char *const what[6] = {
     "label of an element",    "kind of an element",   "physical property of an element",
     "material of an element", "colour of an element", "number of nodes of an element"};
-  /* quadratic simplices, by dimension: around the first face, corners and edge nodes in turn, then upwards */
-  static const int around[4][10] = {{0}, {0, 2, 1}, {0, 3, 1, 4, 2, 5}, {0, 4, 1, 5, 2, 6, 7, 8, 9, 3}};
+
+  /* quadratic simplices, by dimension: around the first face, corners and edge nodes in turn, then
+     upwards */
+  static const int around[4][10] = {
+    {0}, {0, 2, 1}, {0, 3, 1, 4, 2, 5}, {0, 4, 1, 5, 2, 6, 7, 8, 9, 3}};
   SbScan *s = &d->im->scan;
   int64_t head[6], n, other;
   SbDeckElement e = {.type = 0};
   int dim;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < 6; i++) PetscCall(SbScanText(s, what[i], &head[i]));
+  for (int i = 0; i < 6; i++)
+    PetscCall(SbScanText(s, what[i], &head[i]));
   e.label = head[0];
   e.property = head[2];
   n = head[5];
   PetscCall(SbScanRoom(s, "nodes of an element", n, 2, 2));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++)
-    if (types[i].id == head[1]) e.type = types[i].type;
+    if (types[i].id == head[1])
+      e.type = types[i].type;
   if (e.type && SbGmshTypes[e.type].nnode != n)
     SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)e.label,
                   (long long)head[1], (long long)n, SbGmshTypes[e.type].nnode);
@@ -59,38 +66,48 @@ static PetscErrorCode read_element(SbDeck *d)
   for (int64_t k = 0; k < n; k++) {
     const PetscBool quadratic = (PetscBool)(SbGmshIsSimplex(e.type) && n > dim + 1);
 
-    PetscCall(SbScanText(s, "node of an element", k < 10 ? &e.node[quadratic ? around[dim][k] : k] : &other));
-    if (!k) e.at = s->token;
+    PetscCall(SbScanText(s, "node of an element",
+                         k < 10 ? &e.node[quadratic ? around[dim][k] : k] : &other));
+    if (!k)
+      e.at = s->token;
   }
-  if (e.type) PetscCall(SbDeckAddElement(d, &e));
+  if (e.type)
+    PetscCall(SbDeckAddElement(d, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads a group. A member has nvalue values: kind (7 a node, 8 an element), label, since 2435 two more. */
+/* Reads a group. A member has nvalue values: kind (7 a node, 8 an element), label, since 2435 two
+   more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
   SbScan *s = &d->im->scan;
-  int64_t number, n = 0, value[4];
+  int64_t number;
+  int64_t n = 0;
+  int64_t value[4];
   char name[SB_GROUP_MAX];
   PetscInt set[2] = {-1, -1};
 
   PetscFunctionBeginUser;
   PetscCall(SbScanText(s, "number of a group", &number));
-  while (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of members of a group", &n));
+  while (SbScanMore(s, '\n'))
+    PetscCall(SbScanText(s, "number of members of a group", &n));
   PetscCall(SbScanRoom(s, "members of a group", n, 4, 4));
   SbScanEndOfLine(s);
   PetscCall(SbScanRestOfLine(s, sizeof(name), name));
-  if (!name[0]) (void)snprintf(name, sizeof(name), "group_%lld", (long long)number);
+  if (!name[0])
+    (void)snprintf(name, sizeof(name), "group_%lld", (long long)number);
   for (int64_t i = 0; i < n; i++) {
     PetscCall(SbScanText(s, "kind of a member of a group", &value[0]));
     PetscCall(SbScanText(s, "label of a member of a group", &value[1]));
     if (value[0] == 7 || value[0] == 8) {
       PetscInt *mine = &set[value[0] - 7];
 
-      if (*mine < 0) PetscCall(SbDeckFindSet(d, (PetscBool)(value[0] == 7), name, mine));
+      if (*mine < 0)
+        PetscCall(SbDeckFindSet(d, (PetscBool)(value[0] == 7), name, mine));
       PetscCall(SbDeckAddRange(d, *mine, -1, value[1], value[1], 1));
     }
-    for (int k = 2; k < nvalue; k++) PetscCall(SbScanText(s, "value of a member of a group", &value[k]));
+    for (int k = 2; k < nvalue; k++)
+      PetscCall(SbScanText(s, "value of a member of a group", &value[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,19 +122,27 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
   for (SbScanNext(s); s->at < s->end; SbScanNext(s)) {
     int64_t id;
 
-    while (s->at > s->data && s->at[-1] != '\n') s->at--; /* back to the beginning of the line */
-    if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
+    while (s->at > s->data && s->at[-1] != '\n')
+      s->at--; /* back to the beginning of the line */
+    if (!is_mark(s))
+      SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     SbScanEndOfLine(s);
+
     // a data set: its number, then its records
     PetscCall(SbScanText(s, "number of a data set", &id));
     SbScanEndOfLine(s);
-    if (id == 2412 && !im->nvert) SB_SCAN_ERROR(s, "elements before the nodes");
+    if (id == 2412 && !im->nvert)
+      SB_SCAN_ERROR(s, "elements before the nodes");
     for (;;) {
       // the data set ends at a delimiter; the end of the file is an error
-      while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
+      while (s->at < s->end && (*s->at == '\n' || *s->at == '\r'))
+        s->at++;
       s->token = s->at;
-      if (s->at >= s->end) SB_SCAN_ENDS(s, "a line of %d", -1);
-      if (is_mark(s)) break;
+      if (s->at >= s->end)
+        SB_SCAN_ENDS(s, "a line of %d", -1);
+      if (is_mark(s))
+        break;
+
       // data set 2411 has the coordinates on a line of their own, data set 15 on the same line
       if (id == 2411 || id == 781 || id == 15) {
         int64_t label, other;
@@ -125,17 +150,22 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 
         PetscCall(SbScanText(s, "label of a node", &label));
         PetscCall(SbDeckAddNode(&d, label, &x));
-        for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
+        for (int i = 0; i < 3; i++)
+          PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
         PetscCall(SbScanPoint(s, "coordinate", label, x));
       }
-      if (id == 2412) PetscCall(read_element(&d));
-      if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(&d, 2));
-      if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(&d, 4));
+      if (id == 2412)
+        PetscCall(read_element(&d));
+      if (id == 2429 || id == 2430 || id == 2432)
+        PetscCall(read_group(&d, 2));
+      if (id == 2435 || id == 2452 || id == 2467 || id == 2477)
+        PetscCall(read_group(&d, 4));
       SbScanEndOfLine(s); /* other data sets are skipped */
     }
     SbScanEndOfLine(s);
   }
-  if (!im->nvert) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
+  if (!im->nvert)
+    SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
   PetscCall(SbDeckBuild(&d));
   PetscCall(SbImportJoinGroups(im));
   PetscFunctionReturn(PETSC_SUCCESS);

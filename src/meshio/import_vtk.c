@@ -1,9 +1,11 @@
 /*
-  import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File
-  formats"; "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
+  import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's
+  Guide, "File formats"; "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and
+  CONNECTIVITY.
 
-  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c. Point data
-  is skipped. Binary data is big-endian. Errors: other data sets, volume cells other than 4- and 10-node tets.
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c.
+  Point data is skipped. Binary data is big-endian. Errors: other data sets, volume cells other than
+  4- and 10-node tets.
 */
 #include <strings.h>
 #include "meshio_impl.h"
@@ -18,7 +20,8 @@ typedef struct {
 } Vtk;
 
 /* Reads n numbers of this type into an array that it allocates; value NULL: skips them. */
-static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberType type, double **value)
+static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberType type,
+                                 double **value)
 {
   SbScan *s = v->scan;
   const size_t bytes = (size_t)n * (size_t)type.size;
@@ -26,19 +29,25 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberTy
   PetscReal x;
 
   PetscFunctionBeginUser;
+
   // binary data begins after the end of the line
-  if (s->bytes) SbScanEndOfLine(s);
+  if (s->bytes)
+    SbScanEndOfLine(s);
   PetscCall(SbScanRoom(s, what, n, least, least));
-  if (value) PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
+  if (value)
+    PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
   for (int64_t i = 0; i < n && !s->bytes; i++) {
     PetscCall(SbScanReal(s, what, 0, &x));
-    if (value) (*value)[i] = x;
+    if (value)
+      (*value)[i] = x;
   }
-  if (!s->bytes) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->bytes)
+    PetscFunctionReturn(PETSC_SUCCESS);
   s->token = s->at;
   if ((size_t)(s->end - s->at) < bytes)
     SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
-  if (value) SbNumbersConvert(type, PETSC_TRUE, (size_t)n, s->at, *value);
+  if (value)
+    SbNumbersConvert(type, PETSC_TRUE, (size_t)n, s->at, *value);
   s->at += bytes;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -47,14 +56,16 @@ static PetscErrorCode read_cells(Vtk *v)
 {
   SbScan *s = v->scan;
   SbVtkGrid *grid = &v->grid;
-  int64_t n, size, k0 = 0;
+  int64_t n, size;
+  int64_t k0 = 0;
   double *all;
   SbNumberType type;
   char word[32];
   const char *at;
 
   PetscFunctionBeginUser;
-  if (v->cells_at) SB_SCAN_ERROR(s, "second section CELLS");
+  if (v->cells_at)
+    SB_SCAN_ERROR(s, "second section CELLS");
   v->cells_at = s->token;
   PetscCall(SbScanCount(s, "cells", 1, 1, &n));
   PetscCall(SbScanCount(s, "numbers in the list of cells", 1, 1, &size));
@@ -64,9 +75,11 @@ static PetscErrorCode read_cells(Vtk *v)
     // since version 5: `n` offsets from 0 to the number of points, then the points
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "offsets", n, type, &grid->end));
-    for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* drop the first offset, 0 */
+    for (int64_t c = 0; c + 1 < n; c++)
+      grid->end[c] = grid->end[c + 1]; /* drop the first offset, 0 */
     (void)SbScanWord(s, sizeof(word), word);
-    if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(s, "expected CONNECTIVITY, found '%s'", word);
+    if (strcasecmp(word, "CONNECTIVITY"))
+      SB_SCAN_ERROR(s, "expected CONNECTIVITY, found '%s'", word);
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "points of cells", size, type, &grid->connect));
     grid->ncell = (PetscInt)PetscMax(n - 1, 0);
@@ -75,6 +88,7 @@ static PetscErrorCode read_cells(Vtk *v)
   }
   s->at = at;
   grid->ncell = (PetscInt)n;
+
   // before version 5: [n, p1 ... pn] for each cell; the points move together
   PetscCall(read_array(v, "list of cells", size, (SbNumberType){'i', 4}, &grid->connect));
   PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
@@ -83,9 +97,11 @@ static PetscErrorCode read_cells(Vtk *v)
     const double npoint = k0 < size ? all[k0] : 0;
 
     if (!(npoint >= 1 && npoint <= (double)(size - k0 - 1)) || npoint != PetscFloorReal(npoint))
-      SB_SCAN_ERROR(s, "cell %lld of %lld has %g points, more than the section announces or less than one",
-                    (long long)c, (long long)grid->ncell, npoint);
-    for (int64_t k = 0; k < (int64_t)npoint; k++) grid->connect[grid->nconnect++] = all[k0 + 1 + k];
+      SB_SCAN_ERROR(
+        s, "cell %lld of %lld has %g points, more than the section announces or less than one",
+        (long long)c, (long long)grid->ncell, npoint);
+    for (int64_t k = 0; k < (int64_t)npoint; k++)
+      grid->connect[grid->nconnect++] = all[k0 + 1 + k];
     k0 += 1 + (int64_t)npoint;
     grid->end[c] = (double)grid->nconnect;
   }
@@ -100,7 +116,8 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
 
   PetscFunctionBeginUser;
   if (ncomponent < 0 || ncomponent > 1024)
-    SB_SCAN_ERROR(v->scan, "array '%s' of %lld components; expected up to 1024", name, (long long)ncomponent);
+    SB_SCAN_ERROR(v->scan, "array '%s' of %lld components; expected up to 1024", name,
+                  (long long)ncomponent);
   PetscCall(SbScanRoom(v->scan, "tuples", ntuple, 1, 1));
   if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && grid->narray < SB_VTK_ARRAYS) {
     const int a = grid->narray++;
@@ -123,13 +140,17 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   SbNumberType type;
   char name[SB_NAME_MAX], word[32];
   double *x = NULL;
-  int64_t n, ncomponent = 1, ntuple;
+  int64_t n;
+  int64_t ncomponent = 1;
+  int64_t ntuple;
   size_t k = 0;
 
   PetscFunctionBeginUser;
-  while (k < PETSC_STATIC_ARRAY_LENGTH(tuples) && strcasecmp(section, tuples[k].name)) k++;
+  while (k < PETSC_STATIC_ARRAY_LENGTH(tuples) && strcasecmp(section, tuples[k].name))
+    k++;
   if (!strcasecmp(section, "POINTS")) {
-    if (v->im->x) SB_SCAN_ERROR(s, "second section POINTS");
+    if (v->im->x)
+      SB_SCAN_ERROR(s, "second section POINTS");
     PetscCall(SbScanCount(s, "points", 3, 3, &n));
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
@@ -139,12 +160,14 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   } else if (!strcasecmp(section, "CELL_TYPES")) {
     PetscCall(SbScanText(s, "number of types of cells", &n));
     if (!v->cells_at || n != v->grid.ncell)
-      SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
+      SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n,
+                    (long long)v->grid.ncell);
     PetscCall(read_array(v, "types of cells", n, (SbNumberType){'i', 4}, &v->grid.type));
   } else if (on_cells || !strcasecmp(section, "POINT_DATA")) {
     // cells or points to which the following arrays belong
     n = on_cells ? v->grid.ncell : v->im->nvert;
-    if (!v->im->x || !v->cells_at) SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
+    if (!v->im->x || !v->cells_at)
+      SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
     PetscCall(SbScanText(s, "number of data", &v->ntuple));
     if (v->ntuple != n)
       SB_SCAN_ERROR(s, "data for %lld %s; there are %lld", (long long)v->ntuple,
@@ -156,7 +179,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
 
     (void)SbScanWord(s, sizeof(name), name);
     PetscCall(SbScanType(s, &type));
-    if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
+    if (SbScanMore(s, '\n'))
+      PetscCall(SbScanText(s, "number of components", &ncomponent));
     at = s->at;
     (void)SbScanWord(s, sizeof(word), word);
     if (strcasecmp(word, "LOOKUP_TABLE"))
@@ -171,7 +195,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     for (int64_t i = 0; i < n; i++) {
       (void)SbScanWord(s, sizeof(name), name);
       if (!strcmp(name, "METADATA")) {
-        do SbScanEndOfLine(s);
+        do
+          SbScanEndOfLine(s);
         while (SbScanMore(s, '\n'));
         (void)SbScanWord(s, sizeof(name), name);
       }
@@ -187,7 +212,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
     // a block of lines up to an empty line
-    do SbScanEndOfLine(s);
+    do
+      SbScanEndOfLine(s);
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
     (void)SbScanWord(s, sizeof(name), name);
@@ -206,6 +232,7 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
+
   // header: text or binary, unstructured grid
   if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
     SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
@@ -216,11 +243,13 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);
   s->bytes = (PetscBool)!strcasecmp(kind, "BINARY");
   (void)SbScanWord(s, sizeof(word), word);
-  if (strcasecmp(word, "DATASET")) SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
+  if (strcasecmp(word, "DATASET"))
+    SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
   (void)SbScanWord(s, sizeof(word), word);
   if (strcasecmp(word, "UNSTRUCTURED_GRID"))
     SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
-  while (SbScanWord(s, sizeof(name), name)) PetscCall(read_section(&v, name));
+  while (SbScanWord(s, sizeof(name), name))
+    PetscCall(read_section(&v, name));
   if (!im->x || !v.cells_at || !v.grid.type)
     SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
                   !im->x        ? "POINTS, with at least one,"

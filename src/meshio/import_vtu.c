@@ -1,19 +1,23 @@
 /*
-  import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file formats").
+  import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file
+  formats").
 
-  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or
-  base64. A binary array begins with its length or, if compressed by zlib, with the number and sizes of its
-  blocks. Base64 may continue after a final =: some writers encode lengths and data separately.
+  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw
+  bytes or base64. A binary array begins with its length or, if compressed by zlib, with the number
+  and sizes of its blocks. Base64 may continue after a final =: some writers encode lengths and data
+  separately.
 
-  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c. Errors:
-  several pieces, other compressors, volume cells other than 4- and 10-node tets.
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c.
+  Errors: several pieces, other compressors, volume cells other than 4- and 10-node tets.
 */
 #include <ctype.h>
 #include <stdlib.h>
 #include <zlib.h>
 #include "meshio_impl.h"
 
-enum { ZLIB_RATIO = 1032 }; /* largest compression ratio of zlib */
+enum {
+  ZLIB_RATIO = 1032
+}; /* largest compression ratio of zlib */
 
 typedef struct {
   SbScan *scan;
@@ -40,11 +44,14 @@ static PetscBool find_element(const char *from, const char *end, const char *nam
 
   for (const char *p = from; p && p < end; p++) {
     p = (const char *)memchr(p, '<', (size_t)(end - p));
-    if (!p || (size_t)(end - p) < n + 2) return PETSC_FALSE;
-    if (strncmp(p + 1, name, n) || !strchr(" \t\r\n/>", p[n + 1]) || !p[n + 1]) continue;
+    if (!p || (size_t)(end - p) < n + 2)
+      return PETSC_FALSE;
+    if (strncmp(p + 1, name, n) || !strchr(" \t\r\n/>", p[n + 1]) || !p[n + 1])
+      continue;
     tag->open = p;
     tag->close = (const char *)memchr(p, '>', (size_t)(end - p));
-    if (tag->close) tag->close++;
+    if (tag->close)
+      tag->close++;
     return (PetscBool)(tag->close != NULL);
   }
   return PETSC_FALSE;
@@ -57,14 +64,20 @@ static void attribute(Tag tag, const char *name, size_t size, char value[])
 
   value[0] = 0;
   for (const char *p = tag.open; p + n + 2 < tag.close; p++) {
-    const char *q = p + 1 + n, *quote;
+    const char *q = p + 1 + n;
+    const char *quote;
     size_t length = 0;
 
-    if (!isspace((unsigned char)*p) || strncmp(p + 1, name, n)) continue;
-    while (q < tag.close && isspace((unsigned char)*q)) q++;
-    if (q >= tag.close || *q++ != '=') continue;
-    while (q < tag.close && isspace((unsigned char)*q)) q++;
-    if (q >= tag.close || (*q != '"' && *q != '\'')) continue;
+    if (!isspace((unsigned char)*p) || strncmp(p + 1, name, n))
+      continue;
+    while (q < tag.close && isspace((unsigned char)*q))
+      q++;
+    if (q >= tag.close || *q++ != '=')
+      continue;
+    while (q < tag.close && isspace((unsigned char)*q))
+      q++;
+    if (q >= tag.close || (*q != '"' && *q != '\''))
+      continue;
     for (quote = q++; q < tag.close && *q != *quote && length + 1 < size; q++)
       value[length++] = isprint((unsigned char)*q) ? *q : '?';
     value[length] = 0;
@@ -99,21 +112,26 @@ static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
 {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-  if (!b->text && (size_t)(b->end - b->at) < n) return PETSC_FALSE;
+  if (!b->text && (size_t)(b->end - b->at) < n)
+    return PETSC_FALSE;
   for (size_t i = 0; i < n; i++) {
     for (; b->text && b->nbit < 8; b->at++) {
       const char *digit;
 
-      while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
-      if (b->at >= b->end) return PETSC_FALSE;
+      while (b->at < b->end && isspace((unsigned char)*b->at))
+        b->at++;
+      if (b->at >= b->end)
+        return PETSC_FALSE;
       digit = *b->at ? strchr(digits, *b->at) : NULL;
-      if (digit ? b->fill : *b->at != '=' || b->ndigit < 2) return PETSC_FALSE;
+      if (digit ? b->fill : *b->at != '=' || b->ndigit < 2)
+        return PETSC_FALSE;
       b->bits = b->bits << 6 | (digit ? (uint32_t)(digit - digits) : 0);
       b->nbit = digit ? b->nbit + 6 : 0;
       b->ndigit = (b->ndigit + 1) % 4;
       b->fill = (PetscBool)(!digit && b->ndigit);
     }
-    if (b->text) b->nbit -= 8;
+    if (b->text)
+      b->nbit -= 8;
     out[i] = (unsigned char)(b->text ? b->bits >> b->nbit : (uint32_t)*b->at++);
   }
   return PETSC_TRUE;
@@ -135,10 +153,14 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Decompresses an array: number and size of blocks, size of a smaller last one, compressed sizes; blocks. */
-static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
+/* Decompresses an array: number and size of blocks, size of a smaller last one, compressed sizes;
+   blocks. */
+static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want,
+                                  unsigned char out[])
 {
-  size_t nblock, size, last, full, *packed = NULL, at = 0;
+  size_t nblock, size, last, full;
+  size_t *packed = NULL;
+  size_t at = 0;
   unsigned char *in = NULL;
 
   PetscFunctionBeginUser;
@@ -148,17 +170,19 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   full = nblock - (nblock && last);
   if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
       full * size + (nblock ? last : 0) != want)
-    SB_SCAN_ERROR(v->scan,
-                  "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all", name,
-                  nblock, size, last, want);
+    SB_SCAN_ERROR(
+      v->scan, "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all",
+      name, nblock, size, last, want);
   PetscCall(SbImportScratch(v->im, nblock * sizeof(*packed), &packed));
-  for (size_t i = 0; i < nblock; i++) PetscCall(take_length(v, b, name, &packed[i]));
+  for (size_t i = 0; i < nblock; i++)
+    PetscCall(take_length(v, b, name, &packed[i]));
   for (size_t i = 0; i < nblock; i++) {
     const size_t n = i + 1 == nblock && last ? last : size;
     uLongf got = (uLongf)n;
 
     if (packed[i] > (size_t)(b->end - b->at) + 3)
-      SB_SCAN_ERROR(v->scan, "a block of array '%s' announces %zu bytes, which the file does not hold", name,
+      SB_SCAN_ERROR(v->scan,
+                    "a block of array '%s' announces %zu bytes, which the file does not hold", name,
                     packed[i]);
     PetscCall(SbImportScratch(v->im, packed[i], &in));
     if (!take_bytes(b, packed[i], in))
@@ -173,7 +197,8 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
 /* Reads the n numbers of the array of this element; *value is allocated. */
 static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
 {
-  SbScan *s = v->scan, part;
+  SbScan *s = v->scan;
+  SbScan part;
   SbNumberType type;
   Bytes b = {.at = tag.close, .end = s->end, .text = PETSC_TRUE};
   char format[16], name[64], kind[32];
@@ -194,6 +219,7 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
     SB_SCAN_ERROR(s, "an array of type '%s'; expected one as Float64 or Int32", kind);
   attribute(tag, "format", sizeof(format), format);
   attribute(tag, "Name", sizeof(name), name);
+
   // where the numbers are: in the element, or in the appended data; how many there can be
   if (!strcmp(format, "appended")) {
     PetscCall(attribute_number(v, tag, "offset", &offset));
@@ -204,24 +230,29 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
     b.text = v->appended_text;
   } else if (!format[0] || !strcmp(format, "ascii") || !strcmp(format, "binary")) {
     b.end = (const char *)memchr(tag.close, '<', (size_t)(s->end - tag.close));
-    if (!b.end) SB_SCAN_ERROR(s, "the array has no end; the file is truncated, write or copy it again");
+    if (!b.end)
+      SB_SCAN_ERROR(s, "the array has no end; the file is truncated, write or copy it again");
   } else
     SB_SCAN_ERROR(s, "an array of format '%s'; expected ascii, binary or appended", format);
   text = (PetscBool)(!format[0] || !strcmp(format, "ascii"));
   room = text ? (b.end - b.at) / 2 + 1 : (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
   if (n > room)
-    SB_SCAN_ERROR(s, "array '%s' should hold %lld numbers, which is more than the file can contain there",
-                  name, (long long)n);
+    SB_SCAN_ERROR(
+      s, "array '%s' should hold %lld numbers, which is more than the file can contain there", name,
+      (long long)n);
   PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
+
   // text: numbers separated by blanks
   if (text) {
     part = *s;
     part.at = b.at;
     part.end = b.end;
     part.bytes = PETSC_FALSE;
-    for (int64_t i = 0; i < n; i++) PetscCall(SbScanReal(&part, "value of an array", 0, &(*value)[i]));
+    for (int64_t i = 0; i < n; i++)
+      PetscCall(SbScanReal(&part, "value of an array", 0, &(*value)[i]));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   // n binary numbers of this type
   want = (size_t)n * (size_t)type.size;
   PetscCall(SbImportScratch(v->im, want, &v->raw));
@@ -230,8 +261,8 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   else {
     PetscCall(take_length(v, &b, name, &length));
     if (length != want || !take_bytes(&b, want, v->raw))
-      SB_SCAN_ERROR(s, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
-                    length, want);
+      SB_SCAN_ERROR(s, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64",
+                    name, length, want);
   }
   SbNumbersConvert(type, v->big_endian, (size_t)n, v->raw, *value);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,8 +279,8 @@ static PetscErrorCode content(Vtu *v, const char *name, const char **from, const
   v->scan->token = v->scan->data;
   if (!find_element(v->scan->data, v->xml_end, name, &begin) ||
       !find_element(begin.close, v->xml_end, closing, &after))
-    SB_SCAN_ERROR(v->scan, "there is no element %s, or it has no end; the file is truncated or damaged",
-                  name);
+    SB_SCAN_ERROR(
+      v->scan, "there is no element %s, or it has no end; the file is truncated or damaged", name);
   *from = begin.close;
   *end = after.open;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -267,7 +298,8 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
   v->cells_at = v->scan->token = from;
   for (; find_element(from, end, "DataArray", &tag); from = tag.close) {
     attribute(tag, "Name", sizeof(found), found);
-    if (strcmp(found, name)) continue;
+    if (strcmp(found, name))
+      continue;
     PetscCall(read_array(v, tag, n, value));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -278,16 +310,20 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
-  Vtu vtu = {.scan = s, .im = im}, *v = &vtu;
+  Vtu vtu = {.scan = s, .im = im};
+  Vtu *v = &vtu;
   Tag tag, second;
   const char *from, *end;
-  int64_t npoint, ncell, ncomponent = 3;
-  double *x = NULL, last;
+  int64_t npoint, ncell;
+  int64_t ncomponent = 3;
+  double *x = NULL;
+  double last;
   SbVtkGrid *grid = &v->grid;
   char value[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
+
   // end of the XML part, beginning of the appended data
   v->xml_end = s->end;
   if (find_element(s->data, s->end, "AppendedData", &tag)) {
@@ -296,9 +332,11 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     v->appended_text = (PetscBool)!strcmp(value, "base64");
     s->bytes = (PetscBool)!v->appended_text;
     v->appended = (const char *)memchr(tag.close, '_', (size_t)(s->end - tag.close));
-    if (!v->appended) SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
+    if (!v->appended)
+      SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
     v->appended++;
   }
+
   // type, byte order and compression of the file
   if (!find_element(s->data, v->xml_end, "VTKFile", &tag))
     SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
@@ -313,28 +351,34 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   attribute(tag, "compressor", sizeof(value), value);
   v->zlib = (PetscBool)(value[0] != 0);
   if (v->zlib && strcmp(value, "vtkZLibDataCompressor") != 0)
-    SB_SCAN_ERROR(s,
-                  "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
-                  "Save Data, Compressor Type)",
-                  value);
+    SB_SCAN_ERROR(
+      s,
+      "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
+      "Save Data, Compressor Type)",
+      value);
   if (!find_element(s->data, v->xml_end, "Piece", &tag))
     SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
   s->token = tag.close;
   if (find_element(tag.close, v->xml_end, "Piece", &second))
-    SB_SCAN_ERROR(s, "the grid is in several pieces; save it in one (ParaView: Merge Blocks, Clean to Grid)");
+    SB_SCAN_ERROR(
+      s, "the grid is in several pieces; save it in one (ParaView: Merge Blocks, Clean to Grid)");
   PetscCall(attribute_number(v, tag, "NumberOfPoints", &npoint));
   PetscCall(attribute_number(v, tag, "NumberOfCells", &ncell));
   if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
-    SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number", (long long)npoint,
-                  (long long)ncell);
+    SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number",
+                  (long long)npoint, (long long)ncell);
+
   // the only array of the element Points
   PetscCall(content(v, "Points", &from, &end));
   s->token = from;
-  if (!find_element(from, end, "DataArray", &tag)) SB_SCAN_ERROR(s, "the element Points has no array");
+  if (!find_element(from, end, "DataArray", &tag))
+    SB_SCAN_ERROR(s, "the element Points has no array");
   PetscCall(attribute_number(v, tag, "NumberOfComponents", &ncomponent));
-  if (ncomponent != 3) SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  if (ncomponent != 3)
+    SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
   PetscCall(read_array(v, tag, 3 * npoint, &x));
   PetscCall(SbVtkSetPoints((PetscInt)npoint, x, im));
+
   // cell types, end offsets of cells, then the connectivity
   grid->ncell = (PetscInt)ncell;
   PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
@@ -342,17 +386,21 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   last = ncell ? grid->end[ncell - 1] : 0;
   s->token = v->cells_at;
   if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
-    SB_SCAN_ERROR(s, "the last of the offsets is %g; expected the number of points of all cells", last);
+    SB_SCAN_ERROR(s, "the last of the offsets is %g; expected the number of points of all cells",
+                  last);
   grid->nconnect = (int64_t)last;
   PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
+
   // cell data with one number per cell; other arrays are skipped
   if (find_element(s->data, v->xml_end, "CellData", &tag) && tag.close[-2] != '/') {
     PetscCall(content(v, "CellData", &from, &end));
-    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS; from = tag.close) {
+    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS;
+         from = tag.close) {
       const int a = grid->narray;
 
       attribute(tag, "NumberOfComponents", sizeof(value), value);
-      if (value[0] && strcmp(value, "1") != 0) continue;
+      if (value[0] && strcmp(value, "1") != 0)
+        continue;
       grid->narray++;
       attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
       PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));

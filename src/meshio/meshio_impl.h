@@ -1,12 +1,15 @@
 /*
-  meshio_impl.h - shared by src/meshio/: readers, writers, decks of labelled nodes and elements, gmsh as a
-  child.
+  meshio_impl.h - shared by src/meshio/: readers, writers, decks of labelled nodes and elements,
+  gmsh as a child.
 */
 #pragma once
 #include "sbgmsh.h"
 
 /* The arrays of a body: vertices and simplices, then nodes of edges and groups. */
-enum { SB_IMPORT_NMESH = 14, SB_IMPORT_NPART = 20 };
+enum {
+  SB_IMPORT_NMESH = 14,
+  SB_IMPORT_NPART = 20
+};
 typedef struct {
   void **array;
   size_t bytes;
@@ -17,7 +20,8 @@ PetscErrorCode SbImportForget(SbImport *import);
 /* Names the group (dim, tag), if it exists. */
 void SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 
-/* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error messages. */
+/* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error
+   messages. */
 PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);
 
 /* Reads a file, or a mesh description `text`: sets x, vert_number, items and groups. */
@@ -25,7 +29,8 @@ typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *body); /* .vol */
 PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *body);
-PetscErrorCode SbImportRead_Medit(const char *path, SbImport *body); /* or the neutral format of Netgen */
+PetscErrorCode SbImportRead_Medit(const char *path,
+                                  SbImport *body); /* or the neutral format of Netgen */
 PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
@@ -34,7 +39,8 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
 /* Reads block k of n of all arrays of an .h5 mesh. */
-PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
+PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body,
+                               SbSlabRows *rows);
 
 /* gmsh's element types */
 typedef struct {
@@ -42,27 +48,30 @@ typedef struct {
   int dim, nnode;
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
-extern const char *const SbGroupKinds[4]; /* "point", "curve", ...; a group without name is "curve_12" */
+extern const char
+  *const SbGroupKinds[4]; /* "point", "curve", ...; a group without name is "curve_12" */
 /* Whether the element is a simplex of first or second order. */
 static inline PetscBool SbGmshIsSimplex(int type)
 {
-  return (PetscBool)(SbGmshTypes[type].nnode == SbGmshTypes[type].dim + 1 || type == SB_GMSH_TET10 ||
-                     type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
+  return (PetscBool)(SbGmshTypes[type].nnode == SbGmshTypes[type].dim + 1 ||
+                     type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
 }
 
-/* Counts an element, and adds it if needed: a tet, a simplex in a group, a triangle of a surface. Of
-   second-order ones the corners are kept, of a 10-node tet, vert[10] in gmsh's order, also edge nodes. */
+/* Counts an element, and adds it if needed: a tet, a simplex in a group, a triangle of a surface.
+   Of second-order ones the corners are kept, of a 10-node tet, vert[10] in gmsh's order, also edge
+   nodes. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number);
 /*
-  SbImportCheckTypes - all volume elements must be tets of 4 or 10 nodes; there must be tets (surface: or
-  triangles).
+  SbImportCheckTypes - all volume elements must be tets of 4 or 10 nodes; there must be tets
+  (surface: or triangles).
 
   Not collective. Errors: PETSC_ERR_FILE_UNEXPECTED, whose message lists the elements.
 */
 PetscErrorCode SbImportCheckTypes(const SbImport *import);
 
-/* Position in gmsh's order of node k of a 10-node tet of Abaqus, Nastran, VTK: the last two change places. */
+/* Position in gmsh's order of node k of a 10-node tet of Abaqus, Nastran, VTK: the last two change
+   places. */
 static inline int SbGmshNode(int k)
 {
   return k < 8 ? k : 17 - k;
@@ -89,13 +98,15 @@ typedef struct {
   SbCount nrange;
   SbDeckRange *range; /* [nrange] */
 } SbDeckSet;
-/* A file of labelled nodes and elements; zero but for the first five members. Arrays: SbImportScratch(). */
+/* A file of labelled nodes and elements; zero but for the first five members. Arrays:
+   SbImportScratch(). */
 typedef struct {
   SbImport *im;
-  int (*compare)(const char *, const char *); /* comparison of set names: strcmp() or strcasecmp() */
-  const char *cure;                           /* advice in the message about a duplicate label */
-  PetscBool unique;                           /* duplicate element labels are an error too */
-  PetscBool strict;                           /* undefined nodes of sets and tets are an error */
+  int (*compare)(const char *,
+                 const char *); /* comparison of set names: strcmp() or strcasecmp() */
+  const char *cure;             /* advice in the message about a duplicate label */
+  PetscBool unique;             /* duplicate element labels are an error too */
+  PetscBool strict;             /* undefined nodes of sets and tets are an error */
   SbCount nelement, nset, nfound;
   PetscInt capacity[2];   /* of im->x, im->vert_number */
   SbDeckElement *element; /* [nelement] */
@@ -105,19 +116,22 @@ typedef struct {
   PetscBool *seen;        /* [nset] visited sets */
   int64_t nlooked;        /* number of labels searched for */
 } SbDeck;
-#define SB_DECK_TAG ((int64_t)1 << 40) /* number of the group of set 0, larger than any property number */
+#define SB_DECK_TAG \
+  ((int64_t)1 << 40) /* number of the group of set 0, larger than any property number */
 
 /* Adds a node to `im`; the caller sets its coordinates, which are 0. */
 PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);
 PetscErrorCode SbDeckAddElement(SbDeck *deck, const SbDeckElement *element);
 /* Finds or creates the set of this name. */
 PetscErrorCode SbDeckFindSet(SbDeck *deck, PetscBool of_nodes, const char *name, PetscInt *set);
-/* Adds to a set the labels first, first + step, ... last, or the members of the set `other`; -1: none. */
-PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, PetscInt other, int64_t first, int64_t last,
-                              int64_t step);
+/* Adds to a set the labels first, first + step, ... last, or the members of the set `other`; -1:
+   none. */
+PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, PetscInt other, int64_t first,
+                              int64_t last, int64_t step);
 /* Converts the deck to items, and groups for SbImportJoinGroups(). Undefined members: `strict`. */
 PetscErrorCode SbDeckBuild(SbDeck *deck);
-/* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
+/* Finds the members of a set and of the sets in it, recursively, each once; result in
+   deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
 /* vtk_grid.c: cells and cell arrays of a VTK file */
@@ -139,17 +153,21 @@ typedef struct {
 } SbVtkGrid;
 
 /*
-  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers become groups.
+  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers
+  become groups.
 
-  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, ...; or the only array) gives the
-  groups volume_N, surface_N, ...; another one NAME_volume_N, ... Errors of a cell name import->scan.token.
+  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, ...; or the only array)
+  gives the groups volume_N, surface_N, ...; another one NAME_volume_N, ... Errors of a cell name
+  import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
-/* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid one. */
+/* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid
+   one. */
 PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im);
 
 /* write_gmsh.c, write_h5.c: one file */
-extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
+extern const char
+  *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, SbMeshFormat format, FILE *file);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* The .xmf for ParaView of a mesh that was written to `h5`. */
@@ -163,6 +181,7 @@ PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, 
 /* Moves to the beginning of a text; false if it does not occur. */
 PetscBool SbScanFind(SbScan *scan, const char *text);
 
-PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* value in quotes */
+PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size,
+                            char value[]); /* value in quotes */
 /* Reads the rest of the line as a name, trimmed; "" if empty. */
 PetscErrorCode SbScanRestOfLine(SbScan *scan, size_t size, char name[]);

@@ -1,5 +1,6 @@
 /*
-  numbers.c - map from the numbers of nodes, elements or groups in a file to their indices in memory.
+  numbers.c - map from the numbers of nodes, elements or groups in a file to their indices in
+  memory.
 
   Consecutive numbers need nothing but the first one, others a hash table, at most half full.
 */
@@ -10,7 +11,8 @@ static PetscInt *find_slot(const SbNumbers *s, int64_t number)
 {
   PetscInt k = (PetscInt)((uint64_t)number * 0x9e3779b97f4a7c15u >> 33) & (s->nslot - 1);
 
-  while (s->slot[k] >= 0 && s->number[s->slot[k]] != number) k = (k + 1) & (s->nslot - 1);
+  while (s->slot[k] >= 0 && s->number[s->slot[k]] != number)
+    k = (k + 1) & (s->nslot - 1);
   return &s->slot[k];
 }
 
@@ -22,11 +24,14 @@ PetscErrorCode SbNumbersAdd(SbNumbers *s, int64_t number)
   if (!s->nslot && (uint64_t)number - (uint64_t)s->number[0] == (uint64_t)s->n - 1)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (2 * s->n > s->nslot) {
-    for (s->nslot = 64; s->nslot < 4 * s->n;) s->nslot *= 2;
+    for (s->nslot = 64; s->nslot < 4 * s->n;)
+      s->nslot *= 2;
     PetscCall(PetscFree(s->slot));
     PetscCall(PetscMalloc1(s->nslot, &s->slot));
-    for (PetscInt k = 0; k < s->nslot; k++) s->slot[k] = -1;
-    for (PetscInt i = 0; i < s->n; i++) *find_slot(s, s->number[i]) = i;
+    for (PetscInt k = 0; k < s->nslot; k++)
+      s->slot[k] = -1;
+    for (PetscInt i = 0; i < s->n; i++)
+      *find_slot(s, s->number[i]) = i;
   }
   *find_slot(s, number) = s->n - 1;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,7 +50,8 @@ PetscInt SbNumbersFind(const SbNumbers *s, int64_t number)
 {
   uint64_t at;
 
-  if (s->nslot) return *find_slot(s, number);
+  if (s->nslot)
+    return *find_slot(s, number);
   at = s->n ? (uint64_t)number - (uint64_t)s->number[0] : 0;
   return at < (uint64_t)s->n ? (PetscInt)at : -1;
 }

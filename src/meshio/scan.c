@@ -1,9 +1,10 @@
 /*
-  scan.c - scanner: a file is read into memory in one piece, then parsed token by token, as text or binary.
+  scan.c - scanner: a file is read into memory in one piece, then parsed token by token, as text or
+  binary.
 
-  Every read is checked against the end of the file. Line numbers are counted only when an error occurs. A
-  number of items announced in a file is compared with the number that the rest of the file can hold before
-  memory is allocated.
+  Every read is checked against the end of the file. Line numbers are counted only when an error
+  occurs. A number of items announced in a file is compared with the number that the rest of the
+  file can hold before memory is allocated.
 */
 #include <ctype.h>
 #include <errno.h>
@@ -19,11 +20,12 @@ PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, 
   PetscFunctionBeginUser;
   *file = fopen(path, "rb");
   PetscCheck(*file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "%s: cannot open the file (%s); check the name and the folder the run starts in", where,
-             strerror(errno));
+             "%s: cannot open the file (%s); check the name and the folder the run starts in",
+             where, strerror(errno));
   if (fstat(fileno(*file), &info) || !S_ISREG(info.st_mode)) {
     (void)fclose(*file);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file", where);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file",
+            where);
   }
   *size = (size_t)info.st_size;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -42,6 +44,7 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   got = fread(s->data, 1, size, file);
   (void)fclose(file);
   s->data[got] = 0;
+
   /* skip the UTF-8 byte order mark */
   if (got >= 3 && !memcmp(s->data, "\xef\xbb\xbf", 3)) {
     got -= 3;
@@ -50,10 +53,10 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   }
   s->at = s->token = s->data;
   s->end = s->data + got;
-  PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ, "%s: only %zu of %zu bytes could be read",
-             where, got, size);
-  PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: is empty (0 bytes); write the mesh again",
-             where);
+  PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ,
+             "%s: only %zu of %zu bytes could be read", where, got, size);
+  PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: is empty (0 bytes); write the mesh again", where);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -61,7 +64,8 @@ const char *SbScanPosition(const SbScan *s, char position[64])
 {
   size_t n = 1;
 
-  for (const char *p = s->data; p < s->token; p++) n += s->bytes || *p == '\n';
+  for (const char *p = s->data; p < s->token; p++)
+    n += s->bytes || *p == '\n';
   (void)snprintf(position, 64, "%s %zu", s->bytes ? "byte" : "line", n);
   return position;
 }
@@ -69,9 +73,11 @@ const char *SbScanPosition(const SbScan *s, char position[64])
 void SbScanNext(SbScan *s)
 {
   for (;; SbScanEndOfLine(s)) {
-    while (s->at < s->end && isspace((unsigned char)*s->at)) s->at++;
+    while (s->at < s->end && isspace((unsigned char)*s->at))
+      s->at++;
     s->token = s->at;
-    if (!s->comment || s->at >= s->end || *s->at != s->comment) return;
+    if (!s->comment || s->at >= s->end || *s->at != s->comment)
+      return;
   }
 }
 
@@ -83,11 +89,14 @@ static inline PetscBool ends_token(const SbScan *s, const char *p)
 /* Raises the error of an unexpected token. */
 static PetscErrorCode unexpected(SbScan *s, const char *what, int64_t number)
 {
-  char found[24], of[32] = "";
+  char found[24];
+  char of[32] = "";
 
   PetscFunctionBeginUser;
-  if (number) (void)snprintf(of, sizeof(of), " of node %lld", (long long)number);
-  if (s->at >= s->end) SB_SCAN_ENDS(s, "the %s%s", what, of);
+  if (number)
+    (void)snprintf(of, sizeof(of), " of node %lld", (long long)number);
+  if (s->at >= s->end)
+    SB_SCAN_ENDS(s, "the %s%s", what, of);
   (void)SbScanWord(s, sizeof(found), found);
   SB_SCAN_ERROR(s, "expected the %s%s, found '%s'", what, of, found);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -104,9 +113,12 @@ PetscErrorCode SbScanText(SbScan *s, const char *what, int64_t *value)
   SbScanNext(s);
   p = s->at;
   minus = (PetscBool)(p < s->end && *p == '-');
-  if (p < s->end && (*p == '-' || *p == '+')) p++;
-  for (; p < s->end && *p >= '0' && *p <= '9' && ndigit < 18; p++, ndigit++) v = 10 * v + (*p - '0');
-  if (!ndigit || !ends_token(s, p)) PetscCall(unexpected(s, what, 0));
+  if (p < s->end && (*p == '-' || *p == '+'))
+    p++;
+  for (; p < s->end && *p >= '0' && *p <= '9' && ndigit < 18; p++, ndigit++)
+    v = 10 * v + (*p - '0');
+  if (!ndigit || !ends_token(s, p))
+    PetscCall(unexpected(s, what, 0));
   *value = minus ? -v : v;
   s->at = p;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -117,9 +129,11 @@ static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *v
 {
   PetscFunctionBeginUser;
   s->token = s->at;
-  if ((size_t)(s->end - s->at) < n) SB_SCAN_ENDS(s, "the %s", what);
+  if ((size_t)(s->end - s->at) < n)
+    SB_SCAN_ENDS(s, "the %s", what);
   memcpy(value, s->at, n);
-  for (size_t i = 0; s->swap && i < n; i++) ((char *)value)[i] = s->at[n - 1 - i];
+  for (size_t i = 0; s->swap && i < n; i++)
+    ((char *)value)[i] = s->at[n - 1 - i];
   s->at += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -140,7 +154,8 @@ PetscErrorCode SbScanInt(SbScan *s, int bytes, const char *what, int64_t *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanCount(SbScan *s, const char *what, int text_bytes, int binary_bytes, int64_t *n)
+PetscErrorCode SbScanCount(SbScan *s, const char *what, int text_bytes, int binary_bytes,
+                           int64_t *n)
 {
   char number[64];
 
@@ -171,12 +186,14 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
       copy[n] = s->at[n] == 'D' || s->at[n] == 'd' ? 'E' : s->at[n];
     copy[n] = 0;
     *value = strtod(copy, &end);
-    if (end == copy + n) p = (char *)s->at + n;
+    if (end == copy + n)
+      p = (char *)s->at + n;
   }
   if (p > s->at && p + 1 < s->end && *p == ',' && isdigit((unsigned char)p[1]))
     SB_SCAN_ERROR(s, "the %s, %.*s, has a decimal comma; write the file with decimal points", what,
                   (int)PetscMin(24, p + strspn(p, ",0123456789") - s->at), s->at);
-  if (s->at >= s->end || p == s->at || !ends_token(s, p)) PetscCall(unexpected(s, what, number));
+  if (s->at >= s->end || p == s->at || !ends_token(s, p))
+    PetscCall(unexpected(s, what, number));
   s->at = p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -186,24 +203,29 @@ PetscErrorCode SbScanPoint(SbScan *s, const char *what, int64_t number, PetscRea
   PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++) {
     PetscCall(SbScanReal(s, what, number, &x[i]));
-    if (isfinite(x[i])) continue;
+    if (isfinite(x[i]))
+      continue;
     if (number)
-      SB_SCAN_ERROR(s, "%s of node %lld is not a finite number; repair the file", what, (long long)number);
+      SB_SCAN_ERROR(s, "%s of node %lld is not a finite number; repair the file", what,
+                    (long long)number);
     SB_SCAN_ERROR(s, "the %s is not a finite number; repair the file", what);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanRoom(SbScan *s, const char *what, int64_t n, int64_t text_bytes, int64_t binary_bytes)
+PetscErrorCode SbScanRoom(SbScan *s, const char *what, int64_t n, int64_t text_bytes,
+                          int64_t binary_bytes)
 {
   const int64_t room = (s->end - s->at) / (s->binary ? binary_bytes : text_bytes) + 1;
 
   PetscFunctionBeginUser;
-  if (n < 0) SB_SCAN_ERROR(s, "%lld %s are announced; a count cannot be negative", (long long)n, what);
+  if (n < 0)
+    SB_SCAN_ERROR(s, "%lld %s are announced; a count cannot be negative", (long long)n, what);
   if (n > room)
-    SB_SCAN_ERROR(
-      s, "%lld %s are announced, the rest of the file cannot hold more than %lld; it is damaged or truncated",
-      (long long)n, what, (long long)room);
+    SB_SCAN_ERROR(s,
+                  "%lld %s are announced, the rest of the file cannot hold more than %lld; it is "
+                  "damaged or truncated",
+                  (long long)n, what, (long long)room);
   if (n > PETSC_MAX_INT / 8)
     SB_SCAN_ERROR(s, "%lld %s are more than this build can number", (long long)n, what);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -216,8 +238,10 @@ PetscErrorCode SbScanQuoted(SbScan *s, const char *what, size_t size, char value
   PetscFunctionBeginUser;
   SbScanNext(s);
   n = *s->at == '"' ? strcspn(s->at + 1, "\"") : 0; /* the data ends with a zero */
-  if (*s->at != '"' || s->at[n + 1] != '"') PetscCall(unexpected(s, what, 0));
-  if (n >= size) SB_SCAN_ERROR(s, "the %s is longer than %zu characters", what, size - 1);
+  if (*s->at != '"' || s->at[n + 1] != '"')
+    PetscCall(unexpected(s, what, 0));
+  if (n >= size)
+    SB_SCAN_ERROR(s, "the %s is longer than %zu characters", what, size - 1);
   memcpy(value, s->at + 1, n);
   value[n] = 0;
   s->at += n + 2;
@@ -231,10 +255,12 @@ PetscErrorCode SbScanRestOfLine(SbScan *s, size_t size, char name[])
   PetscFunctionBeginUser;
   (void)SbScanMore(s, '\n');
   for (; s->at < s->end && *s->at != '\n'; s->at++) {
-    if (n + 1 >= size) SB_SCAN_ERROR(s, "the name is longer than %zu characters", size - 1);
+    if (n + 1 >= size)
+      SB_SCAN_ERROR(s, "the name is longer than %zu characters", size - 1);
     name[n++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
   }
-  while (n && name[n - 1] == ' ') n--;
+  while (n && name[n - 1] == ' ')
+    n--;
   name[n] = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -256,17 +282,19 @@ PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
   static const struct {
     const char *name[3];
     SbNumberType type;
-  } types[] = {{{"char", "int8", ""}, {'i', 1}},          {{"uchar", "uint8", "unsigned_char"}, {'u', 1}},
-               {{"short", "int16", ""}, {'i', 2}},        {{"ushort", "uint16", "unsigned_short"}, {'u', 2}},
-               {{"int", "int32", "vtkidtype"}, {'i', 4}}, {{"uint", "uint32", "unsigned_int"}, {'u', 4}},
-               {{"float", "float32", ""}, {'f', 4}},      {{"double", "float64", ""}, {'f', 8}},
-               {{"long", "vtktypeint64", ""}, {'i', 8}},  {{"unsigned_long", "vtktypeuint64", ""}, {'u', 8}}};
+  } types[] = {
+    {{"char", "int8", ""}, {'i', 1}},          {{"uchar", "uint8", "unsigned_char"}, {'u', 1}},
+    {{"short", "int16", ""}, {'i', 2}},        {{"ushort", "uint16", "unsigned_short"}, {'u', 2}},
+    {{"int", "int32", "vtkidtype"}, {'i', 4}}, {{"uint", "uint32", "unsigned_int"}, {'u', 4}},
+    {{"float", "float32", ""}, {'f', 4}},      {{"double", "float64", ""}, {'f', 8}},
+    {{"long", "vtktypeint64", ""}, {'i', 8}},  {{"unsigned_long", "vtktypeuint64", ""}, {'u', 8}}};
   char word[32];
 
   PetscFunctionBeginUser;
   (void)SbScanWord(s, sizeof(word), word);
   for (size_t i = 0; i < 3 * PETSC_STATIC_ARRAY_LENGTH(types) && word[0]; i++) {
-    if (strcasecmp(word, types[i / 3].name[i % 3])) continue;
+    if (strcasecmp(word, types[i / 3].name[i % 3]))
+      continue;
     *type = types[i / 3].type;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -274,7 +302,8 @@ PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[])
+void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes,
+                      double value[])
 {
   const unsigned char *from = (const unsigned char *)bytes;
 
@@ -282,7 +311,8 @@ void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const v
     uint64_t bits = 0;
 
     for (int b = 0; b < type.size; b++)
-      bits |= (uint64_t)from[i * (size_t)type.size + (size_t)b] << 8 * (big_endian ? type.size - 1 - b : b);
+      bits |= (uint64_t)from[i * (size_t)type.size + (size_t)b]
+              << 8 * (big_endian ? type.size - 1 - b : b);
     if (type.kind == 'f' && type.size == 4) {
       const uint32_t half = (uint32_t)bits;
       float x;
@@ -303,7 +333,8 @@ void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const v
 
 PetscBool SbScanMore(SbScan *s, char comment)
 {
-  while (s->at < s->end && *s->at != '\n' && isspace((unsigned char)*s->at)) s->at++;
+  while (s->at < s->end && *s->at != '\n' && isspace((unsigned char)*s->at))
+    s->at++;
   s->token = s->at;
   return (PetscBool)(s->at < s->end && *s->at != '\n' && *s->at != comment);
 }
@@ -319,6 +350,7 @@ PetscBool SbScanFind(SbScan *s, const char *text)
 {
   const char *found = (const char *)memmem(s->at, (size_t)(s->end - s->at), text, strlen(text));
 
-  if (found) s->at = found;
+  if (found)
+    s->at = found;
   return found ? PETSC_TRUE : PETSC_FALSE;
 }

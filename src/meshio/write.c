@@ -1,5 +1,6 @@
 /*
-  write.c - writes a mesh in the format of its extension, under a temporary name until it is complete.
+  write.c - writes a mesh in the format of its extension, under a temporary name until it is
+  complete.
 */
 #include <errno.h>
 #include <strings.h>
@@ -7,7 +8,8 @@
 #include "meshio_impl.h"
 
 /* Writes one file: a mesh, or the .xmf of the mesh `h5`. */
-static PetscErrorCode write_file(const SbImport *im, const char *path, SbMeshFormat format, const char *h5)
+static PetscErrorCode write_file(const SbImport *im, const char *path, SbMeshFormat format,
+                                 const char *h5)
 {
   char part[PETSC_MAX_PATH_LEN + 32];
   PetscErrorCode ierr = PETSC_SUCCESS;
@@ -34,7 +36,8 @@ static PetscErrorCode write_file(const SbImport *im, const char *path, SbMeshFor
   }
   failed = (PetscBool)(failed || (!ierr && rename(part, path)));
   error = errno;
-  if (ierr || failed) (void)unlink(part);
+  if (ierr || failed)
+    (void)unlink(part);
   PetscCall(ierr);
   PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(error));
@@ -47,6 +50,7 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
   const char *dot = strrchr(path, '.');
 
   PetscFunctionBeginUser;
+
   // format by the extension of the name
   if (format == SB_MESH_AUTO) {
     PetscCheck(dot && (!strcasecmp(dot, ".msh") || !strcasecmp(dot, ".h5")), PETSC_COMM_SELF,
@@ -54,9 +58,11 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
     format = strcasecmp(dot, ".h5") ? SB_MESH_MSH41 : SB_MESH_H5;
   }
   PetscCall(write_file(im, path, format, NULL));
+
   // mesh.h5 -> mesh.xmf, for ParaView
   (void)snprintf(index, sizeof(index), "%.*s.xmf",
                  (int)(dot && !strchr(dot, '/') ? dot - path : (ptrdiff_t)strlen(path)), path);
-  if (format == SB_MESH_H5) PetscCall(write_file(im, index, format, path));
+  if (format == SB_MESH_H5)
+    PetscCall(write_file(im, index, format, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

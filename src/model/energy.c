@@ -1,7 +1,7 @@
 /*
-  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the
-  current positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One
-  reduction for the sums, one for the extremes.
+  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m
+  v with the current positions x = X + u, the centre of mass, and extremes of speed, displacement
+  and det F. One reduction for the sums, one for the extremes.
 
   With the consistent mass matrix kinetic energy and momenta use it, too; not the centre of mass.
 */
@@ -27,9 +27,11 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   SbSpaceStrainEnergy(s, u, NULL, &sum.strain, &extreme[2], &ninverted, &sum.volume);
   sum.inverted = (PetscReal)ninverted;
   extreme[2] = -extreme[2];
+
   /* p = M v */
   PetscCall(PetscCalloc1(3 * s->nnode, &p));
-  if (V) SbSpaceAddInertia(s, &(SbStage){.a = v}, p);
+  if (V)
+    SbSpaceAddInertia(s, &(SbStage){.a = v}, p);
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3], L[3];
 
@@ -39,16 +41,18 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
       sum.momentum[k] += p[3 * i + k];
     }
     SbCross(x, p + 3 * i, L);
-    for (PetscInt k = 0; k < 3; k++) sum.angular[k] += L[k];
+    for (PetscInt k = 0; k < 3; k++)
+      sum.angular[k] += L[k];
     extreme[1] = PetscMax(extreme[1], SbDot3(u + 3 * i, u + 3 * i));
-    if (!v) continue;
+    if (!v)
+      continue;
     extreme[0] = PetscMax(extreme[0], SbDot3(v + 3 * i, v + 3 * i));
     sum.kinetic += 0.5 * SbDot3(v + 3 * i, p + 3 * i);
   }
   PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(PetscFree(p));
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, &sum, sizeof(sum) / sizeof(PetscReal), MPIU_REAL, MPI_SUM, m->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, sizeof(sum) / sizeof(PetscReal), MPIU_REAL,
+                             MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
   e->kinetic = sum.kinetic;
   e->strain = sum.strain;
@@ -77,12 +81,15 @@ PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_
   PetscCall(SbEvaluationBegin(m, 0., &at));
   PetscCall(PetscCalloc2(m->nbody, &strain, 3 * s->nnode, &p));
   SbSpaceStrainEnergy(s, at.stage.u, strain, &unused[0], &unused[1], &n, &unused[2]);
-  for (PetscInt b = 0; b < m->nbody; b++) sum[b][1] += strain[b];
-  if (V) SbSpaceAddInertia(s, &(SbStage){.a = at.stage.v}, p);
+  for (PetscInt b = 0; b < m->nbody; b++)
+    sum[b][1] += strain[b];
+  if (V)
+    SbSpaceAddInertia(s, &(SbStage){.a = at.stage.v}, p);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
     PetscReal *mine = sum[s->node_body[i / 3]];
 
-    if (V) mine[0] += 0.5 * at.stage.v[i] * p[i];
+    if (V)
+      mine[0] += 0.5 * at.stage.v[i] * p[i];
     mine[2 + i % 3] += p[i];
     mine[5 + i % 3] += s->node_mass[i / 3] * (s->node_x[i] + at.stage.u[i]);
   }
@@ -111,7 +118,8 @@ PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, Pets
   PetscFunctionBeginUser;
   PetscCall(SbEvaluationBegin(m, 0., &at));
   SbSpaceStrainEnergy(m->space, at.stage.u, NULL, &sum[0], &unused[0], ninverted, &unused[1]);
-  if (F) PetscCall(SbSpaceAddInternalForce(m->space, &at.stage, at.f));
+  if (F)
+    PetscCall(SbSpaceAddInternalForce(m->space, &at.stage, at.f));
   PetscCall(SbEvaluationEnd(m, &at));
   sum[1] = (PetscReal)*ninverted;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, m->comm));

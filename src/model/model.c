@@ -2,7 +2,8 @@
   The model: the semi-discrete equation M a + C v + f_int(u) = f_ext(t, u, v) of a scene.
 
   Set-up makes one list of effects per operation; an evaluation calls the effects in these lists.
-  A static run has no M and no C, and loads and prescribed displacements are multiplied by the load factor.
+  A static run has no M and no C, and loads and prescribed displacements are multiplied by the load
+  factor.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -13,13 +14,16 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   SbModel m = *model;
 
   PetscFunctionBeginUser;
-  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectDestroy(&m->effect[e]));
+  if (!m)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < m->neffect; e++)
+    PetscCall(SbEffectDestroy(&m->effect[e]));
   PetscCall(PetscFree(m->effect));
   PetscCall(PetscFree(m->lists));
   PetscCall(SbSpaceDestroy(&m->space));
   PetscCall(SbMeshDestroy(&m->mesh));
-  for (PetscInt k = 0; k < m->nmaterial; k++) PetscCall(SbMaterialDestroy(&m->material[k]));
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    PetscCall(SbMaterialDestroy(&m->material[k]));
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(SbElementDestroy(&m->element[b]));
     PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
@@ -42,16 +46,18 @@ static PetscErrorCode check_inclusions(SbModel m)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(m->nmaterial, &count));
-  for (PetscInt c = 0; c < m->mesh->ncell_owned; c++) count[m->mesh->cell_material[c]]++;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)m->nmaterial, MPIU_INT, MPI_SUM, m->comm));
+  for (PetscInt c = 0; c < m->mesh->ncell_owned; c++)
+    count[m->mesh->cell_material[c]]++;
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)m->nmaterial, MPIU_INT, MPI_SUM, m->comm));
   for (PetscInt b = 0; b < m->nbody; b++) {
     for (PetscInt k = 0; k < m->body[b].ninclusion; k++) {
       const PetscInt i = m->body[b].inclusion[k].material;
 
-      PetscCheck(
-        count[i], m->comm, PETSC_ERR_USER_INPUT,
-        "-body_%s_inclusions: '%s' holds no tetrahedra of this body that an earlier inclusion has not taken",
-        m->body[b].name, m->material[i]->name);
+      PetscCheck(count[i], m->comm, PETSC_ERR_USER_INPUT,
+                 "-body_%s_inclusions: '%s' holds no tetrahedra of this body that an earlier "
+                 "inclusion has not taken",
+                 m->body[b].name, m->material[i]->name);
     }
   }
   PetscCall(PetscFree(count));
@@ -62,16 +68,19 @@ static PetscErrorCode check_inclusions(SbModel m)
 static PetscErrorCode match_mass(SbModel m, PetscInt b)
 {
   const SbMesh mesh = m->mesh;
-  PetscReal mass = 0., factor;
+  PetscReal mass = 0.;
+  PetscReal factor;
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *vert = mesh->cell + 4 * c;
 
-    if (mesh->cell_body[c] != b) continue;
-    mass += m->material[mesh->cell_material[c]]->density *
-            (mesh->cell_set[c] & SB_CURVED ? SbTetCurvedVolume(mesh->x, vert, mesh->edge_off + 18 * c)
-                                           : SbTetDeterminant(mesh->x, vert) / 6.);
+    if (mesh->cell_body[c] != b)
+      continue;
+    mass +=
+      m->material[mesh->cell_material[c]]->density *
+      (mesh->cell_set[c] & SB_CURVED ? SbTetCurvedVolume(mesh->x, vert, mesh->edge_off + 18 * c)
+                                     : SbTetDeterminant(mesh->x, vert) / 6.);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));
   factor = m->body[b].in_memory->mass / mass;
@@ -81,15 +90,17 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists. */
+/* Lists of the effects that have an operation, in scenario order, one after the other in
+   m->lists. */
 #define NLIST 12
-#define SORT_INTO_LIST(m, op)                                               \
-  do {                                                                      \
-    PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST");        \
-    (m)->op = list;                                                         \
-    for (PetscInt i_ = 0; i_ < (m)->neffect; i_++)                          \
-      if ((m)->effect[i_]->ops.op) (m)->op[(m)->n##op++] = (m)->effect[i_]; \
-    list += (m)->n##op;                                                     \
+#define SORT_INTO_LIST(m, op)                                        \
+  do {                                                               \
+    PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST"); \
+    (m)->op = list;                                                  \
+    for (PetscInt i_ = 0; i_ < (m)->neffect; i_++)                   \
+      if ((m)->effect[i_]->ops.op)                                   \
+        (m)->op[(m)->n##op++] = (m)->effect[i_];                     \
+    list += (m)->n##op;                                              \
   } while (0)
 
 PetscErrorCode SbModelSetUp(SbModel m)
@@ -107,11 +118,14 @@ PetscErrorCode SbModelSetUp(SbModel m)
     m->body[b].edge_nodes = (PetscBool)(per[1] > 0);
   }
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
-  if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
+  if (m->nmaterial > m->nbody)
+    PetscCall(check_inclusions(m));
   for (PetscInt b = 0; b < m->nbody; b++)
-    if (m->body[b].in_memory && m->body[b].in_memory->mass > 0.) PetscCall(match_mass(m, b));
+    if (m->body[b].in_memory && m->body[b].in_memory->mass > 0.)
+      PetscCall(match_mass(m, b));
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
+
   /* skip supports that do not act at this time; the sets that others prescribe in all directions */
   for (PetscInt e = 0; e < m->neffect; e++) {
     SbEffect effect = m->effect[e];
@@ -128,13 +142,16 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
+
   /* supports first: other effects need the prescribed unknowns */
   for (PetscInt k = 0; k < 2 * m->neffect; k++) {
     SbEffect effect = m->effect[k % m->neffect];
 
-    if ((k < m->neffect) != (effect->ops.prescribe != NULL)) continue;
+    if ((k < m->neffect) != (effect->ops.prescribe != NULL))
+      continue;
     effect->dynamic = m->dynamic;
-    if (effect->ops.setup) SbEffectCall(effect, setup, m->space);
+    if (effect->ops.setup)
+      SbEffectCall(effect, setup, m->space);
     m->linear = (PetscBool)(m->linear && effect->linear);
   }
   PetscCall(SbSpacePrescribeDone(m->space));
@@ -152,10 +169,12 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, nonsymmetric);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass += m->space->node_mass[i];
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    mass += m->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(&mass, &m->mass, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscCall(SbOptionBool(&SbRunScope, "validate", &validate));
-  if (!validate) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!validate)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMeshValidate(m->mesh));
   PetscCall(SbSpaceValidate(m->space));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,7 +187,8 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
 
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(&centre[0][0], 4 * m->nbody));
-  if (U) PetscCall(VecGetArrayRead(U, &u));
+  if (U)
+    PetscCall(VecGetArrayRead(U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal *c = centre[s->node_body[i]];
 
@@ -176,10 +196,13 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
     for (PetscInt k = 0; k < 3; k++)
       c[k] += s->node_mass[i] * (s->node_x[3 * i + k] + (u ? u[3 * i + k] : 0.));
   }
-  if (U) PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
+  if (U)
+    PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
   for (PetscInt b = 0; b < m->nbody; b++)
-    for (PetscInt k = 0; k < 3; k++) centre[b][k] /= centre[b][3];
+    for (PetscInt k = 0; k < 3; k++)
+      centre[b][k] /= centre[b][3];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,10 +211,14 @@ PetscErrorCode SbEvaluationBegin(SbModel m, PetscReal t, SbEvaluation *e)
   PetscFunctionBeginUser;
   e->stage = (SbStage){.t = t, .shift_k = 1.};
   PetscCall(SbSpaceGetLocalRead(m->space, e->U, &e->stage.u));
-  if (e->V) PetscCall(SbSpaceGetLocalRead(m->space, e->V, &e->stage.v));
-  if (e->A) PetscCall(SbSpaceGetLocalRead(m->space, e->A, &e->stage.a));
-  if (e->F) PetscCall(SbSpaceGetLocalWrite(m->space, e->F, &e->f));
-  if (e->F) PetscCall(PetscArrayzero(e->f, 3 * m->space->nnode));
+  if (e->V)
+    PetscCall(SbSpaceGetLocalRead(m->space, e->V, &e->stage.v));
+  if (e->A)
+    PetscCall(SbSpaceGetLocalRead(m->space, e->A, &e->stage.a));
+  if (e->F)
+    PetscCall(SbSpaceGetLocalWrite(m->space, e->F, &e->f));
+  if (e->F)
+    PetscCall(PetscArrayzero(e->f, 3 * m->space->nnode));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,48 +226,62 @@ PetscErrorCode SbEvaluationEnd(SbModel m, SbEvaluation *e)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSpaceRestoreLocalRead(m->space, e->U, &e->stage.u));
-  if (e->V) PetscCall(SbSpaceRestoreLocalRead(m->space, e->V, &e->stage.v));
-  if (e->A) PetscCall(SbSpaceRestoreLocalRead(m->space, e->A, &e->stage.a));
-  if (e->F) PetscCall(SbSpaceRestoreLocalWrite(m->space, e->F, &e->f));
+  if (e->V)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, e->V, &e->stage.v));
+  if (e->A)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, e->A, &e->stage.a));
+  if (e->F)
+    PetscCall(SbSpaceRestoreLocalWrite(m->space, e->F, &e->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool apart, PetscReal sign,
-                                     PetscReal f[])
+PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool apart,
+                                     PetscReal sign, PetscReal f[])
 {
   const PetscInt n = 3 * m->space->nnode;
 
   PetscFunctionBeginUser;
-  if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nforce)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
+
   /* constant ones first: they have a common factor */
   for (PetscInt e = 0; e < m->nforce; e++)
     if (m->force[e]->steady && SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
   if (m->load != 1.)
-    for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
+    for (PetscInt i = 0; i < n; i++)
+      f[i] *= m->load;
   for (PetscInt e = 0; e < m->nforce; e++)
-    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential) && SbEffectActs(m->force[e], stage->t))
+    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential) &&
+        SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
   if (sign != 1.)
-    for (PetscInt i = 0; i < n; i++) f[i] *= sign;
+    for (PetscInt i = 0; i < n; i++)
+      f[i] *= sign;
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
+PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain,
+                               Vec F)
 {
   SbEvaluation e = {.U = U, .V = V, .A = A, .F = F};
 
   PetscFunctionBeginUser;
   PetscCall(SbEvaluationBegin(m, t, &e));
-  PetscCall(SbModelExternalForces(m, &e.stage, (PetscBool)(constrain && m->barrier_apart), -1., e.f));
+  PetscCall(
+    SbModelExternalForces(m, &e.stage, (PetscBool)(constrain && m->barrier_apart), -1., e.f));
   PetscCall(SbSpaceAddInternalForce(m->space, &e.stage, e.f));
-  if (A || V) SbSpaceAddInertia(m->space, &e.stage, e.f);
-  if (m->space->constraints) SbConstraintsResidual(m->space, e.stage.u, constrain, e.f);
+  if (A || V)
+    SbSpaceAddInertia(m->space, &e.stage, e.f);
+  if (m->space->constraints)
+    SbConstraintsResidual(m->space, e.stage.u, constrain, e.f);
   PetscCall(SbEvaluationEnd(m, &e));
+
   /* guesses have the prescribed values */
-  if (constrain) PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, F));
+  if (constrain)
+    PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -255,8 +296,8 @@ PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k,
-                              Vec U, Vec V, Mat A)
+PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a,
+                              PetscReal shift_k, Vec U, Vec V, Mat A)
 {
   SbEvaluation e = {.U = U, .V = V};
 
@@ -267,9 +308,11 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   e.stage.shift_k = shift_k;
   PetscCall(SbSpaceAssembleTangent(m->space, &e.stage, A));
   for (PetscInt k = 0; k < m->ntangent; k++) {
-    if (!SbEffectActs(m->tangent[k], t)) continue;
-    /* in a static run the load factor, except for formulas of t, which is the load factor there: they
-       prescribe the load path themselves */
+    if (!SbEffectActs(m->tangent[k], t))
+      continue;
+
+    /* in a static run the load factor, except for formulas of t, which is the load factor there:
+       they prescribe the load path themselves */
     m->space->block_scale = m->tangent[k]->steady ? m->load : 1.;
     SbEffectCall(m->tangent[k], tangent, m->space, &e.stage, A);
   }
@@ -287,7 +330,8 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscCall(SbEvaluationBegin(m, t, &e));
   PetscCall(SbSpaceGetLocalRead(m->space, X, &x));
   for (PetscInt k = 0; k < m->nnonsymmetric; k++) {
-    if (!SbEffectActs(m->nonsymmetric[k], t)) continue;
+    if (!SbEffectActs(m->nonsymmetric[k], t))
+      continue;
     e.stage.shift_k = m->nonsymmetric[k]->steady ? m->load : 1.;
     SbEffectCall(m->nonsymmetric[k], nonsymmetric, m->space, &e.stage, x, e.f);
   }
@@ -302,7 +346,8 @@ PetscErrorCode SbModelProjectTangent(SbModel m, PetscBool filter)
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < m->nmaterial; k++)
     if (m->material[k]->adaptive)
-      PetscCall(SbMaterialSetTangent(m->material[k], filter ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
+      PetscCall(
+        SbMaterialSetTangent(m->material[k], filter ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
   m->space->tentative = (PetscBool)(m->may_filter && !filter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -313,19 +358,25 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  if (!m->nprescribe && !s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nprescribe && !s->constraints)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++)
-    if (m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
-  for (PetscInt k = 0; k < 3 * s->nfixed; k++) s->fixed_value[k] *= m->load;
+    if (m->prescribe[e]->steady)
+      SbEffectCall(m->prescribe[e], prescribe, s, t);
+  for (PetscInt k = 0; k < 3 * s->nfixed; k++)
+    s->fixed_value[k] *= m->load;
   for (PetscInt e = 0; e < m->nprescribe; e++)
-    if (!m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
+    if (!m->prescribe[e]->steady)
+      SbEffectCall(m->prescribe[e], prescribe, s, t);
   PetscCall(VecGetArray(U, &u));
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
     const PetscInt node = s->fixed_node[k / 3];
 
-    if (s->fixed[node] & (1 << k % 3)) u[3 * node + k % 3] = s->fixed_value[k];
+    if (s->fixed[node] & (1 << k % 3))
+      u[3 * node + k % 3] = s->fixed_value[k];
   }
-  if (s->constraints) SbConstraintsPrescribe(s, PETSC_FALSE, u);
+  if (s->constraints)
+    SbConstraintsPrescribe(s, PETSC_FALSE, u);
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -347,7 +398,8 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   }
   PetscCall(VecRestoreArray(U, &v));
   PetscCall(SbModelPrescribe(m, 0., U));
-  if (!V) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!V)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(m->nbody, &centre));
   PetscCall(SbModelCentres(m, NULL, centre));
   PetscCall(VecGetArray(V, &v));
@@ -360,8 +412,10 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
     SbCross(body->angular_velocity, r, spin);
     for (PetscInt k = 0; k < 3; k++) {
       v[3 * i + k] = body->velocity[k] + spin[k];
-      if (start->velocity[k]) v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
-      if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
+      if (start->velocity[k])
+        v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
+      if (s->fixed[i] & (1 << k))
+        v[3 * i + k] = 0.;
     }
   }
   PetscCall(VecRestoreArray(V, &v));

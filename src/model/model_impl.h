@@ -4,10 +4,11 @@
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c: energy check of a converged active set; `again`: coefficients were reduced. Collective. */
+/* restitution.c: energy check of a converged active set; `again`: coefficients were reduced.
+   Collective. */
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
-/* model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1, and
-   f[nnode][3], zero, of F; V, A and F may be NULL. Collective. */
+/* model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1,
+   and f[nnode][3], zero, of F; V, A and F may be NULL. Collective. */
 typedef struct {
   Vec U, V, A, F;
   SbStage stage;
@@ -16,5 +17,5 @@ typedef struct {
 PetscErrorCode SbEvaluationBegin(SbModel model, PetscReal t, SbEvaluation *e);
 PetscErrorCode SbEvaluationEnd(SbModel model, SbEvaluation *e);
 /* f[nnode][3], zero before, = sign * f_ext, N; apart: without barrier contact. Not collective. */
-PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart, PetscReal sign,
-                                     PetscReal f[]);
+PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart,
+                                     PetscReal sign, PetscReal f[]);

@@ -1,17 +1,17 @@
 /*
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
-  Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double
-  precision, the step, its time, the next step's length, work and dissipation so far, and the history
-  variables of effects. A file is written beside its target, flushed and renamed; the newest ones are kept. It
-  is accepted by a run with the same hash of the mesh (every coordinate and cell by its original number), and
-  the same text of the options that determine the mechanics. A checksum over the three vectors detects a file
-  that was damaged later (both sums: mesh.c).
+  Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and
+  double precision, the step, its time, the next step's length, work and dissipation so far, and the
+  history variables of effects. A file is written beside its target, flushed and renamed; the newest
+  ones are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell
+  by its original number), and the same text of the options that determine the mechanics. A checksum
+  over the three vectors detects a file that was damaged later (both sums: mesh.c).
 
-  Effects have active contact constraints and friction states. Each gives records of numbers, whose entities
-  have numbers that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`,
-  in any order. Every rank reads all; the effect takes its entities'. Without such a dataset (no contact, or
-  an older file) the effects begin as at the start of a run.
+  Effects have active contact constraints and friction states. Each gives records of numbers, whose
+  entities have numbers that no partition changes (SbEffectOps.save); they are one dataset per
+  effect, `state_<name>`, in any order. Every rank reads all; the effect takes its entities'.
+  Without such a dataset (no contact, or an older file) the effects begin as at the start of a run.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -30,13 +30,14 @@ typedef struct {
   Vec vec; /* NULL: penalty data of faces */
 } Part;
 
-/* Those of a run: arc length has `path`; penalty data of faces are there where they are history variables. */
+/* Those of a run: arc length has `path`; penalty data of faces are there where they are history
+   variables. */
 #define NPART 5
 static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
 {
   const SbModel m = run->model;
-  const PetscBool remember =
-    (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 && m->space->jump && !m->space->linear);
+  const PetscBool remember = (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 &&
+                                         m->space->jump && !m->space->linear);
   const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->U},
                            {"v", "SI", NULL, &out->node, 3, 1, run->V},
                            {"a", "SI", NULL, &out->node, 3, 2, run->A},
@@ -45,7 +46,8 @@ static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
   PetscInt n = 0;
 
   for (int k = 0; k < NPART; k++)
-    if (all[k].vec || (k == NPART - 1 && remember)) part[n++] = all[k];
+    if (all[k].vec || (k == NPART - 1 && remember))
+      part[n++] = all[k];
   return n;
 }
 
@@ -54,7 +56,8 @@ typedef struct {
   PetscReal t, next, dt, t_end, paused;
 } Times;
 
-/* Scalars, by name. Optional ones are zero where they are missing: those of re-meshing, and of a pause. */
+/* Scalars, by name. Optional ones are zero where they are missing: those of re-meshing, and of a
+   pause. */
 typedef struct {
   const char *name;
   PetscReal *value;
@@ -87,7 +90,8 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
   memcpy(number, all, sizeof(all));
 }
 
-static PetscErrorCode checksum_of(MPI_Comm comm, const Part *p, const PetscReal slice[], uint64_t *sum)
+static PetscErrorCode checksum_of(MPI_Comm comm, const Part *p, const PetscReal slice[],
+                                  uint64_t *sum)
 {
   uint64_t mine = 0;
 
@@ -107,7 +111,8 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
 
   PetscFunctionBeginUser;
   *checksum = 0;
-  PetscCall(PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  PetscCall(
+    PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
   for (const Part *p = part; p < part + n; p++) {
     const PetscScalar *array = jumps;
     uint64_t sum;
@@ -117,15 +122,18 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
     else
       PetscCall(SbSpaceGetJumps(run->model->space, run->U, jumps));
     PetscCall(SbForestReduce(p->order->sf, p->ncomp, MPIU_REAL, array, slice));
-    if (p->vec) PetscCall(VecRestoreArrayRead(p->vec, &array));
-    PetscCall(SbH5WriteSlice(h, h->file, p->name, p->unit, p->order, p->ncomp, H5T_IEEE_F64LE, slice));
+    if (p->vec)
+      PetscCall(VecRestoreArrayRead(p->vec, &array));
+    PetscCall(
+      SbH5WriteSlice(h, h->file, p->name, p->unit, p->order, p->ncomp, H5T_IEEE_F64LE, slice));
     PetscCall(checksum_of(out->comm, p, slice, &sum));
     if (p->sum)
       PetscCall(SbH5PutInt(h, h->file, p->sum, (int64_t)sum));
     else
       *checksum += sum;
   }
-  if (run->path) PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
+  if (run->path)
+    PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
   PetscCall(PetscFree2(slice, jumps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -138,7 +146,8 @@ static uint64_t sum_of_records(PetscInt n, PetscInt width, const PetscReal recor
   for (PetscInt i = 0; i < n; i++) {
     uint64_t one = SALT;
 
-    for (PetscInt k = 0; k < width; k++) one = SbMixReal(one, record[width * i + k]);
+    for (PetscInt k = 0; k < width; k++)
+      one = SbMixReal(one, record[width * i + k]);
     sum += one;
   }
   return sum;
@@ -157,7 +166,8 @@ static PetscErrorCode write_effects(SbRun run, SbH5 *h, uint64_t *sum)
     PetscReal *record;
     uint64_t mine, all;
 
-    if (!e->ops.save) continue;
+    if (!e->ops.save)
+      continue;
     SbEffectCall(e, save, m->space, &order.n, &record);
     PetscCallMPI(MPI_Allreduce(&order.n, &order.N, 1, MPIU_INT, MPI_SUM, m->comm));
     PetscCallMPI(MPI_Scan(&order.n, &order.start, 1, MPIU_INT, MPI_SUM, m->comm));
@@ -175,7 +185,8 @@ static PetscErrorCode write_effects(SbRun run, SbH5 *h, uint64_t *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable. Collective. */
+/* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable.
+   Collective. */
 static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok)
 {
   const SbModel m = run->model;
@@ -191,19 +202,24 @@ static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *su
     PetscReal *record;
     int64_t n = 0;
 
-    if (!e->ops.load) continue;
+    if (!e->ops.load)
+      continue;
     SbFormat(sizeof(name), name, "state_%s", e->name);
     SbH5GetInt(h->file, name, &n, &there);
-    if (!there || n <= 0) continue;
+    if (!there || n <= 0)
+      continue;
     order.n = order.N = (PetscInt)n;
     PetscCall(PetscMalloc1(e->nstate * order.n, &record));
     PetscCall(SbH5ReadSlice(h, name, &order, e->nstate, record, ok));
-    if (*ok && sum) *sum += sum_of_records(order.n, e->nstate, record);
-    if (*ok && !sum) SbEffectCall(e, load, m->space, t, u, order.n, record);
+    if (*ok && sum)
+      *sum += sum_of_records(order.n, e->nstate, record);
+    if (*ok && !sum)
+      SbEffectCall(e, load, m->space, t, u, order.n, record);
     PetscCall(PetscFree(record));
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
-  if (!sum) PetscCall(SbModelContactResume(m));
+  if (!sum)
+    PetscCall(SbModelContactResume(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,13 +228,16 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbOutput out = (SbOutput)ctx;
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
   SbH5 h;
-  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN];
+  char message[SB_MESSAGE_MAX] = "";
   uint64_t checksum;
   Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
   Number number[NNUMBER];
 
   PetscFunctionBeginUser;
-  /* whether this step is to be written: by time, by number, as the last one, or because the run stops */
+
+  /* whether this step is to be written: by time, by number, as the last one, or because the run
+     stops */
   if (step->step == run->step0 ||
       !(run->stopped || (step->last && asked) ||
         (out->checkpoint_every > 0. && SbOutputDue(out->checkpoint_every, step->t, step->dt)) ||
@@ -230,19 +249,23 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
+
   /* a temporary file beside its target; a full disk is an error before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   SbOutputPath(out, name, path);
   SbOutputPath(out, "checkpoint.tmp", tmp);
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536));
+  PetscCall(
+    SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536));
 
   /* the state */
   PetscCall(write_parts(run, out, &h, &checksum));
   PetscCall(write_effects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
+
   /* time, work and dissipation so far */
-  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
+  if (run->ts)
+    PetscCall(TSGetTimeStep(run->ts, &times.next));
   numbers_of(run, &times, number);
   for (int i = 0; i < NNUMBER; i++)
     if (!number[i].optional || *number[i].value != 0.)
@@ -285,9 +308,12 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
 
   PetscFunctionBeginUser;
+
   // a run that may be asked to stop writes one, too: work and dissipation are part of the state
-  if (asked) run->want_energies = PETSC_TRUE;
-  if (asked || run->stop.listens) PetscCall(SbRunAddMonitor(run, monitor, out));
+  if (asked)
+    run->want_energies = PETSC_TRUE;
+  if (asked || run->stop.listens)
+    PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -295,14 +321,19 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash)
 {
   PetscBool ok = PETSC_TRUE;
-  char *options, a[200] = "", b[200] = "";
-  const char *theirs, *ours = out->identity;
+  char *options;
+  char a[200] = "";
+  char b[200] = "";
+  const char *theirs;
+  const char *ours = out->identity;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5ReadText(h, "options", &options, &ok));
+
   // the first lines in which the texts of options differ
   for (theirs = options; ok && !a[0] && (*theirs || *ours);) {
-    const size_t n = strcspn(theirs, "\n"), m = strcspn(ours, "\n");
+    const size_t n = strcspn(theirs, "\n");
+    const size_t m = strcspn(ours, "\n");
 
     if (n != m || strncmp(theirs, ours, n)) {
       SbFormat(sizeof(a), a, "%.*s", n ? (int)n : 7, n ? theirs : "nothing");
@@ -312,14 +343,15 @@ static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t m
     ours += m + (ours[m] == '\n');
   }
   PetscCall(PetscFree(options));
+  PetscCheck(!ok || !a[0], out->comm, PETSC_ERR_USER_INPUT,
+             "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects "
+             "must be the same",
+             h->path, a, b);
   PetscCheck(
-    !ok || !a[0], out->comm, PETSC_ERR_USER_INPUT,
-    "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects must be the same",
-    h->path, a, b);
-  PetscCheck((uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
-             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s); "
-             "-body_<name>_state FOLDER takes the state of a run with any mesh",
-             h->path, SbOutputMeshStep(run) ? ", or a body was re-meshed: name it by -restart FILE" : "");
+    (uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
+    "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s); "
+    "-body_<name>_state FOLDER takes the state of a run with any mesh",
+    h->path, SbOutputMeshStep(run) ? ", or a body was re-meshed: name it by -restart FILE" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -331,21 +363,28 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
   PetscReal *slice, *jumps;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  PetscCall(
+    PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
   for (const Part *p = part; p < part + n && *ok; p++) {
     PetscScalar *array = jumps;
     uint64_t sum;
     int64_t own = 0;
 
-    if (p->sum && H5Lexists(h->file, p->name, H5P_DEFAULT) <= 0) continue;
+    if (p->sum && H5Lexists(h->file, p->name, H5P_DEFAULT) <= 0)
+      continue;
     PetscCall(SbH5ReadSlice(h, p->name, p->order, p->ncomp, slice, ok));
-    if (p->sum) SbH5GetInt(h->file, p->sum, &own, ok);
-    if (*ok && p->vec && p->vec == run->path) SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
-    if (!*ok) break;
+    if (p->sum)
+      SbH5GetInt(h->file, p->sum, &own, ok);
+    if (*ok && p->vec && p->vec == run->path)
+      SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
+    if (!*ok)
+      break;
     PetscCall(checksum_of(out->comm, p, slice, &sum));
     *ok = (PetscBool)(!p->sum || own == (int64_t)sum);
-    if (!p->sum) *all += sum;
-    if (p->vec) PetscCall(VecGetArray(p->vec, &array));
+    if (!p->sum)
+      *all += sum;
+    if (p->vec)
+      PetscCall(VecGetArray(p->vec, &array));
     PetscCall(SbForestBroadcast(p->order->sf, p->ncomp, MPIU_REAL, slice, array));
     if (p->vec)
       PetscCall(VecRestoreArray(p->vec, &array));
@@ -356,19 +395,23 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Loads one file; not ok: truncated, damaged or no checkpoint. One that does not fit the run is an error. */
+/* Loads one file; not ok: truncated, damaged or no checkpoint. One that does not fit the run is an
+   error. */
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbH5 h;
   Times times;
   Number number[NNUMBER];
-  int64_t step, mesh_hash, checksum = 0, format;
+  int64_t step, mesh_hash;
+  int64_t checksum = 0;
+  int64_t format;
   uint64_t sum = 0;
   PetscReal values[NNUMBER] = {0.};
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbH5GetInt(h.file, "format", &format, ok);
   SbH5GetInt(h.file, "step", &step, ok);
   SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok);
@@ -378,19 +421,28 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
     PetscBool there = PETSC_TRUE;
 
     SbH5GetReal(h.file, number[i].name, &values[i], &there);
-    if (!there && !number[i].optional) *ok = PETSC_FALSE;
+    if (!there && !number[i].optional)
+      *ok = PETSC_FALSE;
   }
-  if (*ok && format != FORMAT) *ok = PETSC_FALSE;
+  if (*ok && format != FORMAT)
+    *ok = PETSC_FALSE;
 
   /* the identity, the state and its checksum */
-  if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
-  if (*ok) PetscCall(read_parts(run, out, &h, &sum, ok));
-  if (*ok) PetscCall(read_effects(run, &h, 0., &sum, ok));
-  if (*ok) SbCheckpointSumMeshes(run, &h, &sum, ok);
-  if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
+  if (*ok)
+    PetscCall(check_identity(run, out, &h, mesh_hash));
+  if (*ok)
+    PetscCall(read_parts(run, out, &h, &sum, ok));
+  if (*ok)
+    PetscCall(read_effects(run, &h, 0., &sum, ok));
+  if (*ok)
+    SbCheckpointSumMeshes(run, &h, &sum, ok);
+  if (sum != (uint64_t)checksum)
+    *ok = PETSC_FALSE;
 
-  /* scalars; the next step has the length of the uninterrupted run, unless -ts_dt or -ts_max_time differ */
-  for (int i = 0; i < NNUMBER && *ok; i++) *number[i].value = values[i];
+  /* scalars; the next step has the length of the uninterrupted run, unless -ts_dt or -ts_max_time
+     differ */
+  for (int i = 0; i < NNUMBER && *ok; i++)
+    *number[i].value = values[i];
   if (*ok && run->ts && (!run->fixed_step || (times.dt == run->dt && times.t_end == run->t_end)))
     PetscCall(TSSetTimeStep(run->ts, times.next));
 
@@ -404,20 +456,25 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
       SbH5GetReal(h.file, run->carried[i].name, run->carried[i].value, ok);
     if (!all)
       PetscCall(SbWarning(
-        out->comm, "%s has no errors, as it was written without -ledger: they count from there", h.path));
+        out->comm, "%s has no errors, as it was written without -ledger: they count from there",
+        h.path));
   }
-  if (*ok) PetscCall(SbProbesRead(run, out, &h));
+  if (*ok)
+    PetscCall(SbProbesRead(run, out, &h));
   for (PetscInt i = 0; *ok && i < SbLiveCount(); i++) {
     PetscReal value;
 
     SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok);
-    if (*ok) SbLiveSet(i, times.t, value);
+    if (*ok)
+      SbLiveSet(i, times.t, value);
   }
 
   /* history variables of effects; the run is at the file's step */
-  if (*ok) PetscCall(read_effects(run, &h, times.t, NULL, ok));
+  if (*ok)
+    PetscCall(read_effects(run, &h, times.t, NULL, ok));
   PetscCall(SbH5Close(&h));
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
   run->after.dt = times.paused;
   run->step0 = (PetscInt)step;
   run->t0 = times.t;
@@ -433,26 +490,30 @@ PetscErrorCode SbCheckpointLoad(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputOrder(run, out));
-  PetscCheck(stat(out->restart, &info) || !S_ISDIR(info.st_mode), out->comm, PETSC_ERR_FILE_OPEN,
-             "-restart %s is a folder: name a checkpoint_*.h5 in it, or go on there with -output_dir %s "
-             "-restart latest",
-             out->restart, out->restart);
+  PetscCheck(
+    stat(out->restart, &info) || !S_ISDIR(info.st_mode), out->comm, PETSC_ERR_FILE_OPEN,
+    "-restart %s is a folder: name a checkpoint_*.h5 in it, or go on there with -output_dir %s "
+    "-restart latest",
+    out->restart, out->restart);
   for (;;) {
     PetscCall(SbCheckpointFind(out, path));
+
     /* an unreadable one is skipped if an older one may be taken */
-    PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
-               out->ndamaged ? "readable " : "", out->dir);
+    PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN,
+               "-restart latest: there is no %scheckpoint in %s", out->ndamaged ? "readable " : "",
+               out->dir);
     PetscCall(load(run, out, path, &ok));
-    if (ok) break;
-    PetscCheck(!strcmp(out->restart, "latest"), out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s",
-               path,
+    if (ok)
+      break;
+    PetscCheck(!strcmp(out->restart, "latest"), out->comm, PETSC_ERR_FILE_READ,
+               "cannot restart from %s: %s", path,
                access(path, R_OK) ? "there is no such file, or it may not be read"
                                   : "it is truncated, damaged or not a checkpoint");
     PetscCall(SbWarning(out->comm, SB_SKIPPED, path));
     out->ndamaged++;
   }
   if (!out->quiet)
-    PetscCall(PetscPrintf(out->comm, "restart from %s: step %" PetscInt_FMT ", t = %g s\n", path, run->step0,
-                          run->t0));
+    PetscCall(PetscPrintf(out->comm, "restart from %s: step %" PetscInt_FMT ", t = %g s\n", path,
+                          run->step0, run->t0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,8 @@
 /*
-  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the
-  group `mesh_<body>` with the arrays of SbMemoryMesh, written by rank 0. A restart takes it from there before
-  the scene is set up; the mesh of the other bodies comes from their files.
+  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the
+  checkpoint, as the group `mesh_<body>` with the arrays of SbMemoryMesh, written by rank 0. A
+  restart takes it from there before the scene is set up; the mesh of the other bodies comes from
+  their files.
 */
 #include <unistd.h>
 #include "output_impl.h"
@@ -43,9 +44,9 @@ static uint64_t sum_of(const Array array[NARRAY])
       if (a->type == H5T_STD_U64LE)
         sum += ((uint64_t *)a->data)[i] * (uint64_t)(2 * i + 1);
       else
-        sum +=
-          SbMixReal((uint64_t)i + a->salt, a->type == H5T_IEEE_F64LE ? ((PetscReal *)a->data)[i]
-                                                                     : (PetscReal)((PetscInt *)a->data)[i]);
+        sum += SbMixReal((uint64_t)i + a->salt, a->type == H5T_IEEE_F64LE
+                                                  ? ((PetscReal *)a->data)[i]
+                                                  : (PetscReal)((PetscInt *)a->data)[i]);
     }
   }
   return sum;
@@ -64,26 +65,32 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
     Array a[NARRAY];
     hid_t group;
 
-    if (!g || !g->step) continue;
+    if (!g || !g->step)
+      continue;
     memcpy(count, (const PetscInt[NCOUNT]){g->nvert, g->ncell, g->ntri, g->nedge}, sizeof(count));
     PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
     arrays_of(g, count, a);
-    if (!out->rank) own = sum_of(a);
+    if (!out->rank)
+      own = sum_of(a);
     PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
-    PetscCall(SbH5Reserve(h, 32 * ((PetscInt64)count[0] + count[2]) + 40 * ((PetscInt64)count[1] + count[3]) +
-                               65536));
+    PetscCall(SbH5Reserve(h, 32 * ((PetscInt64)count[0] + count[2]) +
+                               40 * ((PetscInt64)count[1] + count[3]) + 65536));
     SbFormat(sizeof(name), name, "mesh_%s", body->name);
     PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
     PetscCall(SbH5PutInt(h, group, "step", g->step));
     PetscCall(SbH5PutReal(h, group, "mass", g->mass));
     PetscCall(SbH5PutReal(h, group, "bound", g->bound));
     PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
-    for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
+    for (int k = 0; k < NCOUNT; k++)
+      PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
     for (int k = 0; k < NARRAY; k++) {
-      const PetscInt N = a[k].n, n = out->rank ? 0 : N;
+      const PetscInt N = a[k].n;
+      const PetscInt n = out->rank ? 0 : N;
       const SbOrder order = {.N = N, .n = n, .start = N - n};
 
-      if (N) PetscCall(SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].type, a[k].data));
+      if (N)
+        PetscCall(
+          SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].type, a[k].data));
     }
     PetscCall(SbH5GroupLink(h, group, h->file, name));
     (void)H5Gclose(group);
@@ -93,10 +100,12 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 }
 
 /* The mesh of a body in an open file; NULL when it has none. */
-static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
+static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory,
+                                PetscBool *ok)
 {
   char name[2 * SB_NAME_MAX];
-  int64_t step = 0, sum = 0;
+  int64_t step = 0;
+  int64_t sum = 0;
   PetscInt count[NCOUNT];
   Array a[NARRAY];
   hid_t group;
@@ -104,20 +113,25 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   PetscFunctionBeginUser;
   *in_memory = NULL;
   SbFormat(sizeof(name), name, "mesh_%s", body);
-  if (!*ok || H5Lexists(file, name, H5P_DEFAULT) <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok || H5Lexists(file, name, H5P_DEFAULT) <= 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   group = H5Gopen2(file, name, H5P_DEFAULT);
   *ok = (PetscBool)(group >= 0);
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* older files have no curved edges */
   for (int k = 0; k < NCOUNT; k++) {
     int64_t n = 0;
 
-    if (k < 3 || H5Aexists(group, counts[k]) > 0) SbH5GetInt(group, counts[k], &n, ok);
+    if (k < 3 || H5Aexists(group, counts[k]) > 0)
+      SbH5GetInt(group, counts[k], &n, ok);
     *ok = (PetscBool)(*ok && n >= 0 && n < PETSC_MAX_INT / 8);
     count[k] = *ok ? (PetscInt)n : 0;
   }
   SbH5GetInt(group, "step", &step, ok);
   SbH5GetInt(group, "sum", &sum, ok);
+
   /* counts must agree with the sizes of the datasets before anything is allocated */
   arrays_of(&(SbMemoryMesh){0}, count, a);
   for (int k = 0; k < NARRAY; k++)
@@ -129,13 +143,16 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     SbH5GetReal(group, "bound", &(*in_memory)->bound, ok);
     arrays_of(*in_memory, count, a);
     for (int k = 0; k < NARRAY && *ok; k++) {
-      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].type, a[k].n, a[k].ncomp, a[k].data);
+      if (a[k].n)
+        *ok = SbH5Read(group, a[k].name, a[k].type, a[k].n, a[k].ncomp, a[k].data);
+
       /* check before the mesh is compared: a damaged file is not one of another mesh */
       for (PetscInt i = 0; a[k].type == H5T_STD_I64LE && i < a[k].n * a[k].ncomp && *ok; i++)
         *ok = (PetscBool)(((PetscInt *)a[k].data)[i] >= 0 && ((PetscInt *)a[k].data)[i] < count[0]);
     }
     *ok = (PetscBool)(*ok && (int64_t)sum_of(a) == sum);
-    if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));
+    if (!*ok)
+      PetscCall(SbMemoryMeshDestroy(in_memory));
   }
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,7 +167,8 @@ void SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok)
 
     SbFormat(sizeof(name), name, "mesh_%s", run->model->body[b].name);
     group = SbH5OpenGroup(h->file, name);
-    if (group < 0) continue;
+    if (group < 0)
+      continue;
     SbH5GetInt(group, "sum", &own, ok);
     (void)H5Gclose(group);
     *sum += (uint64_t)own;
@@ -165,10 +183,12 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->restart[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (;;) {
     PetscCall(SbCheckpointFind(out, path));
-    if (!path[0]) break;
+    if (!path[0])
+      break;
 
     /* the meshes of that file, on rank 0 */
     if (!out->rank) {
@@ -179,15 +199,20 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
       ok = (PetscBool)(file >= 0);
       for (PetscInt b = 0; b < m->nbody && file >= 0; b++)
         PetscCall(read_mesh(file, m->body[b].name, &m->body[b].in_memory, &ok));
-      if (file >= 0) (void)H5Fclose(file);
-      for (PetscInt b = 0; b < m->nbody && !ok; b++) PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
+      if (file >= 0)
+        (void)H5Fclose(file);
+      for (PetscInt b = 0; b < m->nbody && !ok; b++)
+        PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
     }
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
-    if (ok || strcmp(out->restart, "latest")) break;
+    if (ok || strcmp(out->restart, "latest"))
+      break;
     PetscCall(SbWarning(out->comm, SB_SKIPPED, path));
     out->ndamaged++;
   }
+
   // broadcast which bodies have their own mesh, and its sizes
-  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(SbMemoryMeshShare(out->comm, &m->body[b].in_memory));
+  for (PetscInt b = 0; b < m->nbody; b++)
+    PetscCall(SbMemoryMeshShare(out->comm, &m->body[b].in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

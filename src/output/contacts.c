@@ -1,12 +1,12 @@
 /*
   The active contact points, with normals, gaps and forces: -output_contacts.
 
-  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in
-  an order that no partition changes. Their number differs from frame to frame, so they have their own
-  indices, contacts.xmf and contacts.vtkhdf.
+  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per
+  point, in an order that no partition changes. Their number differs from frame to frame, so they
+  have their own indices, contacts.xmf and contacts.vtkhdf.
 
-  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the
-  number that it begins with, then by effect, kind, and the number of the other side.
+  A point is sent to the rank that has its share of the numbers of points and edges, and sorted
+  there: by the number that it begins with, then by effect, kind, and the number of the other side.
 */
 #include <stddef.h>
 #include "output_impl.h"
@@ -39,12 +39,14 @@ static const struct {
 
 static int by_keys(const void *a, const void *b)
 {
-  const SbContactPoint *p = (const SbContactPoint *)a, *q = (const SbContactPoint *)b;
+  const SbContactPoint *p = (const SbContactPoint *)a;
+  const SbContactPoint *q = (const SbContactPoint *)b;
   const PetscInt of_p[4] = {p->id[1], p->effect, p->id[0], p->id[2]};
   const PetscInt of_q[4] = {q->id[1], q->effect, q->id[0], q->id[2]};
 
   for (int k = 0; k < 4; k++)
-    if (of_p[k] != of_q[k]) return of_p[k] < of_q[k] ? -1 : 1;
+    if (of_p[k] != of_q[k])
+      return of_p[k] < of_q[k] ? -1 : 1;
   return 0;
 }
 
@@ -57,26 +59,32 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 
   PetscFunctionBeginUser;
   *bytes = 0;
-  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_points)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
+
   /* Sends this rank's contact points to the ranks of their slices; sorts the received ones. */
-  for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
+  for (PetscInt i = 0; i < c->list.n; i++)
+    bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, out->comm));
   PetscCall(PetscMalloc1(c->list.n, &dest));
   for (PetscInt i = 0; i < c->list.n; i++)
-    dest[i] = (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
+    dest[i] =
+      (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
   PetscCall(PetscFree(c->point));
   PetscCall(SbRouteCreate(out->comm, c->list.n, NULL, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), NULL, c->list.point, &c->point));
   c->share.n = route.nrecv;
   PetscCall(SbRouteDestroy(&route));
-  if (c->share.n) qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
+  if (c->share.n)
+    qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
   c->share.start -= c->share.n;
   PetscCallMPI(MPI_Allreduce(&c->share.n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
-  for (int k = 0; k < NTABLE; k++) *bytes += 8 * (PetscInt64)c->share.N * table[k].ncomp + 8192;
+  for (int k = 0; k < NTABLE; k++)
+    *bytes += 8 * (PetscInt64)c->share.N * table[k].ncomp + 8192;
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -88,14 +96,17 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   hid_t group;
 
   PetscFunctionBeginUser;
-  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_points)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   PetscCall(PetscMalloc1(3 * c->share.n, &column));
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
     const int ncomp = table[k].ncomp;
-    const hid_t type = table[k].whole ? H5T_STD_I32LE : out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+    const hid_t type = table[k].whole ? H5T_STD_I32LE
+                       : out->precise ? H5T_IEEE_F64LE
+                                      : H5T_IEEE_F32LE;
 
     /* this rank's rows, as numbers of the file */
     for (PetscInt i = 0; i < c->share.n * ncomp; i++) {
@@ -113,9 +124,10 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
       else
         column[i] = ((const PetscReal *)((const char *)p + table[k].from))[i % ncomp];
     }
-    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)c->share.n * ncomp, column, NULL,
-                     H5P_DEFAULT);
-    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, column));
+    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)c->share.n * ncomp, column,
+                     NULL, H5P_DEFAULT);
+    PetscCall(
+      SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, column));
   }
   PetscCall(PetscFree(column));
   PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
@@ -134,11 +146,14 @@ PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const c
   char name[64];
 
   PetscFunctionBeginUser;
-  if (group < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (group < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbH5GetInt(group, "count", &n, &ok);
-  if (n) (void)SbH5Rows(group, "gap", &bytes);
+  if (n)
+    (void)SbH5Rows(group, "gap", &bytes);
   (void)H5Gclose(group);
-  if (!out->contact_index) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_index)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
     array[k] = (SbArray){.name = table[k].name,
                          .ncomp = table[k].ncomp,

@@ -1,14 +1,16 @@
 /*
   The fields that a run can write: one table, a name, a unit and a function each.
 
-  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation per frame.
+  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation per
+  frame.
 
   von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
-  reaction:          residual without constraints at prescribed unknowns, the force of the support on the body
-  contact force:     of obstacles and other bodies on the body
+  reaction:          residual without constraints at prescribed unknowns, the force of the support
+  on the body contact force:     of obstacles and other bodies on the body
   contact gap:       along the normal: a vertex minus gap times normal is the point of contact
   mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
-  pressure:          the law's -lambda theta, theta: its measure of the change of volume (SbMaterialOps); they
+  pressure:          the law's -lambda theta, theta: its measure of the change of volume
+  (SbMaterialOps); they
                      differ by 2/3 mu theta for small strains, little for nu near 0.5.
 */
 #include <stddef.h>
@@ -18,7 +20,8 @@
 static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, *(const Vec *)((const char *)step + f->from), values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, *(const Vec *)((const char *)step + f->from),
+                           values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -31,7 +34,8 @@ static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, 
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const PetscReal *x = SbPointsRest(run, out, i);
 
-    for (int k = 0; k < 3; k++) values[3 * i + k] += x[k];
+    for (int k = 0; k < 3; k++)
+      values[3 * i + k] += x[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -65,8 +69,10 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else one. */
-static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step, const PetscReal **array)
+/* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else
+   one. */
+static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step,
+                                 const PetscReal **array)
 {
   SbOutput o = (SbOutput)run->output;
   const PetscReal *u;
@@ -86,14 +92,18 @@ static void stress(const PetscReal s[6], PetscReal value[])
 {
   static const int position[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
 
-  for (int k = 0; k < 6; k++) value[k] = s[position[k]];
+  for (int k = 0; k < 6; k++)
+    value[k] = s[position[k]];
 }
 
 static void von_mises(const PetscReal s[6], PetscReal value[])
 {
-  const PetscReal a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
+  const PetscReal a = s[0] - s[1];
+  const PetscReal b = s[1] - s[2];
+  const PetscReal d = s[2] - s[0];
 
-  value[0] = PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+  value[0] =
+    PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
 }
 
 static void mean_pressure(const PetscReal s[6], PetscReal value[])
@@ -116,11 +126,13 @@ static PetscErrorCode of_state(const SbField *f, SbRun run, const SbStep *step, 
 
   PetscFunctionBeginUser;
   PetscCall(cell_state(f, run, step, &state));
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) in_cell(f, state, c, values + f->ncomp * c);
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
+    in_cell(f, state, c, values + f->ncomp * c);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode space_error(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode space_error(const SbField *f, SbRun run, const SbStep *step,
+                                  PetscReal *values)
 {
   PetscFunctionBeginUser;
   (void)f;
@@ -155,7 +167,8 @@ static const SbField table[] = {
   {"contact_force", "N", 3, .compute = contact, .help = "force of contact on the body"},
   {"contact_gap", "m", 3, .compute = contact,
    .help = "from the nearest point of what it may touch, along the normal there; 0: nothing near"},
-  {"stress", "Pa", 6, CELL, .compute = of_state, STATE(sigma), .of_stress = stress, .help = "Cauchy stress"},
+  {"stress", "Pa", 6, CELL, .compute = of_state, STATE(sigma), .of_stress = stress,
+   .help = "Cauchy stress"},
   {"von_mises", "Pa", 1, CELL, .compute = of_state, STATE(sigma), .of_stress = von_mises,
    .help = "von Mises stress"},
   {"pressure", "Pa", 1, CELL, .compute = of_state, STATE(pressure),
@@ -169,10 +182,11 @@ static const SbField table[] = {
    .help = "energy of the estimated error of the mesh per rest volume; needs -ledger"},
   {"body", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
    .help = "number of the body, always written"},
-  {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE, .help = "MPI rank that owns the cell"},
+  {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
+   .help = "MPI rank that owns the cell"},
   {"sets", "1", 1, CELL, .compute = NULL, .constant = PETSC_TRUE,
-   .help =
-     "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside"},
+   .help = "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of "
+           "cells, 1 inside"},
 };
 
 const SbField *SbFieldGetAll(PetscInt *n)
@@ -190,13 +204,14 @@ PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField *
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < n; i++) {
     names[i] = table[i].name;
-    if (strcmp(table[i].name, name)) continue;
+    if (strcmp(table[i].name, name))
+      continue;
     *field = &table[i];
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SbSuggestName(name, n, names, sizeof(all), all);
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no field '%s'; fields are none, %s", option, name,
-          all);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no field '%s'; fields are none, %s",
+          option, name, all);
 }
 
 PetscBool SbFieldIsProbed(const SbField *f)
@@ -215,7 +230,8 @@ PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, 
     PetscReal here[6] = {0.};
 
     in_cell(f, state, cells->item[i].number, here);
-    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += cells->item[i].weight * here[k];
+    for (PetscInt k = 0; k < f->ncomp; k++)
+      value[k] += cells->item[i].weight * here[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -228,16 +244,20 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
   PetscFunctionBeginUser;
   PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-output_fields space_error needs its estimate: give -ledger yes, too");
+
   /* the array of the cells' state that this field needs */
   if (f->compute == of_state) {
     PetscReal **state = (PetscReal **)((char *)out + f->from);
 
-    if (!*state) PetscCall(PetscMalloc1(f->of_stress ? 6 * n : n, state));
+    if (!*state)
+      PetscCall(PetscMalloc1(f->of_stress ? 6 * n : n, state));
   }
+
   /* weights of nodes at vertices; forces also need the residual of each step */
-  if (forces) run->want_residual = PETSC_TRUE;
+  if (forces)
+    run->want_residual = PETSC_TRUE;
   if (!f->cell)
-    PetscCall(
-      SbPointsPrepare(run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));
+    PetscCall(SbPointsPrepare(
+      run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,12 +1,14 @@
 /*
-  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's
-  results are moved aside when the run starts, files with other names never. Checkpoints are found by number.
+  The folder of the results: created, write-tested and locked before anything is computed; an
+  earlier run's results are moved aside when the run starts, files with other names never.
+  Checkpoints are found by number.
 
-  Plain files are written whole beside their target and renamed into it, so that a reader, or a kill, never
-  meets half a file; failures of one rank are reported by all.
+  Plain files are written whole beside their target and renamed into it, so that a reader, or a
+  kill, never meets half a file; failures of one rank are reported by all.
 
-  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its
-  process, however that ends, and works between hosts where the file system supports it; else there is none.
+  The lock is one of the file system (fcntl) on a file that names host and process: it is released
+  with its process, however that ends, and works between hosts where the file system supports it;
+  else there is none.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -43,7 +45,8 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
     bad = fwrite(text, 1, size, file) != size;
     bad = fclose(file) || bad || rename(tmp, path);
   }
-  if (!bad) return;
+  if (!bad)
+    return;
   SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
            strerror(errno ? errno : EIO));
   (void)unlink(tmp);
@@ -59,29 +62,34 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
   // A step that ends at the multiple but for rounding has reached it. A load factor may come back.
   const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
 
-  return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
+  return (PetscBool)(PetscFloorReal((t + ahead) / every) !=
+                     PetscFloorReal((t - dt + ahead) / every));
 }
 
 void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
-  int fd, error = 0;
+  int fd;
+  int error = 0;
 
   SbOutputPath(out, ".supple_tries_to_write", probe);
   for (size_t i = 1; i <= strlen(out->dir) && !error; i++) {
-    if (out->dir[i] != '/' && out->dir[i]) continue;
+    if (out->dir[i] != '/' && out->dir[i])
+      continue;
     SbFormat(i + 1, part, "%s", out->dir);
-    if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK)) error = errno;
+    if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK))
+      error = errno;
   }
   if (!error) {
     fd = open(probe, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     error = fd < 0 ? errno : 0;
-    if (fd >= 0) (void)close(fd);
+    if (fd >= 0)
+      (void)close(fd);
     (void)unlink(probe);
   }
   if (error)
-    SbFormat(SB_MESSAGE_MAX, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
-             strerror(error));
+    SbFormat(SB_MESSAGE_MAX, message, "-output_dir %s cannot be written: %s; give another folder",
+             out->dir, strerror(error));
 }
 
 #define LOCK ".supple_running"
@@ -91,38 +99,48 @@ static char locked[PETSC_MAX_PATH_LEN];
 
 static void remove_lock(void)
 {
-  if (locked[0]) (void)unlink(locked);
+  if (locked[0])
+    (void)unlink(locked);
   locked[0] = 0;
 }
 
-/* Opens and locks the lock file, or says why not; rank 0. Again if its owner removed the file meanwhile. */
+/* Opens and locks the lock file, or says why not; rank 0. Again if its owner removed the file
+   meanwhile. */
 static void lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-  char path[PETSC_MAX_PATH_LEN], text[512] = "", host[256] = "";
+  char path[PETSC_MAX_PATH_LEN];
+  char text[512] = "";
+  char host[256] = "";
   struct stat mine, there;
 
   SbOutputPath(out, LOCK, path);
   for (PetscBool again = PETSC_TRUE; again;) {
     out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (out->lock < 0) return;
+    if (out->lock < 0)
+      return;
     if (fcntl(out->lock, F_SETLK, &all)) {
-      const ssize_t n = errno == EACCES || errno == EAGAIN ? read(out->lock, text, sizeof(text) - 1) : -1;
+      const ssize_t n =
+        errno == EACCES || errno == EAGAIN ? read(out->lock, text, sizeof(text) - 1) : -1;
 
       (void)close(out->lock);
       out->lock = -1;
       if (n >= 0)
-        SbFormat(SB_MESSAGE_MAX, message,
-                 "-output_dir %s is in use by another run%s%s: wait for its end, or give another folder",
-                 out->dir, n ? ", " : "", text);
+        SbFormat(
+          SB_MESSAGE_MAX, message,
+          "-output_dir %s is in use by another run%s%s: wait for its end, or give another folder",
+          out->dir, n ? ", " : "", text);
       return;
     }
-    again = (PetscBool)(fstat(out->lock, &mine) || stat(path, &there) || mine.st_ino != there.st_ino);
-    if (again) (void)close(out->lock);
+    again =
+      (PetscBool)(fstat(out->lock, &mine) || stat(path, &there) || mine.st_ino != there.st_ino);
+    if (again)
+      (void)close(out->lock);
   }
   (void)gethostname(host, sizeof(host) - 1);
   SbFormat(sizeof(text), text, "process %ld on %s since %s", (long)getpid(), host, out->started);
-  if (!ftruncate(out->lock, 0)) (void)!write(out->lock, text, strlen(text));
+  if (!ftruncate(out->lock, 0))
+    (void)!write(out->lock, text, strlen(text));
 
   SbErrorSetCleanup(remove_lock); /* an error leaves the output as it is */
   SbFormat(sizeof(locked), locked, "%s", path);
@@ -134,14 +152,16 @@ PetscErrorCode SbOutputLock(SbRun run)
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
-  if (!out->rank) lock_folder(out, message);
+  if (!out->rank)
+    lock_folder(out, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbFolderUnlock(SbOutput out)
 {
-  if (out->lock < 0) return;
+  if (out->lock < 0)
+    return;
   remove_lock();
   (void)close(out->lock);
   out->lock = -1;
@@ -161,13 +181,15 @@ static int list_checkpoints(const char *dir, struct dirent ***names)
 {
   const int n = scandir(dir, names, is_checkpoint, versionsort);
 
-  if (n < 0) *names = NULL;
+  if (n < 0)
+    *names = NULL;
   return PetscMax(n, 0);
 }
 
 static void free_names(int n, struct dirent **names)
 {
-  for (int i = 0; i < n; i++) free(names[i]);
+  for (int i = 0; i < n; i++)
+    free(names[i]);
   free(names);
 }
 
@@ -178,7 +200,8 @@ void SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
   char path[PETSC_MAX_PATH_LEN];
 
   for (int i = 0; i < n; i++) {
-    if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
+    if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step)
+      continue;
     SbOutputPath(out, names[i]->d_name, path);
     (void)unlink(path);
   }
@@ -189,13 +212,16 @@ PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(path, out->restart, PETSC_MAX_PATH_LEN));
-  if (strcmp(path, "latest")) PetscFunctionReturn(PETSC_SUCCESS);
+  if (strcmp(path, "latest"))
+    PetscFunctionReturn(PETSC_SUCCESS);
   path[0] = 0;
   if (!out->rank) {
     struct dirent **names;
-    const int n = list_checkpoints(out->dir, &names), k = n - 1 - out->ndamaged;
+    const int n = list_checkpoints(out->dir, &names);
+    const int k = n - 1 - out->ndamaged;
 
-    if (k >= 0) SbOutputPath(out, names[k]->d_name, path);
+    if (k >= 0)
+      SbOutputPath(out, names[k]->d_name, path);
     free_names(n, names);
   }
   PetscCallMPI(MPI_Bcast(path, PETSC_MAX_PATH_LEN, MPI_CHAR, 0, out->comm));
@@ -214,33 +240,39 @@ static PetscErrorCode keep_earlier(SbOutput out)
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputFiles(out, &n, &file));
-  if (!n) PetscCall(PetscFree(file));
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!n)
+    PetscCall(PetscFree(file));
+  if (!n)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbOutputPath(out, "run.json", path);
-  if (stat(path, &info)) info.st_mtime = time(NULL);
+  if (stat(path, &info))
+    info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
   for (int k = 1; k < 1000 && made; k++) {
     SbFormat(sizeof(name), name, "before_%s", date);
-    if (k > 1) SbAppend(sizeof(name), name, "_%d", k);
+    if (k > 1)
+      SbAppend(sizeof(name), name, "_%d", k);
     SbOutputPath(out, name, path);
     made = mkdir(path, 0777);
-    if (made && errno != EEXIST) break;
+    if (made && errno != EEXIST)
+      break;
   }
-  PetscCheck(
-    !made, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
-    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces them",
-    path, strerror(errno));
+  PetscCheck(!made, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
+             "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite "
+             "yes replaces them",
+             path, strerror(errno));
   for (PetscInt i = 0; i < n; i++) {
     char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN + SB_FILE_MAX];
 
     SbOutputPath(out, file[i].name, from);
     SbFormat(sizeof(to), to, "%s/%s", path, file[i].name);
-    PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s", from, to,
-               strerror(errno));
+    PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s",
+               from, to, strerror(errno));
   }
   PetscCall(PetscFree(file));
   if (!out->quiet)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are kept in %s\n", out->dir, name));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are kept in %s\n",
+                          out->dir, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,7 +281,8 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   char path[PETSC_MAX_PATH_LEN + 8];
 
   PetscFunctionBeginUser;
-  if (!out->restart[0] && !out->overwrite) PetscCall(keep_earlier(out));
+  if (!out->restart[0] && !out->overwrite)
+    PetscCall(keep_earlier(out));
 
   // Later checkpoints would be taken for the latest ones.
   SbCheckpointPrune(out, out->restart[0] ? step0 : -1, PETSC_MAX_INT);
@@ -257,7 +290,9 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   (void)unlink(path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
     SbOutputPath(out, ours[i], path);
-    if (!out->restart[0]) (void)unlink(path);
+    if (!out->restart[0])
+      (void)unlink(path);
+
     // temporary files of an aborted run
     PetscCall(PetscStrlcat(path, ".tmp", sizeof(path)));
     (void)unlink(path);
@@ -267,7 +302,9 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
 
 PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files)
 {
-  enum { NOURS = PETSC_STATIC_ARRAY_LENGTH(ours) };
+  enum {
+    NOURS = PETSC_STATIC_ARRAY_LENGTH(ours)
+  };
   struct dirent **checkpoint;
   const int ncheckpoint = list_checkpoints(out->dir, &checkpoint);
 
@@ -279,9 +316,11 @@ PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files
     char path[PETSC_MAX_PATH_LEN];
     struct stat info;
 
-    SbFormat(sizeof(file->name), file->name, "%s", i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name);
+    SbFormat(sizeof(file->name), file->name, "%s",
+             i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name);
     SbOutputPath(out, file->name, path);
-    if (stat(path, &info)) continue;
+    if (stat(path, &info))
+      continue;
     file->bytes = (PetscInt64)info.st_size;
     (*n)++;
   }

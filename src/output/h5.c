@@ -1,18 +1,23 @@
 /*
   HDF5 through MPI-IO, laid out so that a kill at any moment leaves every completed frame readable.
 
-  HDF5 changes its metadata in place, and half-written metadata is unreadable. Here all metadata that leads to
-  completed frames is changed by single writes:
-  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet.
+  HDF5 changes its metadata in place, and half-written metadata is unreadable. Here all metadata
+  that leads to completed frames is changed by single writes:
+  - A frame is written as a group without a name: new objects at new positions, to which nothing
+  points yet.
     It is flushed, all ranks meet, and only then does it get its name in the group of its hundred.
-  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all
-    of them from the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write in a page.
-  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that
-    ends earlier counts as truncated: SbH5Reserve() makes it longer than a frame needs before the frame.
+  - Such a group keeps its links in its own object header, in the old format (no checksum), with
+  room for all
+    of them from the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write
+    in a page.
+  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a
+  file that
+    ends earlier counts as truncated: SbH5Reserve() makes it longer than a frame needs before the
+    frame.
 
-  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a
-  (object header version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would
-  write checksums and flags that mark the file as being in use.
+  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0),
+  IV.A.1.a (object header version 1), IV.A.2.g (link message). The old format is asked for
+  explicitly; newer ones would write checksums and flags that mark the file as being in use.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -20,8 +25,9 @@
 #include <unistd.h>
 #include "output_impl.h"
 
-/* After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when
-   MPI_Finalize() makes it end. The error has been reported; the remainder of the program's end is skipped. */
+/* After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and
+   crashes when MPI_Finalize() makes it end. The error has been reported; the remainder of the
+   program's end is skipped. */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {
   (void)comm;
@@ -35,14 +41,16 @@ static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 /* The innermost message of the error that HDF5 has on its stack. */
 static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
 {
-  if (!n && error->desc) (void)snprintf((char *)ctx, 160, "%s", error->desc);
+  if (!n && error->desc)
+    (void)snprintf((char *)ctx, 160, "%s", error->desc);
   return 0;
 }
 
 /* Keeps the first error message of this rank. */
 static void note(SbH5 *h, PetscBool bad)
 {
-  if (!bad || h->reason[0]) return;
+  if (!bad || h->reason[0])
+    return;
   SbFormat(sizeof(h->reason), h->reason, "the reason is unknown");
   (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, h->reason);
 }
@@ -55,13 +63,15 @@ static PetscErrorCode agree(SbH5 *h)
 
   PetscFunctionBeginUser;
   if (h->reason[0])
-    SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: HDF5 says '%s'",
-             h->bytes, h->path, h->reason);
+    SbFormat(sizeof(message), message,
+             "cannot write %" PetscInt64_FMT " bytes to %s: HDF5 says '%s'", h->bytes, h->path,
+             h->reason);
   ierr = SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message);
   if (ierr) {
     int key;
 
-    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, new ones first
+    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, new
+    // ones first
     if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
       h->failed = PETSC_TRUE;
       (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
@@ -88,12 +98,14 @@ static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags,
   PetscFunctionBeginUser;
   *h = (SbH5){.comm = comm};
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
+
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   (void)H5Pset_fapl_mpio(list, comm, MPI_INFO_NULL);
   (void)H5Pset_alignment(list, 3000, 4096);
   (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
-  h->file = flags == H5F_ACC_TRUNC ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
+  h->file =
+    flags == H5F_ACC_TRUNC ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
   (void)H5Pclose(list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -112,8 +124,10 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
   PetscCall(open_file(comm, path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, h));
   *ok = (PetscBool)(h->file >= 0);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, comm));
-  if (!*ok && h->file >= 0) (void)H5Fclose(h->file);
-  if (!*ok) h->file = -1;
+  if (!*ok && h->file >= 0)
+    (void)H5Fclose(h->file);
+  if (!*ok)
+    h->file = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,7 +136,8 @@ PetscErrorCode SbH5Close(SbH5 *h)
   hid_t file = h->file;
 
   PetscFunctionBeginUser;
-  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (file < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   h->file = -1;
   H5_CALL(h, H5Fclose(file));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -151,14 +166,19 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
 
     if (fd >= 0) {
       error = fstat(fd, &info) ? errno : posix_fallocate(fd, info.st_size, (off_t)bytes);
-      // What was reserved before the disk was full goes back, so that other files can be ended properly.
-      if (error && ftruncate(fd, info.st_size)) error = errno;
+
+      // What was reserved before the disk was full goes back, so that other files can be ended
+      // properly.
+      if (error && ftruncate(fd, info.st_size))
+        error = errno;
       (void)close(fd);
     }
+
     // A file system that cannot reserve is not full.
     if (error && (fd < 0 || (error != EINVAL && error != EOPNOTSUPP && error != ENOSYS))) {
-      SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: %s; " SB_NO_ROOM,
-               bytes, h->path, strerror(error));
+      SbFormat(sizeof(message), message,
+               "cannot write %" PetscInt64_FMT " bytes to %s: %s; " SB_NO_ROOM, bytes, h->path,
+               strerror(error));
     }
   }
   PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
@@ -175,6 +195,7 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
   const hid_t list = H5Pcreate(H5P_GROUP_CREATE);
 
   PetscFunctionBeginUser;
+
   // Tracking the order of creation is what selects links in the object header under the old format.
   (void)H5Pset_link_creation_order(list, H5P_CRT_ORDER_TRACKED);
   (void)H5Pset_link_phase_change(list, 60000, 59999);
@@ -255,11 +276,13 @@ PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A dataset, of which this rank has the part `mine` in memory and `part` in the file; unit: NULL for none. */
-static PetscErrorCode write_dataset(SbH5 *h, hid_t where, const char *name, const char *unit, hid_t type,
-                                    hid_t mine, hid_t part, const void *data)
+/* A dataset, of which this rank has the part `mine` in memory and `part` in the file; unit: NULL
+   for none. */
+static PetscErrorCode write_dataset(SbH5 *h, hid_t where, const char *name, const char *unit,
+                                    hid_t type, hid_t mine, hid_t part, const void *data)
 {
-  const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
+  const hid_t create = H5Pcreate(H5P_DATASET_CREATE);
+  const hid_t transfer = collective_list();
   hid_t dataset;
 
   PetscFunctionBeginUser;
@@ -268,7 +291,8 @@ static PetscErrorCode write_dataset(SbH5 *h, hid_t where, const char *name, cons
   (void)H5Pset_obj_track_times(create, 0); // the same run writes the same bytes
   dataset = H5Dcreate2(where, name, type, part, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
-  if (unit) PetscCall(SbH5PutText(h, dataset, "unit", unit));
+  if (unit)
+    PetscCall(SbH5PutText(h, dataset, "unit", unit));
   note(h, (PetscBool)(H5Dwrite(dataset, SbH5TypeInMemory(type), mine, part, transfer, data) < 0));
   (void)H5Dclose(dataset);
   (void)H5Sclose(mine);
@@ -278,8 +302,8 @@ static PetscErrorCode write_dataset(SbH5 *h, hid_t where, const char *name, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t type, const void *slice)
+PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit,
+                              const SbOrder *order, PetscInt ncomp, hid_t type, const void *slice)
 {
   hid_t filespace, memspace;
 
@@ -295,7 +319,8 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
 
   PetscFunctionBeginUser;
   (void)H5Tset_size(type, strlen(text) + 1);
-  PetscCall(write_dataset(h, where, name, NULL, type, H5Screate(H5S_SCALAR), H5Screate(H5S_SCALAR), text));
+  PetscCall(
+    write_dataset(h, where, name, NULL, type, H5Screate(H5S_SCALAR), H5Screate(H5S_SCALAR), text));
   (void)H5Tclose(type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -311,7 +336,8 @@ static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
   if (dataset >= 0) {
     const hid_t space = H5Dget_space(dataset);
 
-    if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
+    if (H5Sget_simple_extent_ndims(space) <= 2)
+      (void)H5Sget_simple_extent_dims(space, n, NULL);
     (void)H5Sclose(space);
   }
   return dataset;
@@ -320,23 +346,30 @@ static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
 PetscInt64 SbH5Rows(hid_t where, const char *name, PetscInt *bytes)
 {
   hsize_t n[2];
-  const hid_t dataset = open_dataset(where, name, n), type = dataset < 0 ? -1 : H5Dget_type(dataset);
+  const hid_t dataset = open_dataset(where, name, n);
+  const hid_t type = dataset < 0 ? -1 : H5Dget_type(dataset);
 
-  if (bytes) *bytes = dataset < 0 ? 0 : (PetscInt)H5Tget_size(type);
-  if (dataset >= 0) (void)H5Tclose(type);
-  if (dataset >= 0) (void)H5Dclose(dataset);
+  if (bytes)
+    *bytes = dataset < 0 ? 0 : (PetscInt)H5Tget_size(type);
+  if (dataset >= 0)
+    (void)H5Tclose(type);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
   return (PetscInt64)n[0];
 }
 
-PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, PetscInt ncomp, void *values)
+PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, PetscInt ncomp,
+                   void *values)
 {
   hsize_t n[2];
   const hid_t dataset = open_dataset(where, name, n);
   PetscBool ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)rows && n[1] == (hsize_t)ncomp);
 
   if (ok)
-    ok = (PetscBool)(H5Dread(dataset, SbH5TypeInMemory(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
-  if (dataset >= 0) (void)H5Dclose(dataset);
+    ok = (PetscBool)(H5Dread(dataset, SbH5TypeInMemory(type), H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                             values) >= 0);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
   return ok;
 }
 
@@ -354,13 +387,15 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
     hid_t filespace, memspace;
 
     select_slice(order, ncomp, &filespace, &memspace);
-    *ok = (PetscBool)(H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0);
+    *ok =
+      (PetscBool)(H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0);
     (void)H5Sclose(filespace);
     (void)H5Sclose(memspace);
     (void)H5Pclose(transfer);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
   }
-  if (dataset >= 0) (void)H5Dclose(dataset);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -396,12 +431,14 @@ static PetscBool get(hid_t where, const char *name, H5T_class_t klass, hid_t mem
 
 void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok)
 {
-  if (!get(where, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, value)) *ok = PETSC_FALSE;
+  if (!get(where, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, value))
+    *ok = PETSC_FALSE;
 }
 
 void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
 {
-  if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value)) *ok = PETSC_FALSE;
+  if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value))
+    *ok = PETSC_FALSE;
 }
 
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok)
@@ -422,7 +459,9 @@ PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *o
     (void)H5Dclose(dataset);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &good, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
-  if (!good) PetscCall(PetscFree(*text));
-  if (!good) *ok = PETSC_FALSE;
+  if (!good)
+    PetscCall(PetscFree(*text));
+  if (!good)
+    *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

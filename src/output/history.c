@@ -1,11 +1,12 @@
 /*
   history.csv: one row of scalars per step, each written to the file at once and by one call.
 
-  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'.
-  Numbers have 17 digits: what is read back is what was computed. `total` is kinetic + strain - load_work -
-  prescribed_work, constant as long as nothing is dissipated.
+  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with
+  comment='#'. Numbers have 17 digits: what is read back is what was computed. `total` is kinetic +
+  strain - load_work - prescribed_work, constant as long as nothing is dissipated.
 
-  One reduction per row sums values of effects, probes and bodies, and a flag that the row before failed.
+  One reduction per row sums values of effects, probes and bodies, and a flag that the row before
+  failed.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -22,17 +23,22 @@ struct _p_SbHistory {
   FILE *text; /* rank 0: in memory, a row or the header, row[size] */
   char *row;
   size_t size;
-  PetscInt last_step;    /* of the last row in the file, or -1 */
-  PetscInt nextra;       /* columns of effects, probes and bodies */
-  PetscReal (*mass)[4];  /* [nbody] centre at rest, m, and mass, kg, for columns of bodies */
-  PetscReal *mine, *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
+  PetscInt last_step;   /* of the last row in the file, or -1 */
+  PetscInt nextra;      /* columns of effects, probes and bodies */
+  PetscReal (*mass)[4]; /* [nbody] centre at rest, m, and mass, kg, for columns of bodies */
+  PetscReal *mine,
+    *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 
 /* The columns of every run, with their offset in SbStep; `total` is a sum of others. */
 static const struct {
   const char *name, *unit;
-  enum { REAL, COUNT, TOTAL } kind;
+  enum {
+    REAL,
+    COUNT,
+    TOTAL
+  } kind;
   size_t from;
 } columns[] = {
 #define AT(member) offsetof(SbStep, member)
@@ -68,9 +74,9 @@ static const struct {
 /* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
 static const struct {
   const char *name, *unit;
-} body_columns[SB_BODY_SUMS] = {{"kinetic", "J"},         {"strain", "J"},          {"momentum_x", "kg m/s"},
-                                {"momentum_y", "kg m/s"}, {"momentum_z", "kg m/s"}, {"centre_x", "m"},
-                                {"centre_y", "m"},        {"centre_z", "m"}};
+} body_columns[SB_BODY_SUMS] = {
+  {"kinetic", "J"},         {"strain", "J"},   {"momentum_x", "kg m/s"}, {"momentum_y", "kg m/s"},
+  {"momentum_z", "kg m/s"}, {"centre_x", "m"}, {"centre_y", "m"},        {"centre_z", "m"}};
 
 /* The unit of a column of an effect, by its name. */
 static const char *unit_of(const char *column)
@@ -81,12 +87,14 @@ static const char *unit_of(const char *column)
                {"gap", "m"},      {"work", "J"},  {"energy", "J"},   {"loss", "J"}};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
-    if (strstr(column, units[i].word)) return units[i].unit;
+    if (strstr(column, units[i].word))
+      return units[i].unit;
   return "1";
 }
 
 /* One column in both lines at the top. */
-static void put_column(FILE *line[2], const char *unit, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
+static void put_column(FILE *line[2], const char *unit, const char *format, ...)
+  PETSC_ATTRIBUTE_FORMAT(3, 4);
 static void put_column(FILE *line[2], const char *unit, const char *format, ...)
 {
   va_list args;
@@ -124,13 +132,13 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
       const char *name = !strcmp(f->name, "displacement") ? "u" : f->name;
 
       for (PetscInt c = 0; c < f->ncomp; c++)
-        put_column(line, f->unit, ",%s_%s%s%s", probe->name, name, f->ncomp > 1 && name[1] ? "_" : "",
-                   axes[f->ncomp][c]);
+        put_column(line, f->unit, ",%s_%s%s%s", probe->name, name,
+                   f->ncomp > 1 && name[1] ? "_" : "", axes[f->ncomp][c]);
     }
   }
   for (PetscInt i = 0; i < nbody * SB_BODY_SUMS; i++)
-    put_column(line, body_columns[i % SB_BODY_SUMS].unit, ",%s_%s", run->model->body[i / SB_BODY_SUMS].name,
-               body_columns[i % SB_BODY_SUMS].name);
+    put_column(line, body_columns[i % SB_BODY_SUMS].unit, ",%s_%s",
+               run->model->body[i / SB_BODY_SUMS].name, body_columns[i % SB_BODY_SUMS].name);
   for (PetscInt i = 0; i < SbLiveCount(); i++) {
     const char *column = SbLiveColumn(i, &unit);
 
@@ -151,9 +159,10 @@ static void write_row(SbHistory h, char message[SB_MESSAGE_MAX])
   const off_t before = lseek(h->fd, 0, SEEK_END);
   const ssize_t n = write(h->fd, h->row, h->size);
 
-  if (n == (ssize_t)h->size) return;
-  SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size, h->path,
-           strerror(n < 0 ? errno : ENOSPC));
+  if (n == (ssize_t)h->size)
+    return;
+  SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size,
+           h->path, strerror(n < 0 ? errno : ENOSPC));
   if (n > 0 && ftruncate(h->fd, before))
     SbFormat(SB_MESSAGE_MAX, message, "cannot write to %s, its last row is incomplete", h->path);
 }
@@ -165,7 +174,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   const SbModel model = run->model;
   const SbSpace s = model->space;
   const PetscInt nbody = out->history_bodies ? model->nbody : 0;
-  PetscReal *values = h->mine, *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS;
+  PetscReal *values = h->mine;
+  PetscReal *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS;
   SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
   const PetscReal *residual;
   PetscMPIInt n;
@@ -181,8 +191,10 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
   if (model->nhistory || out->nprobe) {
     PetscCall(SbSpaceGetLocalRead(s, step->U, &stage.u));
-    if (step->V) PetscCall(SbSpaceGetLocalRead(s, step->V, &stage.v));
-    if (step->A) PetscCall(SbSpaceGetLocalRead(s, step->A, &stage.a));
+    if (step->V)
+      PetscCall(SbSpaceGetLocalRead(s, step->V, &stage.v));
+    if (step->A)
+      PetscCall(SbSpaceGetLocalRead(s, step->A, &stage.a));
     if (model->nhistory) {
       PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                  "The residual was asked for but not given to the monitors");
@@ -197,18 +209,23 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
     }
     PetscCall(SbSpaceRestoreLocalRead(s, step->U, &stage.u));
-    if (step->V) PetscCall(SbSpaceRestoreLocalRead(s, step->V, &stage.v));
-    if (step->A) PetscCall(SbSpaceRestoreLocalRead(s, step->A, &stage.a));
+    if (step->V)
+      PetscCall(SbSpaceRestoreLocalRead(s, step->V, &stage.v));
+    if (step->A)
+      PetscCall(SbSpaceRestoreLocalRead(s, step->A, &stage.a));
   }
-  if (nbody) PetscCall(SbModelBodySums(model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
+  if (nbody)
+    PetscCall(SbModelBodySums(model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
 
   /* sums of all ranks; the run ends when the row before could not be written */
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
   PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
   PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
-  if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
+  if (h->sum[h->nextra] > 0.)
+    PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
   for (PetscInt b = 0; b < nbody; b++) // centres are means
-    for (int k = 1; k <= 3; k++) h->sum[h->nextra - (nbody - b - 1) * SB_BODY_SUMS - k] /= h->mass[b][3];
+    for (int k = 1; k <= 3; k++)
+      h->sum[h->nextra - (nbody - b - 1) * SB_BODY_SUMS - k] /= h->mass[b][3];
 
   /* the row, as text, for one call */
   h->last_step = step->step;
@@ -221,20 +238,25 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       const void *value =
         columns[k].kind == TOTAL ? (const char *)&total : (const char *)step + columns[k].from;
 
-      if (k) (void)fputc(',', h->text);
+      if (k)
+        (void)fputc(',', h->text);
       if (columns[k].kind == COUNT)
         (void)fprintf(h->text, "%" PetscInt_FMT, *(const PetscInt *)value);
       else
         (void)fprintf(h->text, "%.17g", *(const PetscReal *)value);
     }
-    for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", h->sum[k]);
-    for (PetscInt k = 0; k < SbLiveCount(); k++) (void)fprintf(h->text, ",%.17g", SbLiveGet(k, step->t));
-    for (PetscInt k = 0; k < run->ncolumn; k++) (void)fprintf(h->text, ",%.17g", *run->column[k].value);
+    for (PetscInt k = 0; k < h->nextra; k++)
+      (void)fprintf(h->text, ",%.17g", h->sum[k]);
+    for (PetscInt k = 0; k < SbLiveCount(); k++)
+      (void)fprintf(h->text, ",%.17g", SbLiveGet(k, step->t));
+    for (PetscInt k = 0; k < run->ncolumn; k++)
+      (void)fprintf(h->text, ",%.17g", *run->column[k].value);
     (void)fputc('\n', h->text);
     (void)fflush(h->text);
     write_row(h, h->message);
   }
-  if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
+  if (step->last)
+    PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
   PetscCall(PetscLogEventEnd(out->event.history, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -252,34 +274,40 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   PetscCall(put_header(run, out, h));
   if (out->restart[0]) {
     FILE *file = fopen(h->path, "r");
-    char *text = NULL, *line, *end;
+    char *text = NULL;
+    char *line, *end;
     size_t room = 0;
 
-    // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
+    // rows up to step0 of a file with the same columns are kept; one without its end was cut off by
+    // a kill
     if (file && getdelim(&text, &room, 0, file) > 0 && !strncmp(text, h->row, h->size)) {
       for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
         const long step = strtol(line, NULL, 10);
 
-        if (step > run->step0) break;
+        if (step > run->step0)
+          break;
         h->last_step = (PetscInt)step;
       }
       SbFileReplace(h->path, text, (size_t)(line - text), message);
       kept = PETSC_TRUE;
     }
     free(text);
-    if (file) (void)fclose(file);
+    if (file)
+      (void)fclose(file);
 
     /* a history with other columns stays, under another name */
     if (!kept && !access(h->path, F_OK)) {
       char other[PETSC_MAX_PATH_LEN + 32];
 
-      (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv", (int)(strlen(h->path) - 4),
-                     h->path, run->step0);
+      (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv",
+                     (int)(strlen(h->path) - 4), h->path, run->step0);
       if (!rename(h->path, other))
-        PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
+        PetscCall(
+          PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
     }
   }
-  if (message[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (message[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
   h->fd = open(h->path, O_WRONLY | O_CREAT | (kept ? O_APPEND : O_TRUNC), 0666);
   if (h->fd < 0)
     SbFormat(SB_MESSAGE_MAX, message, "cannot open %s for writing: %s", h->path, strerror(errno));
@@ -295,28 +323,36 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
-  if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->history)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (!h) {
     PetscCall(PetscNew(&h));
     out->hist = h;
     h->fd = -1;
     h->last_step = -1;
-    for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
+    for (PetscInt e = 0; e < model->nhistory; e++)
+      h->nextra += model->history[e]->ncolumn;
     for (PetscInt p = 0; p < out->nprobe; p++)
-      for (PetscInt i = 0; i < out->probe[p].nfield; i++) h->nextra += out->probe[p].field[i]->ncomp;
-    if (out->history_bodies) h->nextra += SB_BODY_SUMS * model->nbody;
-    PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
+      for (PetscInt i = 0; i < out->probe[p].nfield; i++)
+        h->nextra += out->probe[p].field[i]->ncomp;
+    if (out->history_bodies)
+      h->nextra += SB_BODY_SUMS * model->nbody;
+    PetscCall(
+      PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
     SbOutputPath(out, "history.csv", h->path);
-    if (!out->rank) PetscCall(open_file(run, out, message));
+    if (!out->rank)
+      PetscCall(open_file(run, out, message));
     PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
     PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
   }
 
   /* from now on rows are those of this run */
   PetscCall(SbProbesFind(run, out));
-  if (out->history_bodies) PetscCall(SbModelCentres(model, NULL, h->mass));
+  if (out->history_bodies)
+    PetscCall(SbModelCentres(model, NULL, h->mass));
   run->want_energies = PETSC_TRUE;
-  if (model->nhistory) run->want_residual = PETSC_TRUE;
+  if (model->nhistory)
+    run->want_residual = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -326,9 +362,12 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   SbHistory h = out->hist;
 
   PetscFunctionBeginUser;
-  if (!h) PetscFunctionReturn(PETSC_SUCCESS);
-  if (h->fd >= 0) (void)close(h->fd);
-  if (h->text) (void)fclose(h->text);
+  if (!h)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->fd >= 0)
+    (void)close(h->fd);
+  if (h->text)
+    (void)fclose(h->text);
   free(h->row);
   PetscCall(PetscFree3(h->mine, h->sum, h->mass));
   PetscCall(PetscFree(out->hist));

@@ -1,15 +1,18 @@
 /*
-  What depends on the mesh, rebuilt after a re-meshing: original orders, numbers of nodes, a hash of the mesh.
+  What depends on the mesh, rebuilt after a re-meshing: original orders, numbers of nodes, a hash of
+  the mesh.
 
-  Original order: vertices, cells and nodes by their number in the scenario, whatever the partition. Rank r of
-  p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star forest connects each
-  owned entity (a leaf) with its position in a slice (a root); for any number of components.
+  Original order: vertices, cells and nodes by their number in the scenario, whatever the partition.
+  Rank r of p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star
+  forest connects each owned entity (a leaf) with its position in a slice (a root); for any number
+  of components.
 
-  Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number that is taken
-  marks its position among all possible ones; the count of marks from the lowest rank on is its new number.
+  Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number
+  that is taken marks its position among all possible ones; the count of marks from the lowest rank
+  on is its new number.
 
-  The hash is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which
-  does not depend on the order of its entities.
+  The hash is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014),
+  which does not depend on the order of its entities.
 */
 #include "output_impl.h"
 
@@ -34,22 +37,27 @@ PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
-                                   SbOrder *order)
+PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned,
+                                   const PetscInt key[], SbOrder *order)
 {
   SbOrder all;
-  PetscInt *mark, *number, before = 0, N;
+  PetscInt *mark, *number;
+  PetscInt before = 0;
+  PetscInt N;
 
   PetscFunctionBeginUser;
   PetscCall(SbOrderCreate(comm, bound, nowned, key, &all));
   PetscCall(PetscCalloc1(all.n, &mark));
   PetscCall(PetscMalloc1(nowned, &number));
-  for (PetscInt i = 0; i < nowned; i++) number[i] = 1;
+  for (PetscInt i = 0; i < nowned; i++)
+    number[i] = 1;
   PetscCall(SbForestReduce(all.sf, 1, MPIU_INT, number, mark));
-  for (PetscInt i = 0; i < all.n; i++) before += mark[i];
+  for (PetscInt i = 0; i < all.n; i++)
+    before += mark[i];
   PetscCallMPI(MPI_Allreduce(&before, &N, 1, MPIU_INT, MPI_SUM, comm));
   PetscCallMPI(MPI_Scan(MPI_IN_PLACE, &before, 1, MPIU_INT, MPI_SUM, comm));
-  for (PetscInt i = all.n - 1; i >= 0; i--) before = mark[i] ? mark[i] = before - 1 : before;
+  for (PetscInt i = all.n - 1; i >= 0; i--)
+    before = mark[i] ? mark[i] = before - 1 : before;
   PetscCall(SbForestBroadcast(all.sf, 1, MPIU_INT, mark, number));
   PetscCall(SbOrderCreate(comm, N, nowned, number, order));
   PetscCall(PetscFree(mark));
@@ -92,29 +100,37 @@ static PetscErrorCode order_points(SbRun run, SbOutput out)
   const PetscInt first = mesh->Nvert + 8 * mesh->Ncell; /* of the numbers of nodes at edges */
   const PetscInt size =
     out->discontinuous ? SB_CELL_NODES * mesh->ncell_owned : mesh->nvert_owned + s->nnode_owned;
-  PetscInt *key, *node, *slice, nedge = 0, n = 0, before, all;
+  PetscInt *key, *node, *slice;
+  PetscInt nedge = 0;
+  PetscInt n = 0;
+  PetscInt before, all;
   PetscReal *number;
   PetscBool *cut;
   SbOrder edges = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscMalloc3(PetscMax(size, s->nnode_owned), &key, s->nnode_owned, &node, mesh->ncell_owned, &cut));
+  PetscCall(PetscMalloc3(PetscMax(size, s->nnode_owned), &key, s->nnode_owned, &node,
+                         mesh->ncell_owned, &cut));
+
   /* numbers of the nodes at edges, behind those of the vertices; ghosts have them, too */
   if (s->edge_node) {
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      if (s->node_orig[i] < first) continue;
+      if (s->node_orig[i] < first)
+        continue;
       node[nedge] = i;
       key[nedge++] = s->node_orig[i] - first;
     }
     PetscCall(SbOrderCreateSparse(out->comm, 6 * mesh->Ncell, nedge, key, &edges));
     PetscCall(PetscCalloc2(edges.n, &slice, 3 * s->nnode, &number));
-    for (PetscInt i = 0; i < edges.n; i++) slice[i] = mesh->Nvert + edges.start + i;
+    for (PetscInt i = 0; i < edges.n; i++)
+      slice[i] = mesh->Nvert + edges.start + i;
     PetscCall(SbForestBroadcast(edges.sf, 1, MPIU_INT, slice, key));
-    for (PetscInt i = 0; i < nedge; i++) number[3 * node[i]] = (PetscReal)key[i];
+    for (PetscInt i = 0; i < nedge; i++)
+      number[3 * node[i]] = (PetscReal)key[i];
     PetscCall(SbSpaceUpdateGhosts(s, number));
     PetscCall(PetscMalloc1(s->nnode, &out->edge_number));
-    for (PetscInt i = 0; i < s->nnode; i++) out->edge_number[i] = (PetscInt)number[3 * i];
+    for (PetscInt i = 0; i < s->nnode; i++)
+      out->edge_number[i] = (PetscInt)number[3 * i];
     PetscCall(PetscFree2(slice, number));
   }
 
@@ -122,9 +138,11 @@ static PetscErrorCode order_points(SbRun run, SbOutput out)
   PetscCall(PetscMalloc1(size, &out->place));
   if (out->discontinuous) {
     for (PetscInt i = 0; i < size; i++) {
-      const PetscInt cell = i / SB_CELL_NODES, a = i % SB_CELL_NODES;
+      const PetscInt cell = i / SB_CELL_NODES;
+      const PetscInt a = i % SB_CELL_NODES;
 
-      if (a >= 4 && (!s->edge_node || SbSpaceCellNode(s, cell, a) < 0)) continue;
+      if (a >= 4 && (!s->edge_node || SbSpaceCellNode(s, cell, a) < 0))
+        continue;
       out->place[n] = i;
       key[n++] = SB_CELL_NODES * mesh->cell_orig[cell] + a;
     }
@@ -145,7 +163,8 @@ static PetscErrorCode order_points(SbRun run, SbOutput out)
     cut[c] = (PetscBool)(s->edge_node && !out->quadratic && SbSpaceCellNode(s, c, 4) >= 0);
   PetscCall(SbForestReduce(out->cell.sf, 1, SB_MPI_BOOL, cut, out->split));
   n = 0;
-  for (PetscInt i = 0; i < out->cell.n; i++) n += out->split[i];
+  for (PetscInt i = 0; i < out->cell.n; i++)
+    n += out->split[i];
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, out->comm));
   PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, out->comm));
   out->tet.N += 7 * all;
@@ -163,7 +182,9 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   uint64_t sum = 0;
 
   PetscFunctionBeginUser;
-  if (out->cell.sf) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->cell.sf)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* the positions of cells, points and nodes in a file, whatever the partition */
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
   out->tet = out->cell;
@@ -171,12 +192,14 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   if (s->edge_node || out->discontinuous)
     PetscCall(order_points(run, out));
   else
-    PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->point));
+    PetscCall(
+      SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->point));
   if (!s->vertices) {
     PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + (s->edge_node ? 14 : 8) * mesh->Ncell,
                                   s->nnode_owned, s->node_orig, &out->node));
   } else if (out->discontinuous) {
-    PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->node));
+    PetscCall(
+      SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->node));
   } else {
     out->node = out->point;
     PetscCall(PetscObjectReference((PetscObject)out->node.sf));
@@ -188,7 +211,8 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
       sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
   for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
     for (PetscInt a = 0; a < 4; a++)
-      sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
+      sum +=
+        mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
     for (PetscInt i = 0; mesh->cell_set[k] & SB_CURVED && i < 18; i++)
       sum += SbMixReal(mix((uint64_t)mesh->cell_orig[k]) + (uint64_t)i, mesh->edge_off[18 * k + i]);
   }
@@ -202,7 +226,8 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(space->mesh->nbody, &out->body_nodes));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) out->body_nodes[space->node_body[i]]++;
+  for (PetscInt i = 0; i < space->nnode_owned; i++)
+    out->body_nodes[space->node_body[i]]++;
   PetscCall(PetscMPIIntCast(space->mesh->nbody, &n));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, out->body_nodes, n, MPIU_INT, MPI_SUM, out->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -236,7 +261,8 @@ PetscInt SbOutputMeshStep(SbRun run)
   for (PetscInt b = 0; b < run->model->nbody; b++) {
     const SbMemoryMesh *in_memory = run->model->body[b].in_memory;
 
-    if (in_memory) step = PetscMax(step, in_memory->step);
+    if (in_memory)
+      step = PetscMax(step, in_memory->step);
   }
   return step;
 }

@@ -13,7 +13,8 @@ const SbOption SbOutputRows[] = {
    "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
-   "contact_gap, stress, von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: "
+   "contact_gap, stress, von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; "
+   "sets: "
    "where the sets and groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: by output_every_steps"},
@@ -21,27 +22,33 @@ const SbOption SbOutputRows[] = {
    "steps between frames of fields.h5, while output_every is 0"},
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
-   "each tet in fields.h5 has points of its own, so that cr and dg are discontinuous as computed; if not, "
+   "each tet in fields.h5 has points of its own, so that cr and dg are discontinuous as computed; "
+   "if not, "
    "values are averaged at the vertices"},
   {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
-   "where all bodies are of p2: viewers show quadratic tets; if not, each is eight linear ones over its ten "
+   "where all bodies are of p2: viewers show quadratic tets; if not, each is eight linear ones "
+   "over its ten "
    "nodes"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
-   "contacts.vtkhdf, contacts.xmf: the active contact points of each frame, with normals, gaps and forces"},
+   "contacts.vtkhdf, contacts.xmf: the active contact points of each frame, with normals, gaps and "
+   "forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_bodies", SB_OPTION_BOOL, 1, "", "false", "",
    "history.csv also has energies, momentum and centre of mass of each body"},
-  {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
+  {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)",
+   "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between checkpoints; 0: not by time"},
   {"checkpoint_every_steps", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "steps between checkpoints; 0: not by steps"},
   {"checkpoint_keep", SB_OPTION_INT, 1, "", "2", "[1, inf)", "checkpoints kept, the newest ones"},
   {"restart", SB_OPTION_STRING, 1, "", "", "",
-   "checkpoint to resume from, or latest: the newest one in output_dir, or auto: that one if there is any; "
+   "checkpoint to resume from, or latest: the newest one in output_dir, or auto: that one if there "
+   "is any; "
    "empty: start from the beginning"},
   {"probes", SB_OPTION_NAMES, 1, "", "", "",
-   "names of probes: points, surfaces and volumes whose displacement or other fields are columns of "
+   "names of probes: points, surfaces and volumes whose displacement or other fields are columns "
+   "of "
    "history.csv"},
   {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a progress line"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
@@ -63,11 +70,12 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   int n;
 
   PetscFunctionBeginUser;
+
   /* the scenario file on the command line; empty without one */
   PetscCall(PetscGetArgs(&n, &args));
   for (int i = 1; i < n; i++) {
-    const PetscBool named =
-      (PetscBool)(!strcmp(args[i - 1], "-options_file") || !strcmp(args[i - 1], "-options_file_yaml"));
+    const PetscBool named = (PetscBool)(!strcmp(args[i - 1], "-options_file") ||
+                                        !strcmp(args[i - 1], "-options_file_yaml"));
     const char *dot = strrchr(args[i], '.');
 
     if (named || (args[i][0] != '-' && args[i - 1][0] != '-' && dot &&
@@ -80,7 +88,8 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbOptionString(&SbRunScope, "output_dir", sizeof(out->dir), out->dir));
   if (!out->dir[0]) {
-    const char *slash = strrchr(out->scenario, '/'), *base = slash ? slash + 1 : out->scenario;
+    const char *slash = strrchr(out->scenario, '/');
+    const char *base = slash ? slash + 1 : out->scenario;
     const char *dot = strrchr(base, '.');
 
     SbFormat(sizeof(out->dir), out->dir, "out/%.*s",
@@ -92,14 +101,17 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 
   /* the fields of -output_fields, without those that a static run lacks; and body */
   PetscCall(SbOptionNames(&SbRunScope, "output_fields", &nname, &names));
-  if (nname == 1 && !strcmp(names[0], "none")) nname = 0;
+  if (nname == 1 && !strcmp(names[0], "none"))
+    nname = 0;
   for (PetscInt i = 0; i < nname || (i == nname && out->nfield); i++) {
     const SbField *f;
     PetscInt k = 0;
 
     PetscCall(SbFieldFind("-output_fields", i < nname ? names[i] : "body", &f));
-    while (k < out->nfield && out->field[k] != f) k++;
-    if (k == out->nfield && (model->dynamic || !f->dynamic)) out->field[out->nfield++] = f;
+    while (k < out->nfield && out->field[k] != f)
+      k++;
+    if (k == out->nfield && (model->dynamic || !f->dynamic))
+      out->field[out->nfield++] = f;
   }
   PetscCall(PetscFree(names));
 
@@ -116,9 +128,9 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
                "-output_quadratic yes: all bodies must be of element p2, but '%s' is of %s",
                model->body[b].name, model->body[b].element);
   PetscCall(SbOptionBool(&SbRunScope, "output_contacts", &out->contact_points));
-  PetscCheck(
-    !out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
-    "-output_contacts yes needs frames, but -output_fields is none: give -output_fields body at least");
+  PetscCheck(!out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
+             "-output_contacts yes needs frames, but -output_fields is none: give -output_fields "
+             "body at least");
   PetscCall(SbOptionBool(&SbRunScope, "output_history", &out->history));
   PetscCall(SbOptionBool(&SbRunScope, "output_history_bodies", &out->history_bodies));
   PetscCall(SbOptionInt(&SbRunScope, "output_history_every", &out->history_every));
@@ -146,8 +158,8 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The lines of the complete scenario that determine the mechanics, on which a checkpoint must agree; the mesh
-   itself is compared, not the name of its file. */
+/* The lines of the complete scenario that determine the mechanics, on which a checkpoint must
+   agree; the mesh itself is compared, not the name of its file. */
 static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 {
   size_t n = 0;
@@ -155,11 +167,13 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(strlen(text) + 32, &out->identity));
   n += (size_t)sprintf(out->identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
-  for (const char *line = text; *line; line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
+  for (const char *line = text; *line;
+       line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
     const size_t name = strcspn(line, " \n");
     int length = (int)strcspn(line, "\n#");
 
-    while (length && line[length - 1] == ' ') length--;
+    while (length && line[length - 1] == ' ')
+      length--;
     if (SbHasPrefix(line, "-bodies -body_ -sets -set_ -effects -effect_ -mass") &&
         !memmem(line, name, "_mesh", 5) && !memmem(line, name, "_remesh_", 8))
       n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
@@ -172,7 +186,8 @@ static PetscErrorCode destroy(SbRun run)
   SbOutput out = (SbOutput)run->output;
 
   PetscFunctionBeginUser;
-  if (!out) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesDestroy(out));
   PetscCall(SbHistoryDestroy(out));
   PetscCall(SbOutputForgetMesh(out));
@@ -205,19 +220,24 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCallMPI(MPI_Comm_size(out->comm, &out->size));
   PetscCall(PetscTime(&out->wall_start));
   out->cpu_start = SB_CPU_SECONDS;
-  (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z", localtime_r(&now, &local));
+  (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z",
+                 localtime_r(&now, &local));
   PetscCall(read_options(out, run->model));
+
   // A limit on the size of files is met as a failed write, with its message, not as a signal.
   (void)signal(SIGXFSZ, SIG_IGN);
-  if (!out->rank) SbFolderMake(out, message);
+  if (!out->rank)
+    SbFolderMake(out, message);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   if (!strcmp(out->restart, "auto")) {
     char path[PETSC_MAX_PATH_LEN];
 
     PetscCall(PetscStrncpy(out->restart, "latest", sizeof(out->restart)));
     PetscCall(SbCheckpointFind(out, path));
-    if (!path[0]) out->restart[0] = 0;
+    if (!path[0])
+      out->restart[0] = 0;
   }
+
   // The closing table needs the log events.
   PetscCall(PetscLogDefaultBegin());
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -226,7 +246,9 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
 PetscErrorCode SbOutputAttach(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  char *scenario = NULL, path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  char *scenario = NULL;
+  char path[PETSC_MAX_PATH_LEN];
+  char message[SB_MESSAGE_MAX] = "";
   size_t size = 0;
   PetscViewer viewer;
   FILE *memory;
@@ -235,17 +257,24 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
 
-  /* log events of what the scenario asks for: alike on all ranks, also where some have nothing to write */
-  if (out->nfield) PetscCall(SbLogNamed("Out", "fields", &out->event.fields));
+  /* log events of what the scenario asks for: alike on all ranks, also where some have nothing to
+     write */
+  if (out->nfield)
+    PetscCall(SbLogNamed("Out", "fields", &out->event.fields));
   for (PetscInt i = 0; i < out->nfield; i++)
     PetscCall(SbLogNamed("Field", out->field[i]->name, &out->field_event[i]));
-  if (out->contact_points) PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
-  if (out->history) PetscCall(SbLogNamed("Out", "history", &out->event.history));
-  if (out->history && out->nprobe) PetscCall(SbLogNamed("Out", "probes", &out->event.probes));
-  if (out->progress && !out->quiet) PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
+  if (out->contact_points)
+    PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
+  if (out->history)
+    PetscCall(SbLogNamed("Out", "history", &out->event.history));
+  if (out->history && out->nprobe)
+    PetscCall(SbLogNamed("Out", "probes", &out->event.probes));
+  if (out->progress && !out->quiet)
+    PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
 
   /* load the checkpoint first: if it is refused, the folder stays unchanged */
   PetscCall(SbOutputCountNodes(run->model->space, out));
+
   // the complete scenario as text on rank 0, and on all ranks the part of it that checkpoints carry
   memory = out->rank ? NULL : open_memstream(&scenario, &size);
   PetscCheck(out->rank || memory, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for scenario.opts");
@@ -258,17 +287,20 @@ PetscErrorCode SbOutputAttach(SbRun run)
     PetscCall(PetscMPIIntCast((PetscInt)strlen(out->identity) + 1, &n));
   }
   PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, out->comm));
-  if (out->rank) PetscCall(PetscMalloc1(n, &out->identity));
+  if (out->rank)
+    PetscCall(PetscMalloc1(n, &out->identity));
   PetscCallMPI(MPI_Bcast(out->identity, n, MPI_CHAR, 0, out->comm));
   if (out->restart[0]) {
     PetscCall(SbCheckpointLoad(run));
     PetscCall(SbFramesCheck(run, out));
   }
-  if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
+  if (!out->rank)
+    PetscCall(SbFolderClear(out, run->step0));
 
   /* scenario.opts and run.json */
   SbOutputPath(out, "scenario.opts", path);
-  if (!out->rank) SbFileReplace(path, scenario, size, message);
+  if (!out->rank)
+    SbFileReplace(path, scenario, size, message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(SbRunJson(run, out, "running", ""));

@@ -1,5 +1,6 @@
 /*
-  output_impl.h - shared by src/output: the state of a run's output, original order, HDF5 and file helpers.
+  output_impl.h - shared by src/output: the state of a run's output, original order, HDF5 and file
+  helpers.
 */
 #pragma once
 #include <hdf5.h>
@@ -11,11 +12,11 @@
 #define SB_MESSAGE_MAX 1024
 #define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
 
-/* Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are
-   written, so that the files do not depend on the partition. */
+/* Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results
+   are written, so that the files do not depend on the partition. */
 typedef struct {
-  PetscSF sf;      /* leaves: the entities owned here; roots: this rank's slice; NULL: slices only */
-  PetscInt N;      /* entities of all ranks */
+  PetscSF sf; /* leaves: the entities owned here; roots: this rank's slice; NULL: slices only */
+  PetscInt N; /* entities of all ranks */
   PetscInt nowned; /* owned here */
   PetscInt start;  /* the slice is [start, start + n) */
   PetscInt n;
@@ -23,9 +24,10 @@ typedef struct {
 
 PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const PetscInt original[],
                              SbOrder *order);
-/* The same for numbers key[nowned] in [0, bound) with gaps, which are closed; N: their count. Collective. */
-PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
-                                   SbOrder *order);
+/* The same for numbers key[nowned] in [0, bound) with gaps, which are closed; N: their count.
+   Collective. */
+PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned,
+                                   const PetscInt key[], SbOrder *order);
 PetscErrorCode SbOrderDestroy(SbOrder *order);
 
 /* HDF5 and files */
@@ -45,38 +47,48 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
                         PetscBool *ok); /* no error: see ok */
 PetscErrorCode SbH5Close(SbH5 *h);
-/* Flushes to disk on all ranks. A write that failed since the last flush ends the run here. Collective. */
+/* Flushes to disk on all ranks. A write that failed since the last flush ends the run here.
+   Collective. */
 PetscErrorCode SbH5Flush(SbH5 *h);
-/* A dataset [order->N][ncomp] of this type below `where` out of slices, with its unit. Collective. */
-PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t type, const void *slice);
-/* The slice of such a dataset as doubles; not ok: missing, of another shape or unreadable. Collective. */
+/* A dataset [order->N][ncomp] of this type below `where` out of slices, with its unit.
+   Collective. */
+PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit,
+                              const SbOrder *order, PetscInt ncomp, hid_t type, const void *slice);
+/* The slice of such a dataset as doubles; not ok: missing, of another shape or unreadable.
+   Collective. */
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok);
 /* A group that may be missing: negative then. Not collective. */
 hid_t SbH5OpenGroup(hid_t where, const char *name);
-/* Rows of a dataset [n] or [n][m], and bytes (or NULL) of its numbers; 0: there is none. Not collective. */
+/* Rows of a dataset [n] or [n][m], and bytes (or NULL) of its numbers; 0: there is none. Not
+   collective. */
 PetscInt64 SbH5Rows(hid_t where, const char *name, PetscInt *bytes);
-/* A whole dataset [n][ncomp], or [n], in memory; false: it is missing, of another shape or unreadable. */
-PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
+/* A whole dataset [n][ncomp], or [n], in memory; false: it is missing, of another shape or
+   unreadable. */
+PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp,
+                   void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
 /* ok turns false when the attribute is missing or of another kind. Not collective. */
 void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
 void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);
-/* A text of any length as a dataset, the same on all ranks. Collective. Free what was read with PetscFree. */
+/* A text of any length as a dataset, the same on all ranks. Collective. Free what was read with
+   PetscFree. */
 PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text);
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok);
-/* A group without a name, whose links, with names of up to `letters` letters, lie in one block; see h5.c. */
+/* A group without a name, whose links, with names of up to `letters` letters, lie in one block; see
+   h5.c. */
 PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t *group);
 /* Gives it a name; the file shows it from the next flush on. Collective. */
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
 #define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
 
-/* Reserves `bytes` of disk space beyond the end of the file; later messages name them. Collective. */
+/* Reserves `bytes` of disk space beyond the end of the file; later messages name them.
+   Collective. */
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
-/* Ends the run on all ranks when a rank has a message; the lowest rank's is reported. Collective. */
+/* Ends the run on all ranks when a rank has a message; the lowest rank's is reported.
+   Collective. */
 #define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 /* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
@@ -92,15 +104,20 @@ typedef struct {
     PetscReal weight;
   } * item; /* [n] */
 } SbSum;
-typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
+typedef enum {
+  SB_PROBE_POINT,
+  SB_PROBE_FACETS,
+  SB_PROBE_TETS
+} SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
-  PetscReal at[3];   /* requested position, m */
-  PetscReal x[3];    /* what it follows, at rest, m: the nearest vertex, or node of P2, of the first mesh */
+  PetscReal at[3]; /* requested position, m */
+  PetscReal
+    x[3]; /* what it follows, at rest, m: the nearest vertex, or node of P2, of the first mesh */
   PetscBool found;   /* x and body are known */
   PetscInt body;     /* body of x */
   PetscInt original; /* original number of that vertex or node, -1: removed by re-meshing */
-  PetscInt local;    /* owned local vertex at x, or -1: on the other ranks, and where there is none */
+  PetscInt local; /* owned local vertex at x, or -1: on the other ranks, and where there is none */
   SbProbeKind kind;
   char set[SB_NAME_MAX]; /* set of a mean over facets or tets */
   PetscInt nfield;
@@ -149,7 +166,8 @@ struct _p_SbOutput {
   char dir[PETSC_MAX_PATH_LEN];
   char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
   char restart[PETSC_MAX_PATH_LEN];  /* empty: none */
-  int ndamaged; /* newest checkpoints that cannot be read: -restart latest takes the one before them */
+  int
+    ndamaged; /* newest checkpoints that cannot be read: -restart latest takes the one before them */
   PetscInt nfield;
   PetscLogEvent field_event[SB_FIELD_MAX]; /* SbField_<name> */
   const SbField *field[SB_FIELD_MAX];
@@ -174,14 +192,17 @@ struct _p_SbOutput {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder cell;
-  SbOrder node;     /* order of the unknowns: that of the vertices if no body has nodes at faces */
-  SbOrder point;    /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
+  SbOrder node; /* order of the unknowns: that of the vertices if no body has nodes at faces */
+  SbOrder
+    point; /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
   SbOrder tet;      /* of the tets that points are the corners of: slices only, see split */
   PetscBool *split; /* [cell.n] cells of the slice that are eight of these; NULL: none */
-  PetscInt *edge_number; /* [nnode] point at a node at an edge, as if cells shared theirs; NULL without P2 */
-  PetscInt *place;       /* [point.nowned] 10 cell + a with -output_discontinuous, else node of P2; or NULL */
-  PetscBool attached;    /* run.json exists */
-  PetscInt *body_nodes;  /* [nbody] nodes of each body, supports of faces among them */
+  PetscInt *
+    edge_number; /* [nnode] point at a node at an edge, as if cells shared theirs; NULL without P2 */
+  PetscInt
+    *place; /* [point.nowned] 10 cell + a with -output_discontinuous, else node of P2; or NULL */
+  PetscBool attached;   /* run.json exists */
+  PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
   char *identity; /* options that determine the mechanics, one per line */
   /* cell quantities of the instant being written, computed once for all fields that need them */
@@ -193,7 +214,8 @@ struct _p_SbOutput {
 
   SbFrames frames;
   SbContacts contacts;
-  SbIndex contact_index; /* of them, on rank 0; NULL when there are none to write and none to keep */
+  SbIndex
+    contact_index; /* of them, on rank 0; NULL when there are none to write and none to keep */
   SbHistory hist;
   SbProgress line;
   char started[32]; /* date and time */
@@ -201,11 +223,13 @@ struct _p_SbOutput {
   SbRemeshed *remeshed; /* [nremeshed] for run.json */
 };
 
-/* folder.c: creates the folder with its parents and tests writing; message: the error, if any. Rank 0. */
+/* folder.c: creates the folder with its parents and tests writing; message: the error, if any. Rank
+   0. */
 void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
 /* Releases the lock of SbOutputLock(), if there is one. */
 void SbFolderUnlock(SbOutput out);
-/* Moves or removes an earlier run's results; after a restart only checkpoints of later steps. Rank 0. */
+/* Moves or removes an earlier run's results; after a restart only checkpoints of later steps. Rank
+   0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
 void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN]);
@@ -224,39 +248,48 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
 /* option: for messages */
 PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field);
-PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out,
-                              const SbField *field); /* storage for the quantities of cells that it needs */
-/* value[ncomp] += the sum of a field made of the cells' state. Collective where state_valid is false. */
-PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *step, const SbSum *cells,
-                               PetscReal value[]);
+PetscErrorCode
+SbFieldPrepare(SbRun run, SbOutput out,
+               const SbField *field); /* storage for the quantities of cells that it needs */
+/* value[ncomp] += the sum of a field made of the cells' state. Collective where state_valid is
+   false. */
+PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *step,
+                               const SbSum *cells, PetscReal value[]);
 /* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
 PetscBool SbFieldIsProbed(const SbField *field);
 
-/* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces(). Collective. */
+/* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces().
+   Collective. */
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces);
-/* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4
-   cell + a of the vertex), if it is that cell's alone. */
+/* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of
+   a cell (4 cell + a of the vertex), if it is that cell's alone. */
 typedef struct {
   PetscInt vertex, node, corner;
 } SbPlace;
 SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt point);
 /* Position at rest, m. */
 const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt point);
-/* values[out->point.nowned][3] of a vector of the space: nodal values of P1 and P2, means of the cells
-   around, or each cell's own. Collective. */
+/* values[out->point.nowned][3] of a vector of the space: nodal values of P1 and P2, means of the
+   cells around, or each cell's own. Collective. */
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]);
-/* The same for forces at nodes, or prescribed unknowns only; keeps resultant and moment. Collective. */
-PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);
-/* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
-void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
+/* The same for forces at nodes, or prescribed unknowns only; keeps resultant and moment.
+   Collective. */
+PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R,
+                              PetscReal values[]);
+/* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have
+   it. */
+void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[],
+                    PetscReal value[3]);
 
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
-/* Begins the output, or continues it with the run of a new mesh; so do all ..Attach below. Collective. */
+/* Begins the output, or continues it with the run of a new mesh; so do all ..Attach below.
+   Collective. */
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
-/* contacts.c: points of contact after a step, on the ranks that write them; bytes in the file. Collective. */
+/* contacts.c: points of contact after a step, on the ranks that write them; bytes in the file.
+   Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
@@ -275,11 +308,14 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const Sb
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
-/* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum. Collective. */
+/* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum.
+   Collective. */
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
-/* Raises sum by their checksums in an open file; ok turns false when one is missing. Not collective. */
+/* Raises sum by their checksums in an open file; ok turns false when one is missing. Not
+   collective. */
 void SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
-/* Path of the checkpoint that -restart names; of `latest` the newest undamaged one, "": none. Collective. */
+/* Path of the checkpoint that -restart names; of `latest` the newest undamaged one, "": none.
+   Collective. */
 PetscErrorCode SbCheckpointFind(SbOutput out, char path[PETSC_MAX_PATH_LEN]);
 #define SB_SKIPPED "%s is truncated or damaged: trying the checkpoint before it"
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
@@ -287,7 +323,8 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 void SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 void SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
-PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
+PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status,
+                         const char *reason); /* collective */
 
 /* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf, on rank 0. */
 /* Rows of one dataset of fields.h5, in one frame or one mesh. */
@@ -327,17 +364,19 @@ struct _p_SbIndex {
   PetscInt nwritten; /* vtkhdf.c: frames that the file on disk has */
   double next;       /* when it is made again, in s of MPI_Wtime() */
 };
-/* Removes older files. nowhere[3]: of contact points, with the dummy point of frames without any, m; NULL: of
-   tets. */
-PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
+/* Removes older files. nowhere[3]: of contact points, with the dummy point of frames without any,
+   m; NULL: of tets. */
+PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere,
+                             SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
 /* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
 PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
-/* Adds a frame: its group in fields.h5, and its arrays. Contact points have positions `x` and a number. */
-PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
-                          const SbArray array[]);
-/* Replaces the files, unless there is a message or no index; `message` becomes the error, if any. The last
-   ones of a run are written in any case. */
+/* Adds a frame: its group in fields.h5, and its arrays. Contact points have positions `x` and a
+   number. */
+PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint,
+                          PetscInt n, const SbArray array[]);
+/* Replaces the files, unless there is a message or no index; `message` becomes the error, if any.
+   The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 /* vtkhdf.c: replaces that file when enough frames have come since, or these are the last ones. */
 void SbVtkhdfWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
@@ -361,11 +400,12 @@ typedef struct {
 PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files);
 
 /*
-  SbCheckpointLoad - state of a run from the checkpoint that -restart names, or for `latest` the newest
-  readable one of the folder (a warning names others), on any number of ranks. Collective.
+  SbCheckpointLoad - state of a run from the checkpoint that -restart names, or for `latest` the
+  newest readable one of the folder (a warning names others), on any number of ranks. Collective.
 
   Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
-  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its
-  mesh, bodies or effects are not those of this run (the message names the first option that differs).
+  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT
+  when its mesh, bodies or effects are not those of this run (the message names the first option
+  that differs).
 */
 PetscErrorCode SbCheckpointLoad(SbRun run);

@@ -1,15 +1,16 @@
 /*
   Values at output points for all elements: for vertex fields and probes.
 
-  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a
-  vertex[v][a] u_a (SbElementOps), another one in each cell around the vertex: a vertex field holds their
-  mean, weighted with the volumes of the cells and summed by the cells' original numbers, so that it does not
-  depend on the partition. With -output_discontinuous nothing is averaged.
+  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is
+  sum_a vertex[v][a] u_a (SbElementOps), another one in each cell around the vertex: a vertex field
+  holds their mean, weighted with the volumes of the cells and summed by the cells' original
+  numbers, so that it does not depend on the partition. With -output_discontinuous nothing is
+  averaged.
 
-  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face,
-  which keeps its resultant and its moment. Where a node belongs to several cells and these have points of
-  their own, each has an equal part. What a DG cell does to the support of a face is a force of that face,
-  too. P2 has points at its nodes, with the values there.
+  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of
+  the face, which keeps its resultant and its moment. Where a node belongs to several cells and
+  these have points of their own, each has an equal part. What a DG cell does to the support of a
+  face is a force of that face, too. P2 has points at its nodes, with the values there.
 */
 #include "output_impl.h"
 
@@ -26,10 +27,11 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
     // the cells around each owned vertex: all of them are local
     PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
     PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
-    for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++) key[i] = mesh->cell_orig[p->corner[i] / 4];
+    for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++)
+      key[i] = mesh->cell_orig[p->corner[i] / 4];
     for (PetscInt v = 0; v < mesh->nvert_owned; v++)
-      PetscCall(
-        PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
+      PetscCall(PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v],
+                                      p->corner + p->start[v]));
     PetscCall(PetscFree(key));
 
     /* weights of the means over cells */
@@ -37,16 +39,21 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
     for (PetscInt b = 0; b < s->nbatch; b++)
       PetscCall(PetscArraycpy(p->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
   }
-  if (!forces || p->valence) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!forces || p->valence)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* cells of each node: a rank has all those of its own nodes; ghosts get the number from their owners */
+  /* cells of each node: a rank has all those of its own nodes; ghosts get the number from their
+     owners */
   PetscCall(PetscCalloc1(3 * s->nnode, &count));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++)
+    count[3 * s->cell_node[i]] += 1.;
   for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++)
-    if (s->edge_node[i] >= 0) count[3 * s->edge_node[i]] += 1.;
+    if (s->edge_node[i] >= 0)
+      count[3 * s->edge_node[i]] += 1.;
   PetscCall(SbSpaceUpdateGhosts(s, count));
   PetscCall(PetscMalloc1(s->nnode, &p->valence));
-  for (PetscInt i = 0; i < s->nnode; i++) p->valence[i] = count[3 * i];
+  for (PetscInt i = 0; i < s->nnode; i++)
+    p->valence[i] = count[3 * i];
   PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -55,9 +62,11 @@ SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)
 {
   const SbMesh mesh = run->model->mesh;
   const PetscInt place = out->place ? out->place[i] : i;
-  const PetscInt cell = place / SB_CELL_NODES, a = place % SB_CELL_NODES;
+  const PetscInt cell = place / SB_CELL_NODES;
+  const PetscInt a = place % SB_CELL_NODES;
 
-  if (!out->discontinuous) return i < mesh->nvert_owned ? (SbPlace){i, -1, -1} : (SbPlace){-1, place, -1};
+  if (!out->discontinuous)
+    return i < mesh->nvert_owned ? (SbPlace){i, -1, -1} : (SbPlace){-1, place, -1};
   return a < 4 ? (SbPlace){mesh->cell[4 * cell + a], -1, 4 * cell + a}
                : (SbPlace){-1, SbSpaceCellNode(run->model->space, cell, a), -1};
 }
@@ -81,7 +90,8 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
       continue;
     }
     value[k] = 0.;
-    for (int a = 0; a < 4; a++) value[k] += e->ops.vertex[corner % 4][a] * x[3 * node[a] + k];
+    for (int a = 0; a < 4; a++)
+      value[k] += e->ops.vertex[corner % 4][a] * x[3 * node[a] + k];
   }
 }
 
@@ -90,26 +100,33 @@ static PetscInt vertex_node(SbSpace s, const SbPoints *p, PetscInt vertex)
 {
   const PetscInt corner = s->vertices ? 0 : p->corner[p->start[vertex]];
 
-  return s->vertices ? vertex : SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
+  return s->vertices                                       ? vertex
+         : SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner]
+                                                           : -1;
 }
 
-void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3])
+void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[],
+                    PetscReal value[3])
 {
   const SbSpace s = run->model->space;
   const SbPoints *p = &out->points;
   const PetscInt node = vertex_node(s, p, vertex);
   PetscReal V = 0.;
 
-  for (int k = 0; k < 3; k++) value[k] = node < 0 ? 0. : x[3 * node + k];
-  if (node >= 0) return;
+  for (int k = 0; k < 3; k++)
+    value[k] = node < 0 ? 0. : x[3 * node + k];
+  if (node >= 0)
+    return;
   for (PetscInt i = p->start[vertex]; i < p->start[vertex + 1]; i++) {
     PetscReal there[3];
 
     corner_value(s, p->corner[i], x, there);
-    for (int k = 0; k < 3; k++) value[k] += p->V[p->corner[i] / 4] * there[k];
+    for (int k = 0; k < 3; k++)
+      value[k] += p->V[p->corner[i] / 4] * there[k];
     V += p->V[p->corner[i] / 4];
   }
-  for (int k = 0; k < 3; k++) value[k] /= V;
+  for (int k = 0; k < 3; k++)
+    value[k] /= V;
 }
 
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[])
@@ -136,12 +153,13 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
 /* value += factor times the force at a node */
 static void add_force(const PetscReal r[], PetscInt node, PetscReal factor, PetscReal value[3])
 {
-  for (int k = 0; k < 3; k++) value[k] += factor * r[3 * node + k];
+  for (int k = 0; k < 3; k++)
+    value[k] += factor * r[3 * node + k];
 }
 
 /* Adds a cell's share of the forces r at its nodes to one of its corners. */
-static void add_corner_force(SbSpace s, const PetscReal r[], const PetscReal valence[], PetscInt corner,
-                             PetscReal value[3])
+static void add_corner_force(SbSpace s, const PetscReal r[], const PetscReal valence[],
+                             PetscInt corner, PetscReal value[3])
 {
   const PetscInt *node = s->cell_node + 4 * (corner / 4);
 
@@ -149,17 +167,21 @@ static void add_corner_force(SbSpace s, const PetscReal r[], const PetscReal val
     add_force(r, node[corner % 4], 1. / valence[node[corner % 4]], value);
     return;
   }
+
   // node a lies opposite vertex a: this corner belongs to the faces of the others
   for (int a = 0; a < 4; a++) {
     const PetscInt support = s->dirichlet_node ? s->dirichlet_node[corner - corner % 4 + a] : -1;
 
-    if (a == corner % 4) continue;
+    if (a == corner % 4)
+      continue;
     add_force(r, node[a], 1. / (3. * valence[node[a]]), value);
-    if (support >= 0) add_force(r, support, 1. / 3., value);
+    if (support >= 0)
+      add_force(r, support, 1. / 3., value);
   }
 }
 
-PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[])
+PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R,
+                              PetscReal values[])
 {
   const SbSpace s = run->model->space;
   const SbPoints *p = &out->points;
@@ -175,7 +197,9 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
   PetscCall(SbSpaceRestoreLocalRead(s, R, &all));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const SbPlace at = SbPointsPlace(run, out, i);
-    const PetscInt node = at.vertex < 0 ? at.node : at.corner < 0 ? vertex_node(s, p, at.vertex) : -1;
+    const PetscInt node = at.vertex < 0   ? at.node
+                          : at.corner < 0 ? vertex_node(s, p, at.vertex)
+                                          : -1;
 
     if (at.corner >= 0)
       add_corner_force(s, r, p->valence, at.corner, values + 3 * i);

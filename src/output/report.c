@@ -1,6 +1,6 @@
 /*
-  Console output: a header before the run, a table after it. Eighty columns. Seconds of a phase are those of
-  the slowest rank; the last phase is the rest of the wall time.
+  Console output: a header before the run, a table after it. Eighty columns. Seconds of a phase are
+  those of the slowest rank; the last phase is the rest of the wall time.
 */
 #include <stdarg.h>
 #include <time.h>
@@ -35,8 +35,9 @@ static void entry(const char *title, const char *format, ...)
 }
 
 /*
-  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the
-  largest of them, kg. Copies are alike in all that the tables say but the mass, as they may differ in scale.
+  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least
+  and the largest of them, kg. Copies are alike in all that the tables say but the mass, as they may
+  differ in scale.
 */
 static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, char name[],
                               PetscReal mass[2])
@@ -51,13 +52,16 @@ static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, 
 
     if (strcmp(other->copy_of, body->copy_of) || strcmp(other->element, body->element) ||
         other->ncell != body->ncell || out->body_nodes[k] != out->body_nodes[b] ||
-        strcmp(m->material[k]->law, m->material[b]->law) || m->material[k]->E != m->material[b]->E ||
-        m->material[k]->nu != m->material[b]->nu || m->material[k]->density != m->material[b]->density)
+        strcmp(m->material[k]->law, m->material[b]->law) ||
+        m->material[k]->E != m->material[b]->E || m->material[k]->nu != m->material[b]->nu ||
+        m->material[k]->density != m->material[b]->density)
       continue;
-    if (k < b) return PETSC_FALSE;
+    if (k < b)
+      return PETSC_FALSE;
     mass[0] = PetscMin(mass[0], m->material[k]->density * other->volume);
     mass[1] = PetscMax(mass[1], m->material[k]->density * other->volume);
-    if (++n > 1) (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
+    if (++n > 1)
+      (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
   }
   return PETSC_TRUE;
 }
@@ -65,39 +69,42 @@ static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, 
 static void print_bodies(SbModel m, SbOutput out)
 {
   char name[2 * SB_NAME_MAX], kg[32];
-  PetscInt tets = 0, nodes = 0;
+  PetscInt tets = 0;
+  PetscInt nodes = 0;
   PetscReal mass[2];
 
-  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element", "tets",
-                    "nodes", "unknowns", "min angle deg", "radius ratio");
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element",
+                    "tets", "nodes", "unknowns", "min angle deg", "radius ratio");
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
     const PetscInt n = out->body_nodes[b];
 
     tets += body->ncell;
     nodes += n;
-    if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
-    (void)PetscPrintf(PETSC_COMM_SELF,
-                      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT
-                      " %13.1f %12.2f\n",
-                      name, body->element, body->ncell, n, 3 * n, body->min_dihedral, body->max_radius_ratio);
+    if (!line_of_body(m, out, b, sizeof(name), name, mass))
+      continue;
+    (void)PetscPrintf(
+      PETSC_COMM_SELF,
+      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n",
+      name, body->element, body->ncell, n, 3 * n, body->min_dihedral, body->max_radius_ratio);
   }
   if (m->nbody > 1)
     (void)PetscPrintf(PETSC_COMM_SELF,
-                      "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together", "",
-                      tets, nodes, 3 * nodes);
-  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material", "E (Pa)", "nu",
-                    "rho (kg/m^3)", "mass (kg)");
+                      "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n",
+                      "together", "", tets, nodes, 3 * nodes);
+  (void)PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material",
+                    "E (Pa)", "nu", "rho (kg/m^3)", "mass (kg)");
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial material = m->material[b];
 
-    if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
+    if (!line_of_body(m, out, b, sizeof(name), name, mass))
+      continue;
     if (mass[1] - mass[0] > 1e-5 * mass[1])
       SbFormat(sizeof(kg), kg, "%.2g-%.2g", mass[0], mass[1]);
     else
       SbFormat(sizeof(kg), kg, "%.5g", mass[0]);
-    (void)PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name, material->law,
-                      material->E, material->nu, material->density, kg);
+    (void)PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name,
+                      material->law, material->E, material->nu, material->density, kg);
   }
   (void)PetscPrintf(PETSC_COMM_SELF, "\n");
 }
@@ -105,29 +112,39 @@ static void print_bodies(SbModel m, SbOutput out)
 PetscErrorCode SbReportHeader(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  char threads[64] = "one thread", text[1024] = "", name[SB_NAME_MAX];
+  char threads[64] = "one thread";
+  char text[1024] = "";
+  char name[SB_NAME_MAX];
   int most;
 
   PetscFunctionBeginUser;
-  if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->quiet || out->rank)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* number of threads of a library that cannot be limited to one */
   most = SbThreadsSetOne();
-  if (most > 1) (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "supple %s with PETSc %s on %d rank%s, %s each\n", SB_VERSION,
-                        SB_PETSC_VERSION, (int)out->size, out->size == 1 ? "" : "s", threads));
+  if (most > 1)
+    (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "supple %s with PETSc %s on %d rank%s, %s each\n",
+                        SB_VERSION, SB_PETSC_VERSION, (int)out->size, out->size == 1 ? "" : "s",
+                        threads));
   print_bodies(run->model, out);
-  if (out->scenario[0]) entry("scenario", "%s", out->scenario);
+  if (out->scenario[0])
+    entry("scenario", "%s", out->scenario);
+
   // effects, with the notes of their set-up
   for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
 
     SbAppend(sizeof(text), text, "%s%s", e ? ", " : "", effect->name);
-    if (strcmp(effect->name, effect->type)) SbAppend(sizeof(text), text, " (%s)", effect->type);
+    if (strcmp(effect->name, effect->type))
+      SbAppend(sizeof(text), text, " (%s)", effect->type);
   }
   entry("effects", "%s", text[0] ? text : "none");
   for (PetscInt e = 0; e < run->model->neffect; e++)
     if (run->model->effect[e]->note[0])
       entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note);
+
   // integrator and steps
   SbRunIntegrator(run, sizeof(name), name);
   if (run->arc.on)
@@ -152,7 +169,8 @@ PetscErrorCode SbReportHeader(SbRun run)
     SbAppend(sizeof(text), text, " every %" PetscInt_FMT " steps", out->every_steps);
   else if (out->nfield)
     SbAppend(sizeof(text), text, " every step");
-  if (out->history) SbAppend(sizeof(text), text, "%s history", out->nfield ? ";" : ":");
+  if (out->history)
+    SbAppend(sizeof(text), text, "%s history", out->nfield ? ";" : ":");
   entry("output", "%s%s", out->dir, text);
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
@@ -167,8 +185,8 @@ PetscErrorCode SbReportHeader(SbRun run)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where, probe->x[0],
-          probe->x[1], probe->x[2], PetscSqrtReal(SbDistance2(probe->x, probe->at)));
+    entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
+          probe->x[0], probe->x[1], probe->x[2], PetscSqrtReal(SbDistance2(probe->x, probe->at)));
   }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -180,18 +198,20 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
   const PetscReal change = event->energy[1] - event->energy[0];
 
   PetscFunctionBeginUser;
-  if (!out) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbReserve(out->nremeshed + 1, sizeof(*event), &out->remeshed_size, &out->remeshed));
   out->remeshed[out->nremeshed++] = *event;
-  if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->quiet)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbProgressEnd(out);
   PetscCall(PetscPrintf(out->comm,
                         "body '%s' is re-meshed after step %" PetscInt_FMT
-                        ", t = %g%s: worst quality %.3g -> %.3g, %" PetscInt_FMT " -> %" PetscInt_FMT
-                        " tets, energy %+.3g J (%+.2g %%)\n",
+                        ", t = %g%s: worst quality %.3g -> %.3g, %" PetscInt_FMT
+                        " -> %" PetscInt_FMT " tets, energy %+.3g J (%+.2g %%)\n",
                         event->body, event->step, event->t, run->model->dynamic ? " s" : "",
-                        event->quality[0], event->quality[1], event->tets[0], event->tets[1], change,
-                        (event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
+                        event->quality[0], event->quality[1], event->tets[0], event->tets[1],
+                        change, (event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +220,8 @@ static void size_text(PetscReal bytes, size_t size, char text[])
   static const char *const unit[] = {"B", "kB", "MB", "GB"};
   int k = 0;
 
-  for (; bytes >= 1e3 && k < 3; k++) bytes /= 1e3;
+  for (; bytes >= 1e3 && k < 3; k++)
+    bytes /= 1e3;
   SbFormat(size, text, k ? "%.3g %s" : "%.0f %s", bytes, unit[k]);
 }
 
@@ -209,7 +230,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbOutput out = (SbOutput)run->output;
   const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
   SbPhases phases;
-  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX], text[512];
+  char files[1024] = "";
+  char memory[32], sum[32], solver[SB_NAME_MAX], text[512];
   SbOutputFileSize *file;
   PetscInt nfile;
 
@@ -219,23 +241,28 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->stop_reason));
   PetscCall(SbPhasesGet(out, &phases));
   if (run->want_energies && run->energies.ninverted)
-    PetscCall(SbWarning(run->model->comm,
-                        "%" PetscInt_FMT
-                        " tetrahedra are inverted or flat at the end (det F down to %g): what they show is "
-                        "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
-                        "they come back, see docs/reference/guarantees.md",
-                        run->energies.ninverted, run->energies.min_J));
-  if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(
+      SbWarning(run->model->comm,
+                "%" PetscInt_FMT
+                " tetrahedra are inverted or flat at the end (det F down to %g): what they show is "
+                "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
+                "they come back, see docs/reference/guarantees.md",
+                run->energies.ninverted, run->energies.min_J));
+  if (out->quiet)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   // seconds of the phases
   if (!out->rank) {
-    const PetscReal steps = (PetscReal)run->steps_total, tets = (PetscReal)run->model->mesh->Ncell;
+    const PetscReal steps = (PetscReal)run->steps_total;
+    const PetscReal tets = (PetscReal)run->model->mesh->Ncell;
 
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds", "share",
-                          "ms per step", "us per step, tet"));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
+                          "share", "ms per step", "us per step, tet"));
     for (int i = 0; i < SB_PHASE_COUNT; i++) {
       const PetscReal seconds = phases.seconds[i];
 
-      if ((i == SB_PHASE_CONTACT || i == SB_PHASE_SEARCH) && !(seconds > 0)) continue; /* none in the scene */
+      if ((i == SB_PHASE_CONTACT || i == SB_PHASE_SEARCH) && !(seconds > 0))
+        continue; /* none in the scene */
       PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", SbPhaseNames[i], seconds,
                             (phases.total > 0. ? 100. * seconds / phases.total : 0.)));
       if (steps > 0. && i > SB_PHASE_SETUP)
@@ -250,15 +277,18 @@ PetscErrorCode SbReportSummary(SbRun run)
   for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
 
-    if (!effect->ops.summary) continue;
+    if (!effect->ops.summary)
+      continue;
     text[0] = 0;
     PetscCall(effect->ops.summary(effect, run->model->space, sizeof(text), text));
-    if (!out->rank && text[0]) entry("effect", "%s: %s", effect->name, text);
+    if (!out->rank && text[0])
+      entry("effect", "%s: %s", effect->name, text);
   }
-  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->rank)
+    PetscFunctionReturn(PETSC_SUCCESS);
   entry("steps",
-        "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT " Newton and %" PetscInt_FMT
-        " linear iterations",
+        "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
+        " Newton and %" PetscInt_FMT " linear iterations",
         run->steps_total, run->rejected_total, run->newton_total, run->linear_total);
   if (run->solver_parts[0]) {
     PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(solver), solver));
@@ -267,7 +297,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   }
   size_text(phases.memory_max, sizeof(memory), memory);
   size_text(phases.memory_sum, sizeof(sum), sum);
-  entry("memory", out->size > 1 ? "%s at the peak of the largest rank, %s together" : "%s at the peak",
+  entry("memory",
+        out->size > 1 ? "%s at the peak of the largest rank, %s together" : "%s at the peak",
         memory, sum);
   PetscCall(SbOutputFiles(out, &nfile, &file));
   for (PetscInt i = 0; i < nfile; i++) {
@@ -276,7 +307,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   }
   PetscCall(PetscFree(file));
   entry("files", "in %s: %s", out->dir, files);
-  if (stopped) entry("stopped", "%s", run->stop_reason);
+  if (stopped)
+    entry("stopped", "%s", run->stop_reason);
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,7 @@
 /*
-  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status
-  "running") and replaced as a whole when it ends; a run that was killed leaves the first version.
+  run.json: what ran, where, with which settings, how long and how it ended. Written when a run
+  starts (status "running") and replaced as a whole when it ends; a run that was killed leaves the
+  first version.
 */
 #include <stdarg.h>
 #include <sys/resource.h>
@@ -16,8 +17,8 @@
 #endif
 
 /*
-  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real number,
-  null where it is none.
+  Prints JSON: ' stands for ", $s for a text with its quotes, $d for a PetscInt, and $g for a real
+  number, null where it is none.
 */
 static void put(FILE *f, const char *format, ...)
 {
@@ -52,25 +53,32 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
                                  const SbPhases *phases, char message[SB_MESSAGE_MAX])
 {
   const SbModel m = run->model;
-  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL, *options, name[SB_NAME_MAX],
-       parts[SB_NAME_MAX] = "", mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  char host[256] = "";
+  char path[PETSC_MAX_PATH_LEN];
+  char *text = NULL;
+  char *options, name[SB_NAME_MAX];
+  char parts[SB_NAME_MAX] = "";
+  char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
   int n;
 
   PetscFunctionBeginUser;
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for run.json");
+
   // versions of the program and its libraries, machine
   (void)MPI_Get_library_version(mpi, &n);
   mpi[strcspn(mpi, ",\n")] = 0;
   (void)gethostname(host, sizeof(host) - 1);
-  put(f,
-      "{\n  'program': 'supple',\n  'version': $s,\n  'petsc': $s,\n  'mpi': $s,\n  'hdf5': $s,\n"
-      "  'compiler': $s,\n  'host': $s,\n  'cores': $d,\n  'ranks': $d,\n  'threads_per_rank': $d,\n"
-      "  'started': $s,\n  'scenario': $s,\n  'bodies': [",
-      SB_VERSION, SB_PETSC_VERSION, mpi, H5_VERS_INFO, COMPILER, host,
-      (PetscInt)sysconf(_SC_NPROCESSORS_ONLN), (PetscInt)out->size, (PetscInt)SbThreadsSetOne(), out->started,
-      out->scenario);
+  put(
+    f,
+    "{\n  'program': 'supple',\n  'version': $s,\n  'petsc': $s,\n  'mpi': $s,\n  'hdf5': $s,\n"
+    "  'compiler': $s,\n  'host': $s,\n  'cores': $d,\n  'ranks': $d,\n  'threads_per_rank': $d,\n"
+    "  'started': $s,\n  'scenario': $s,\n  'bodies': [",
+    SB_VERSION, SB_PETSC_VERSION, mpi, H5_VERS_INFO, COMPILER, host,
+    (PetscInt)sysconf(_SC_NPROCESSORS_ONLN), (PetscInt)out->size, (PetscInt)SbThreadsSetOne(),
+    out->started, out->scenario);
+
   // bodies with their meshes and materials
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
@@ -82,16 +90,19 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
         "'max_radius_ratio': $g,\n     'element': $s, 'nodes': $d, 'unknowns': $d, 'material': $s, "
         "'young': $g, 'poisson': $g, 'density': $g}",
         body->name, body->mesh, body->ncell, body->nvert, body->volume, body->min_dihedral,
-        body->max_radius_ratio, body->element, out->body_nodes[b], 3 * out->body_nodes[b], material->law,
-        material->E, material->nu, material->density);
+        body->max_radius_ratio, body->element, out->body_nodes[b], 3 * out->body_nodes[b],
+        material->law, material->E, material->nu, material->density);
   }
+
   // settings; the solver is the current one: a fallback may have replaced it
   SbRunIntegrator(run, sizeof(name), name);
-  if (run->solver_parts[0]) PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(parts), parts));
+  if (run->solver_parts[0])
+    PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(parts), parts));
   put(f,
       "\n  ],\n  'time': $s,\n  'solver': $s,\n  'solver_reason': $s,\n  'solver_parts': $s,\n"
       "  'unknowns': $d,\n  'dt': $g,\n  't_start': $g,\n  't_end': $g,\n",
-      name, run->solver, run->solver_reason, parts, 3 * m->space->Nnode, run->dt, run->t0, run->t_end);
+      name, run->solver, run->solver_reason, parts, 3 * m->space->Nnode, run->dt, run->t0,
+      run->t_end);
   for (int notes = 0; notes < 2; notes++) {
     put(f, notes ? "  'effect_notes': [" : "  'effects': [");
     for (PetscInt e = 0; e < m->neffect; e++)
@@ -101,29 +112,35 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   PetscCall(PetscOptionsGetAll(NULL, &options));
   put(f, "  'options': $s,\n", options);
   PetscCall(PetscFree(options));
+
   // events of re-meshing
   for (PetscInt i = 0; i < out->nremeshed; i++) {
     const SbRemeshed *r = &out->remeshed[i];
 
     put(f, i ? ",\n    {" : "  'remeshed': [\n    {");
     put(f,
-        "'body': $s, 'step': $d, 'time': $g, 'tets': [$d, $d], 'vertices': [$d, $d], 'vertices_moved': $d,\n"
+        "'body': $s, 'step': $d, 'time': $g, 'tets': [$d, $d], 'vertices': [$d, $d], "
+        "'vertices_moved': $d,\n"
         "     'quality_before': $g, 'quality_after': $g, 'energy_before': $g, 'energy_after': $g,\n"
         "     'rigid_speed': $g, 'centre_shift': $g}",
         r->body, r->step, r->t, r->tets[0], r->tets[1], r->vertices[0], r->vertices[1], r->moved,
         r->quality[0], r->quality[1], r->energy[0], r->energy[1], r->speed, r->shift);
   }
-  if (out->nremeshed) put(f, "\n  ],\n");
+  if (out->nremeshed)
+    put(f, "\n  ],\n");
+
   // cost: steps, iterations, seconds, memory, files
   if (phases) {
     SbOutputFileSize *file;
     PetscInt nfile;
 
     put(f,
-        "  'steps': $d,\n  'newton_iterations': $d,\n  'linear_iterations': $d,\n  'rejected_steps': $d,\n"
+        "  'steps': $d,\n  'newton_iterations': $d,\n  'linear_iterations': $d,\n  "
+        "'rejected_steps': $d,\n"
         "  'seconds': {",
         run->steps_total, run->newton_total, run->linear_total, run->rejected_total);
-    for (int i = 0; i < SB_PHASE_COUNT; i++) put(f, "$s: $g, ", SbPhaseNames[i], phases->seconds[i]);
+    for (int i = 0; i < SB_PHASE_COUNT; i++)
+      put(f, "$s: $g, ", SbPhaseNames[i], phases->seconds[i]);
     put(f,
         "'time loop': $g, 'total': $g},\n  'cpu_seconds_max': $g,\n  'memory_max_bytes': $g,\n"
         "  'memory_sum_bytes': $g,\n  'files': [",
@@ -146,9 +163,9 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-const char *const SbPhaseNames[SB_PHASE_COUNT] = {"mesh",         "set-up",  "residual",       "tangent",
-                                                  "linear solve", "contact", "contact search", "energies",
-                                                  "output",       "other"};
+const char *const SbPhaseNames[SB_PHASE_COUNT] = {
+  "mesh",    "set-up",         "residual", "tangent", "linear solve",
+  "contact", "contact search", "energies", "output",  "other"};
 
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
 {
@@ -161,12 +178,14 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
   p->cpu = SB_CPU_SECONDS - out->cpu_start;
   (void)getrusage(RUSAGE_SELF, &usage);
   p->memory_max = p->memory_sum = 1024. * (PetscReal)usage.ru_maxrss;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, p->seconds, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, p->seconds, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
   p->total = p->seconds[SB_PHASE_OTHER];
-  for (int i = 0; i < SB_PHASE_OTHER; i++) p->seconds[SB_PHASE_OTHER] -= p->seconds[i];
+  for (int i = 0; i < SB_PHASE_OTHER; i++)
+    p->seconds[SB_PHASE_OTHER] -= p->seconds[i];
   p->seconds[SB_PHASE_OTHER] = PetscMax(p->seconds[SB_PHASE_OTHER], 0.);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -178,7 +197,8 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 
   PetscFunctionBeginUser;
   PetscCall(SbPhasesGet(out, &phases));
-  if (!out->rank) PetscCall(write_json(run, out, status, reason, &phases, message));
+  if (!out->rank)
+    PetscCall(write_json(run, out, status, reason, &phases, message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -189,7 +209,8 @@ PetscErrorCode SbReportFailure(SbRun run, const char *reason)
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
-  if (!out || !out->attached) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out || !out->attached)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbProgressEnd(out);
   PetscCall(write_json(run, out, "failed", reason, NULL, message));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,11 +1,12 @@
 /*
   Initial state from another run: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
-  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run:
-  u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest there, or of the nearest one; ten
-  weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the
-  body's part of the file. A checkpoint has no mesh, but all unknowns in full precision: for scenes with the
-  same meshes and elements; other scenes take the frame of its step.
+  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of
+  this run: u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest there, or of
+  the nearest one; ten weights in a tet of P2. So element, mesh, material, effects and integrator
+  may differ. Every rank reads the body's part of the file. A checkpoint has no mesh, but all
+  unknowns in full precision: for scenes with the same meshes and elements; other scenes take the
+  frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,21 +21,26 @@ typedef struct {
   char path[PETSC_MAX_PATH_LEN];
   hid_t file, frame, mesh;
   PetscInt npoint, ncell;
-  PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
-  PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt *cell10;     /* [ncell][10] with nodes at the edges (SbTetEdge), -1: none; NULL without P2 */
+  PetscReal *x, *u,
+    *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
+  PetscInt *cell;   /* [ncell][4] those of the body */
+  PetscInt *cell10; /* [ncell][10] with nodes at the edges (SbTetEdge), -1: none; NULL without P2 */
 } Other;
 
-/* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there. PetscFree. */
-static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscInt ncomp, PetscInt *n,
-                               void *array)
+/* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there.
+   PetscFree. */
+static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscInt ncomp,
+                               PetscInt *n, void *array)
 {
   PetscFunctionBeginUser;
   *(void **)array = NULL;
   *n = (PetscInt)SbH5Rows(where, name, NULL);
-  if (!*n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));
-  if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array)) PetscCall(PetscFree(*(void **)array));
+  if (!*n)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(
+    PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));
+  if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array))
+    PetscCall(PetscFree(*(void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,14 +48,16 @@ static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscI
 static PetscBool are_points(const PetscInt number[], PetscInt n, PetscInt npoint)
 {
   for (PetscInt i = 0; i < n; i++)
-    if (number[i] < 0 || number[i] >= npoint) return PETSC_FALSE;
+    if (number[i] < 0 || number[i] >= npoint)
+      return PETSC_FALSE;
   return PETSC_TRUE;
 }
 
 /* The points, and the tets of body number `which`; ok: the arrays are there and fit each other. */
 static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
 {
-  PetscInt n = 0, nbody, nten, nparent, *body, *parent;
+  PetscInt n = 0;
+  PetscInt nbody, nten, nparent, *body, *parent;
 
   PetscFunctionBeginUser;
   PetscCall(read_all(o->mesh, "x", H5T_IEEE_F64LE, 3, &o->npoint, &o->x));
@@ -57,14 +65,17 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   PetscCall(read_all(o->mesh, "body", H5T_STD_I64LE, 1, &nbody, &body));
   PetscCall(read_all(o->mesh, "cells10", H5T_STD_I64LE, 10, &nten, &o->cell10));
   PetscCall(read_all(o->mesh, "parent", H5T_STD_I64LE, 1, &nparent, &parent));
-  *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) && (!nten || o->cell10) &&
-                    (nparent
-                       ? parent && nparent == o->ncell && nten <= nparent && are_points(parent, nparent, nten)
-                       : !nten || nten == o->ncell));
+  *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) &&
+                    (!nten || o->cell10) &&
+                    (nparent ? parent && nparent == o->ncell && nten <= nparent &&
+                                 are_points(parent, nparent, nten)
+                             : !nten || nten == o->ncell));
 
   /* replace parts of P2 tets by the tets, corners first */
-  for (PetscInt i = 0; *ok && body && i < nparent; i++) body[parent[i]] = body[i];
-  if (nten) o->ncell = nten;
+  for (PetscInt i = 0; *ok && body && i < nparent; i++)
+    body[parent[i]] = body[i];
+  if (nten)
+    o->ncell = nten;
   for (PetscInt c = 0; *ok && c < nten; c++) {
     PetscInt *point = o->cell10 + 10 * c;
     const PetscInt middle12 = point[5]; /* the file has the edges 01 12 02 03 13 23 */
@@ -72,15 +83,18 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
     PetscCall(PetscArraymove(point + 5, point + 6, 2));
     point[7] = middle12;
     PetscCall(PetscArraycpy(o->cell + 4 * c, point, 4));
-    if (point[4] >= 0) *ok = are_points(point + 4, 6, o->npoint);
+    if (point[4] >= 0)
+      *ok = are_points(point + 4, 6, o->npoint);
   }
   *ok = (PetscBool)(*ok && are_points(o->cell, 4 * o->ncell, o->npoint));
 
   /* the cells of the body */
   for (PetscInt c = 0; *ok && c < o->ncell; c++) {
-    if (body && body[c] != which) continue;
+    if (body && body[c] != which)
+      continue;
     PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));
-    if (o->cell10) PetscCall(PetscArraymove(o->cell10 + 10 * n, o->cell10 + 10 * c, 10));
+    if (o->cell10)
+      PetscCall(PetscArraymove(o->cell10 + 10 * n, o->cell10 + 10 * c, 10));
     n++;
   }
   o->ncell = n;
@@ -94,11 +108,14 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   char name[SB_MESH_NAME], *comma, *names, *rest;
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
-  PetscInt which = -1, n = 0, nu;
+  PetscInt which = -1;
+  PetscInt n = 0;
+  PetscInt nu;
   int64_t mesh = 0;
   PetscBool ok;
 
   PetscFunctionBeginUser;
+
   /* RUN[,STEP]: a folder or its fields.h5 */
   PetscCall(PetscStrncpy(o->path, text, sizeof(o->path)));
   comma = strrchr(o->path, ',');
@@ -110,36 +127,42 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
     PetscCall(PetscStrlcat(o->path, "/fields.h5", sizeof(o->path)));
   o->file = stat(o->path, &info) ? -1 : H5Fopen(o->path, H5F_ACC_RDONLY, H5P_DEFAULT);
   PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them", option,
-             text, o->path, access(o->path, F_OK) ? "is not there" : "holds no results");
+             "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them",
+             option, text, o->path, access(o->path, F_OK) ? "is not there" : "holds no results");
   SbH5FindFrame(o->file, &frames);
-  PetscCheck(frames.n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame", option, text,
-             o->path);
-  if (frames.found[0]) o->frame = H5Gopen2(o->file, frames.found, H5P_DEFAULT);
+  PetscCheck(frames.n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame", option,
+             text, o->path);
+  if (frames.found[0])
+    o->frame = H5Gopen2(o->file, frames.found, H5P_DEFAULT);
   PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s %s: %s has no frame of step %lld; its last one is of step %lld", option, text, o->path,
-             (long long)frames.wanted, (long long)frames.last);
+             "%s %s: %s has no frame of step %lld; its last one is of step %lld", option, text,
+             o->path, (long long)frames.wanted, (long long)frames.last);
 
   /* the mesh of that frame, which may be one of a re-meshing */
   SbH5GetInt(o->frame, "mesh", &mesh, &ok);
   o->mesh = SbH5OpenGroup(o->file, SbOutputMeshName((PetscInt)mesh, name));
 
-  /* number of the body of this name, or of the one that it is a copy of; the only body, if there is one */
+  /* number of the body of this name, or of the one that it is a copy of; the only body, if there is
+     one */
   if (o->mesh >= 0) {
     PetscCall(SbH5BodyNames(o->file, name, &names));
     rest = names;
     for (char *other = strsep(&rest, ","); other; other = strsep(&rest, ","), n++)
-      if (!strcmp(other, body->name) || (which < 0 && !strcmp(other, body->copy_of))) which = n;
-    if (which < 0 && n == 1) which = 0;
+      if (!strcmp(other, body->name) || (which < 0 && !strcmp(other, body->copy_of)))
+        which = n;
+    if (which < 0 && n == 1)
+      which = 0;
     PetscCall(PetscFree(names));
   }
-  PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
-             text, o->path, body->name);
+  PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'",
+             option, text, o->path, body->name);
   PetscCall(read_tets(o, which, &ok));
   PetscCall(read_all(o->frame, "displacement", H5T_IEEE_F64LE, 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_IEEE_F64LE, 3, &n, &o->v));
-  PetscCheck(ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, "
+  PetscCheck(ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF,
+             PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no complete mesh with displacements; -output_fields "
+             "displacement,velocity there, "
              "or it is damaged",
              option, text, o->path);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -157,9 +180,9 @@ static PetscErrorCode tell_velocity(SbModel m, const char *option, PetscInt b, c
     given = (PetscBool)(given || m->start[b].velocity[k] || body->velocity[k] != 0. ||
                         body->angular_velocity[k] != 0.);
   if (has && given)
-    PetscCall(SbWarning(m->comm,
-                        "%s: the velocity that options give the body is unused in this run: %s has one",
-                        option, path));
+    PetscCall(SbWarning(
+      m->comm, "%s: the velocity that options give the body is unused in this run: %s has one",
+      option, path));
   else if (!has && !given)
     PetscCall(SbWarning(m->comm, "%s: %s has no velocity, the body begins at rest", option, path));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -175,15 +198,17 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscReal *off = NULL;
 
   PetscFunctionBeginUser;
+
   // offsets of that run's edge nodes from the midpoints, at rest
-  if (o->cell10) PetscCall(PetscCalloc1(18 * (size_t)o->ncell, &off));
+  if (o->cell10)
+    PetscCall(PetscCalloc1(18 * (size_t)o->ncell, &off));
   for (PetscInt i = 0; o->cell10 && i < 6 * o->ncell; i++) {
     const PetscInt *point = o->cell10 + 10 * (i / 6);
     const int *e = SbTetEdge[i % 6];
 
     for (int k = 0; k < 3 && point[4] >= 0; k++)
-      off[3 * i + k] =
-        o->x[3 * point[4 + i % 6] + k] - 0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
+      off[3 * i + k] = o->x[3 * point[4 + i % 6] + k] -
+                       0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
   }
   PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, off, &locator));
   PetscCall(VecGetArray(run->U, &u));
@@ -192,9 +217,11 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
     PetscReal L[4], Q[SB_CELL_NODES];
     const PetscReal *weight = L;
     const PetscInt *point;
-    PetscInt cell, n = 4;
+    PetscInt cell;
+    PetscInt n = 4;
 
-    if (s->node_body[i] != b) continue;
+    if (s->node_body[i] != b)
+      continue;
     far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, L));
     point = o->cell + 4 * cell;
     if (o->cell10 && o->cell10[10 * cell + 4] >= 0) {
@@ -205,12 +232,15 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
     }
     for (int k = 0; k < 3; k++) {
       u[3 * i + k] = 0.;
-      if (o->v) v[3 * i + k] = 0.;
+      if (o->v)
+        v[3 * i + k] = 0.;
       for (PetscInt a = 0; a < n; a++) {
         u[3 * i + k] += weight[a] * o->u[3 * point[a] + k];
-        if (o->v) v[3 * i + k] += weight[a] * o->v[3 * point[a] + k];
+        if (o->v)
+          v[3 * i + k] += weight[a] * o->v[3 * point[a] + k];
       }
-      if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
+      if (s->fixed[i] & (1 << k))
+        v[3 * i + k] = 0.;
     }
   }
   PetscCall(VecRestoreArray(run->U, &u));
@@ -219,47 +249,56 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(PetscFree(off));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
   if (far > OUTSIDE * SbBoxDiagonal(run->model->body[b].bbox))
-    PetscCall(SbWarning(run->model->comm,
-                        "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
-                        "nearest place: is it the same body, at the same place?",
-                        option, far, o->path));
+    PetscCall(
+      SbWarning(run->model->comm,
+                "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
+                "nearest place: is it the same body, at the same place?",
+                option, far, o->path));
   PetscCall(tell_velocity(run->model, option, b, o->path, (PetscBool)(o->v != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  The row of each owned node in a checkpoint with n nodes of the same meshes and elements, as an order.
-  Supports of dg may differ: each of this run's takes the row of its face's node. ok: n agrees. Collective.
+  The row of each owned node in a checkpoint with n nodes of the same meshes and elements, as an
+  order. Supports of dg may differ: each of this run's takes the row of its face's node. ok: n
+  agrees. Collective.
 */
 static PetscErrorCode order_of_file(SbRun run, PetscInt n, SbOrder *order, PetscBool *ok)
 {
   const SbOutput out = (SbOutput)run->output;
   const SbSpace s = run->model->space;
-  const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell, edge = support + 4 * s->mesh->Ncell;
-  PetscInt nsupport = 0, *number, *row;
+  const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell;
+  const PetscInt edge = support + 4 * s->mesh->Ncell;
+  PetscInt nsupport = 0;
+  PetscInt *number, *row;
   PetscBool weak = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < run->model->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
+  for (PetscInt b = 0; b < run->model->nbody; b++)
+    weak = (PetscBool)(weak || s->element[b]->weak);
   PetscCall(PetscMalloc2(out->node.n, &number, s->nnode_owned, &row));
-  for (PetscInt i = 0; i < out->node.n; i++) number[i] = out->node.start + i;
+  for (PetscInt i = 0; i < out->node.n; i++)
+    number[i] = out->node.start + i;
   PetscCall(SbForestBroadcast(out->node.sf, 1, MPIU_INT, number, row));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     nsupport += s->node_orig[i] >= support && s->node_orig[i] < edge;
-    if (s->node_orig[i] >= edge) row[i] += n - out->node.N;
+    if (s->node_orig[i] >= edge)
+      row[i] += n - out->node.N;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nsupport, 1, MPIU_INT, MPI_SUM, out->comm));
   for (PetscInt i = 0; n != out->node.N && s->dirichlet_node && i < 4 * s->mesh->ncell; i++)
     if (s->dirichlet_node[i] >= 0 && s->dirichlet_node[i] < s->nnode_owned)
       row[s->dirichlet_node[i]] = row[s->cell_node[i]];
   *ok = (PetscBool)(*ok && (n == out->node.N || (weak && n >= out->node.N - nsupport)));
-  if (*ok) PetscCall(SbOrderCreate(out->comm, n, s->nnode_owned, row, order));
+  if (*ok)
+    PetscCall(SbOrderCreate(out->comm, n, s->nnode_owned, row, order));
   PetscCall(PetscFree2(number, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For
-   another checkpoint frame[] names the frame of its step in its run's folder. Collective. */
+/* The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and
+   elements. For another checkpoint frame[] names the frame of its step in its run's folder.
+   Collective. */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       size_t size, char frame[], PetscBool *is)
 {
@@ -268,19 +307,25 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   const Vec target[2] = {run->U, run->V};
   struct stat info;
   SbH5 h;
-  int64_t hash = 0, step = 0;
-  PetscBool ok = PETSC_TRUE, same;
+  int64_t hash = 0;
+  int64_t step = 0;
+  PetscBool ok = PETSC_TRUE;
+  PetscBool same;
   SbOrder order;
   char *options = NULL;
 
   PetscFunctionBeginUser;
   *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
-  if (*is) PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
-  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*is)
+    PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
+  if (!*is)
+    PetscFunctionReturn(PETSC_SUCCESS);
   *is = (PetscBool)(H5Lexists(h.file, "u", H5P_DEFAULT) > 0);
-  if (!*is) PetscCall(SbH5Close(&h));
-  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*is)
+    PetscCall(SbH5Close(&h));
+  if (!*is)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* compare meshes and elements */
   PetscCall(SbOutputOrder(run, out));
@@ -292,24 +337,27 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     char line[3 * SB_NAME_MAX];
     const SbBody *body = &run->model->body[i];
 
-    SbFormat(sizeof(line), line, "-body_%s_element %s\n", body->copy_of[0] ? body->copy_of : body->name,
-             body->element);
+    SbFormat(sizeof(line), line, "-body_%s_element %s\n",
+             body->copy_of[0] ? body->copy_of : body->name, body->element);
     same = (PetscBool)(strstr(options, line) != NULL);
   }
   PetscCall(PetscFree(options));
   if (!same) {
     const char *name = strrchr(path, '/');
 
-    SbFormat(size, frame, "%.*s,%lld", name ? (int)(name - path) : 1, name ? path : ".", (long long)step);
-    PetscCall(SbWarning(out->comm,
-                        "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place",
-                        option, path, frame));
+    SbFormat(size, frame, "%.*s,%lld", name ? (int)(name - path) : 1, name ? path : ".",
+             (long long)step);
+    PetscCall(
+      SbWarning(out->comm,
+                "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place",
+                option, path, frame));
     PetscCall(SbH5Close(&h));
     *is = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* displacement and velocity of its nodes; supports, behind the faces' nodes there, may be other ones */
+  /* displacement and velocity of its nodes; supports, behind the faces' nodes there, may be other
+     ones */
   PetscCall(order_of_file(run, (PetscInt)SbH5Rows(h.file, "u", NULL), &order, &ok));
   if (ok) {
     PetscReal *slice, *owned;
@@ -319,23 +367,28 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
       const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);
       PetscScalar *x;
 
-      if (k) PetscCall(tell_velocity(run->model, option, b, path, has));
-      if (!has) continue;
+      if (k)
+        PetscCall(tell_velocity(run->model, option, b, path, has));
+      if (!has)
+        continue;
       PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &order, 3, slice, &ok));
-      if (!ok) break;
+      if (!ok)
+        break;
       PetscCall(SbForestBroadcast(order.sf, 3, MPIU_REAL, slice, owned));
       PetscCall(VecGetArray(target[k], &x));
       for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-        if (s->node_body[i / 3] == b) x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];
+        if (s->node_body[i / 3] == b)
+          x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];
       PetscCall(VecRestoreArray(target[k], &x));
     }
     PetscCall(PetscFree2(slice, owned));
     PetscCall(SbOrderDestroy(&order));
   }
   PetscCall(SbH5Close(&h));
-  PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
-             "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well",
-             option, path);
+  PetscCheck(
+    ok, out->comm, PETSC_ERR_USER_INPUT,
+    "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well",
+    option, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -343,33 +396,43 @@ PetscErrorCode SbOutputLoadState(SbRun run)
 {
   const SbModel m = run->model;
   const SbOutput out = (SbOutput)run->output;
-  PetscBool any = PETSC_FALSE, checkpoint;
+  PetscBool any = PETSC_FALSE;
+  PetscBool checkpoint;
 
   PetscFunctionBeginUser;
-  if (out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS); /* a restart has its own state */
+  if (out->restart[0])
+    PetscFunctionReturn(PETSC_SUCCESS); /* a restart has its own state */
   for (PetscInt b = 0; b < m->nbody; b++) {
     Other o = {.file = -1, .frame = -1, .mesh = -1};
     SbCaughtError caught = {0, ""};
     char option[2 * SB_NAME_MAX], frame[PETSC_MAX_PATH_LEN + 24];
 
-    if (!m->start[b].state[0]) continue;
+    if (!m->start[b].state[0])
+      continue;
     any = PETSC_TRUE;
     PetscCall(PetscSNPrintf(option, sizeof(option), "-body_%s_state", m->body[b].name));
     PetscCall(PetscStrncpy(frame, m->start[b].state, sizeof(frame)));
-    PetscCall(take_checkpoint(run, option, b, m->start[b].state, sizeof(frame), frame, &checkpoint));
-    if (checkpoint) continue;
+    PetscCall(
+      take_checkpoint(run, option, b, m->start[b].state, sizeof(frame), frame, &checkpoint));
+    if (checkpoint)
+      continue;
     SB_CATCH(&caught, read_other(option, frame, &m->body[b], &o));
-    if (!caught.code) PetscCall(take_over(run, option, b, &o));
+    if (!caught.code)
+      PetscCall(take_over(run, option, b, &o));
     PetscCall(PetscFree(o.x));
     PetscCall(PetscFree(o.u));
     PetscCall(PetscFree(o.v));
     PetscCall(PetscFree(o.cell));
     PetscCall(PetscFree(o.cell10));
-    if (o.mesh >= 0) (void)H5Gclose(o.mesh);
-    if (o.frame >= 0) (void)H5Gclose(o.frame);
-    if (o.file >= 0) (void)H5Fclose(o.file);
+    if (o.mesh >= 0)
+      (void)H5Gclose(o.mesh);
+    if (o.frame >= 0)
+      (void)H5Gclose(o.frame);
+    if (o.file >= 0)
+      (void)H5Fclose(o.file);
     PetscCall(SbCaughtRaise(m->comm, &caught));
   }
-  if (any) PetscCall(SbModelPrescribe(m, 0., run->U));
+  if (any)
+    PetscCall(SbModelPrescribe(m, 0., run->U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

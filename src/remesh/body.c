@@ -1,24 +1,26 @@
 /*
   body.c - a new mesh of a body in its current state, on rank 0.
 
-  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its
-  interior is tetrahedralised again, in the current or the reference configuration. A new vertex y in the
-  current configuration lies in a tet of the old mesh with barycentric coordinates w, y = sum w_a x_a; its
-  rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same, and
-  the old motion from X to x is interpolated at other points.
+  The hull is kept: all triangles of the surface and of interfaces between regions, with their
+  vertices. Its interior is tetrahedralised again, in the current or the reference configuration. A
+  new vertex y in the current configuration lies in a tet of the old mesh with barycentric
+  coordinates w, y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the same material
+  point. So the volume at rest is the same, and the old motion from X to x is interpolated at other
+  points.
 
-  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current
-  configuration. Inverted and flat tets are repaired by moving their inner vertices through the material
-  towards the mean of their neighbours: of a few positions on the way the one with the best worst tet is
-  chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and
-  bulges now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with
-  all tets around, and the new vertex moves inwards.
+  The motion is not linear between these points, so a new tet may be inverted at rest but not in the
+  current configuration. Inverted and flat tets are repaired by moving their inner vertices through
+  the material towards the mean of their neighbours: of a few positions on the way the one with the
+  best worst tet is chosen, until all are good or nothing helps. A tet with four vertices on a face
+  that was plane at rest and bulges now has no volume at rest, and no inner vertex: one of its inner
+  edges is split at the middle, with all tets around, and the new vertex moves inwards.
 
-  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The
-  flat triangles enclose the tetrahedralised volume. The old tets define a map from it, at rest, to the body:
-  from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New
-  vertices, and nodes at the middles of new edges, are mapped, so that inner edges follow the curvature of the
-  surface. A new tet may still have a negative Jacobian, and is repaired like a flat one.
+  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the
+  same. The flat triangles enclose the tetrahedralised volume. The old tets define a map from it, at
+  rest, to the body: from the point with barycentric coordinates w in a straight tet to that with l
+  = w in the curved tet. New vertices, and nodes at the middles of new edges, are mapped, so that
+  inner edges follow the curvature of the surface. A new tet may still have a negative Jacobian, and
+  is repaired like a flat one.
 */
 #include "remesh_impl.h"
 
@@ -33,7 +35,8 @@ typedef struct {
   const SbOldMesh *old;
   SbLocator flat; /* among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
-  SbKey *curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
+  SbKey *
+    curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
 } Material;
 
 /* Whether face f of tet c belongs to the hull; each triangle once. */
@@ -50,7 +53,8 @@ static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const
 {
   for (int k = 0; k < 3; k++) {
     value[k] = 0;
-    for (int a = 0; a < 4; a++) value[k] += w[a] * at[3 * old->cell[4 * cell + a] + k];
+    for (int a = 0; a < 4; a++)
+      value[k] += w[a] * at[3 * old->cell[4 * cell + a] + k];
   }
 }
 
@@ -59,7 +63,8 @@ static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], 
 {
   mix(old, old->X, cell, w, X);
   for (int i = 0; old->edge_off && i < 18; i++)
-    X[i % 3] += 4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
+    X[i % 3] +=
+      4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
 }
 
 /* Current position of a vertex from its rest position, by the old mesh. */
@@ -70,34 +75,44 @@ static void follow(const Material *at, SbNewMesh *m, PetscInt v)
 
   (void)SbLocatorFind(at->old->rest, m->X + 3 * v, &cell, w);
   mix(at->old, at->old->x, cell, w, m->x + 3 * v);
-  if (m->flat) mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
+  if (m->flat)
+    mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
 }
 
-/* Sets the edge nodes of a new tet, or only those at edges of one of its vertices, unless that is -1. */
+/* Sets the edge nodes of a new tet, or only those at edges of one of its vertices, unless that is
+   -1. */
 static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
 {
   for (int e = 0; m->edge_off && e < 6; e++) {
-    const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]], b = m->cell[4 * c + SbTetEdge[e][1]];
+    const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]];
+    const PetscInt b = m->cell[4 * c + SbTetEdge[e][1]];
     const PetscInt i = SbKeysFind(at->ncurved, at->curved, SbKeyOfPair(a, b));
-    PetscReal *off = m->edge_off + 18 * (size_t)c + 3 * e, middle[3], X[3], w[4];
+    PetscReal *off = m->edge_off + 18 * (size_t)c + 3 * e;
+    PetscReal middle[3], X[3], w[4];
     PetscInt cell;
 
-    if (vertex >= 0 && a != vertex && b != vertex) continue;
+    if (vertex >= 0 && a != vertex && b != vertex)
+      continue;
+
     // a kept edge has its old node, others that of the map at the middle
     if (i >= 0) {
-      for (int k = 0; k < 3; k++) off[k] = at->old->edge_off[3 * (size_t)at->curved[i].slot + k];
+      for (int k = 0; k < 3; k++)
+        off[k] = at->old->edge_off[3 * (size_t)at->curved[i].slot + k];
       continue;
     }
-    for (int k = 0; k < 3; k++) middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
+    for (int k = 0; k < 3; k++)
+      middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
     (void)SbLocatorFind(at->flat, middle, &cell, w);
     mix_rest(at->old, cell, w, X);
-    for (int k = 0; k < 3; k++) off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
+    for (int k = 0; k < 3; k++)
+      off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
     if (SbDot3(off, off) <= PetscSqr(STRAIGHT) * SbDistance2(m->X + 3 * a, m->X + 3 * b))
       memset(off, 0, 3 * sizeof(*off));
   }
 }
 
-/* Rest positions of vertices created in the current configuration; their current ones by the old mesh. */
+/* Rest positions of vertices created in the current configuration; their current ones by the old
+   mesh. */
 static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
@@ -106,13 +121,16 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->X));
-  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
+  if (old->edge_off)
+    PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
   for (PetscInt v = 0; v < m->nkept; v++) {
     PetscCall(PetscArraycpy(m->X + 3 * v, old->X + 3 * m->kept[v], 3));
     PetscCall(PetscArraycpy(m->x + 3 * v, old->x + 3 * m->kept[v], 3));
-    if (m->flat) PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
+    if (m->flat)
+      PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
-  if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
+  if (!how->rest)
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
     PetscReal w[4];
@@ -124,7 +142,8 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
       mix_rest(old, cell, w, m->X + 3 * v);
     else
       PetscCall(PetscArraycpy(m->X + 3 * v, y + 3 * v, 3));
-    if (m->flat) mix(old, old->X, cell, w, m->flat + 3 * v);
+    if (m->flat)
+      mix(old, old->X, cell, w, m->flat + 3 * v);
     mix(old, old->x, cell, w, m->x + 3 * v);
   }
   PetscCall(SbLocatorDestroy(&now));
@@ -134,13 +153,15 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 /* Quality of a tet at rest; for a curved one the worse of this and its least relative Jacobian. */
 static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal shape = SbTetQuality(m->X, m->cell + 4 * cell),
-                  *off = m->edge_off ? m->edge_off + 18 * (size_t)cell : NULL;
+  const PetscReal shape = SbTetQuality(m->X, m->cell + 4 * cell);
+  const PetscReal *off = m->edge_off ? m->edge_off + 18 * (size_t)cell : NULL;
   PetscBool curved = PETSC_FALSE;
   PetscReal least;
 
-  for (int i = 0; off && i < 18; i++) curved = (PetscBool)(curved || off[i] != 0);
-  if (!curved || !(shape > 0)) return shape;
+  for (int i = 0; off && i < 18; i++)
+    curved = (PetscBool)(curved || off[i] != 0);
+  if (!curved || !(shape > 0))
+    return shape;
   least = SbTetCurvedLeast(m->X, m->cell + 4 * cell, off);
   return shape * PetscMin(1, least);
 }
@@ -148,7 +169,8 @@ static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 /* The worse of its qualities at rest and now. */
 static PetscReal worse(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal rest = shape_at_rest(m, cell), now = SbTetQuality(m->x, m->cell + 4 * cell);
+  const PetscReal rest = shape_at_rest(m, cell);
+  const PetscReal now = SbTetQuality(m->x, m->cell + 4 * cell);
 
   return PetscMin(rest, now);
 }
@@ -170,50 +192,65 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
   return worst;
 }
 
-/* Tries positions on the way to the mean of the neighbours at rest; returns whether one was better. */
+/* Tries positions on the way to the mean of the neighbours at rest; returns whether one was
+   better. */
 static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
 {
   PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
   const int nplace = m->flat ? 3 : 2;
-  PetscReal middle[3] = {0, 0, 0}, X[3], kept[3][3], best = worst_around(m, s, v), part = 1;
+  PetscReal middle[3] = {0, 0, 0};
+  PetscReal X[3], kept[3][3];
+  PetscReal best = worst_around(m, s, v);
+  PetscReal part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
   PetscBool better = PETSC_FALSE;
 
-  for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
+  for (int k = 0; k < nplace; k++)
+    memcpy(kept[k], place[k], sizeof(kept[k]));
   for (int k = 0; k < 3; k++) {
     X[k] = m->X[3 * v + k];
     for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++)
-      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
+      for (int a = 0; a < 4; a++)
+        middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
   }
   for (int i = 0; i < PLACES; i++, part /= 2) {
     PetscReal now;
 
-    for (int k = 0; k < 3; k++) m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
+    for (int k = 0; k < 3; k++)
+      m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
     follow(at, m, v);
-    for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
+    for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
+      bend(at, m, s->cells[j], v);
     now = worst_around(m, s, v);
-    if (!(now > best)) continue;
+    if (!(now > best))
+      continue;
     best = now;
     better = PETSC_TRUE;
-    for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
+    for (int k = 0; k < nplace; k++)
+      memcpy(kept[k], place[k], sizeof(kept[k]));
   }
-  for (int k = 0; k < nplace; k++) memcpy(place[k], kept[k], sizeof(kept[k]));
-  for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
+  for (int k = 0; k < nplace; k++)
+    memcpy(place[k], kept[k], sizeof(kept[k]));
+  for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
+    bend(at, m, s->cells[j], v);
   return better;
 }
 
-/* The longest edge of a tet, in the current configuration, that is not on the hull; false: there is none. */
-static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbNewMesh *m, PetscInt c,
-                            PetscInt ends[2])
+/* The longest edge of a tet, in the current configuration, that is not on the hull; false: there is
+   none. */
+static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbNewMesh *m,
+                            PetscInt c, PetscInt ends[2])
 {
   PetscReal longest = -1;
 
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < i; j++) {
-      const PetscInt p = m->cell[4 * c + i], q = m->cell[4 * c + j];
+      const PetscInt p = m->cell[4 * c + i];
+      const PetscInt q = m->cell[4 * c + j];
       const PetscReal length2 = SbDistance2(m->x + 3 * p, m->x + 3 * q);
 
-      if (length2 <= longest || SbKeysFind(3 * hull->ntri, edge, SbKeyOfPair(p, q)) >= 0) continue;
+      if (length2 <= longest || SbKeysFind(3 * hull->ntri, edge, SbKeyOfPair(p, q)) >= 0)
+        continue;
       longest = length2;
       ends[0] = p;
       ends[1] = q;
@@ -225,32 +262,41 @@ static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbN
 /* Inserts a vertex at the middle of an edge at rest; each tet around the edge is divided in two. */
 static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2], SbNewMesh *m)
 {
-  const PetscInt middle = m->nvert, ncell = m->ncell;
+  const PetscInt middle = m->nvert;
+  const PetscInt ncell = m->ncell;
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < ncell; c++) {
     int found = 0;
 
-    for (int a = 0; a < 4; a++) found += m->cell[4 * c + a] == ends[0] || m->cell[4 * c + a] == ends[1];
+    for (int a = 0; a < 4; a++)
+      found += m->cell[4 * c + a] == ends[0] || m->cell[4 * c + a] == ends[1];
     n += found == 2;
   }
   PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->X), &m->X));
   PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->x), &m->x));
   PetscCall(PetscRealloc(4 * (size_t)(ncell + n) * sizeof(*m->cell), &m->cell));
-  if (m->flat) PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->flat), &m->flat));
-  if (m->edge_off) PetscCall(PetscRealloc(18 * (size_t)(ncell + n) * sizeof(*m->edge_off), &m->edge_off));
-  for (int k = 0; k < 3; k++) m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
+  if (m->flat)
+    PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->flat), &m->flat));
+  if (m->edge_off)
+    PetscCall(PetscRealloc(18 * (size_t)(ncell + n) * sizeof(*m->edge_off), &m->edge_off));
+  for (int k = 0; k < 3; k++)
+    m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
   follow(at_old, m, middle);
   m->nvert++;
   for (PetscInt c = 0; c < ncell; c++) {
-    PetscInt *v = m->cell + 4 * c, at[2] = {-1, -1};
+    PetscInt *v = m->cell + 4 * c;
+    PetscInt at[2] = {-1, -1};
 
     for (int a = 0; a < 4; a++) {
-      if (v[a] == ends[0]) at[0] = a;
-      if (v[a] == ends[1]) at[1] = a;
+      if (v[a] == ends[0])
+        at[0] = a;
+      if (v[a] == ends[1])
+        at[1] = a;
     }
-    if (at[0] < 0 || at[1] < 0) continue;
+    if (at[0] < 0 || at[1] < 0)
+      continue;
     PetscCall(PetscArraycpy(m->cell + 4 * m->ncell, v, 4));
     v[at[1]] = middle;
     m->cell[4 * m->ncell++ + at[0]] = middle;
@@ -260,7 +306,8 @@ static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing helps. */
+/* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing
+   helps. */
 static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
@@ -269,6 +316,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   SbKey *edge;
 
   PetscFunctionBeginUser;
+
   // edges of the hull, sorted: they are never split
   PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &edge));
   for (PetscInt i = 0; i < 3 * hull->ntri; i++)
@@ -276,26 +324,31 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   SbKeysSort(3 * hull->ntri, edge);
   for (int round = 0; round < ROUNDS && split && m->ncell <= most; round++) {
     const PetscInt ncell = m->ncell;
-    PetscBool *moved, better = PETSC_TRUE;
+    PetscBool *moved;
+    PetscBool better = PETSC_TRUE;
     Stars stars;
 
     // move inner vertices until all tets are good enough, or nothing helps
     PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
-    for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
+    for (PetscInt i = 0; i < 4 * m->ncell; i++)
+      stars.cells[i] /= 4;
     PetscCall(PetscCalloc1(m->nvert, &moved));
     for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
       better = PETSC_FALSE;
       for (PetscInt c = 0; c < m->ncell; c++) {
-        if (worse(m, c) >= how->quality) continue;
+        if (worse(m, c) >= how->quality)
+          continue;
         for (int a = 0; a < 4; a++) {
           const PetscInt v = m->cell[4 * c + a];
 
-          if (v < m->nkept || !move_vertex(at, &stars, v, m)) continue;
+          if (v < m->nkept || !move_vertex(at, &stars, v, m))
+            continue;
           moved[v] = better = PETSC_TRUE;
         }
       }
     }
-    for (PetscInt v = 0; v < m->nvert; v++) m->nmoved += moved[v];
+    for (PetscInt v = 0; v < m->nvert; v++)
+      m->nmoved += moved[v];
     PetscCall(PetscFree(moved));
     PetscCall(PetscFree(stars.start));
     PetscCall(PetscFree(stars.cells));
@@ -303,7 +356,8 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
     for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS && m->ncell <= most; c++) {
       PetscInt ends[2] = {-1, -1};
 
-      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends)) continue;
+      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends))
+        continue;
       PetscCall(split_edge(at, ends, m));
       split = PETSC_TRUE;
     }
@@ -315,10 +369,13 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
 /* Error if a bad tet remains; inverted tets now are allowed if the old mesh has some. */
 static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
-  PetscInt at_rest = 0, now = 0, before = 0;
+  PetscInt at_rest = 0;
+  PetscInt now = 0;
+  PetscInt before = 0;
   PetscReal worst = 1;
 
   PetscFunctionBeginUser;
+
   // quality of the new tets, at rest and now
   m->quality = 1;
   for (PetscInt c = 0; c < m->ncell; c++) {
@@ -328,6 +385,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     now += !(quality > 0);
     m->quality = PetscMin(m->quality, quality);
   }
+
   // quality of the old tets now
   for (PetscInt c = 0; c < old->ncell; c++) {
     const PetscReal quality = SbTetQuality(old->x, old->cell + 4 * c);
@@ -335,48 +393,61 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
+
   // error if worse than before, or not better where required
-  PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%" PetscInt_FMT " of %" PetscInt_FMT
-             " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "
-             "old tetrahedron to the next%s",
-             at_rest, m->ncell,
-             m->edge_off ? ", or the surface bends too much from one triangle to the next" : "");
+  PetscCheck(
+    !at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%" PetscInt_FMT " of %" PetscInt_FMT
+    " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "
+    "old tetrahedron to the next%s",
+    at_rest, m->ncell,
+    m->edge_off ? ", or the surface bends too much from one triangle to the next" : "");
   PetscCheck(now <= before, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inverted, %" PetscInt_FMT
-             " old ones are",
+             "%" PetscInt_FMT " of %" PetscInt_FMT
+             " new tetrahedra would be inverted, %" PetscInt_FMT " old ones are",
              now, m->ncell, before);
-  PetscCheck(!how->better || m->quality > worst, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "a new mesh would be no better: its worst tetrahedron has the quality %.3g, now it is %.3g",
-             (double)m->quality, (double)worst);
+  PetscCheck(
+    !how->better || m->quality > worst, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "a new mesh would be no better: its worst tetrahedron has the quality %.3g, now it is %.3g",
+    (double)m->quality, (double)worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Re-meshing of a body. */
-static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
-                             Material *at, SbNewMesh *m)
+static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how,
+                             SbSurface *hull, Material *at, SbNewMesh *m)
 {
   SbTets tets = {0};
-  PetscInt *component, nregion, ntri = 0, n = 0, nkept;
+  PetscInt *component, nregion;
+  PetscInt ntri = 0;
+  PetscInt n = 0;
+  PetscInt nkept;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(old->ncell, &component));
+
   // components: tets of one region that are connected by faces
-  for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
+  for (PetscInt c = 0; c < old->ncell; c++)
+    component[c] = c;
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
     const PetscInt other = old->faces.neighbour[s];
 
-    if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
+    if (other >= 0 && old->region[other] == old->region[s / 4])
+      (void)SbUnionJoin(component, other, s / 4);
   }
   nregion = SbUnionLabel(old->ncell, component);
+
   // the hull: outer surface and interfaces between regions, in the configuration to be filled
-  for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
+  for (PetscInt s = 0; s < 4 * old->ncell; s++)
+    ntri += in_hull(old, component, s / 4, s % 4);
   PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
     const PetscInt other = old->faces.neighbour[s];
 
-    if (!in_hull(old, component, s / 4, s % 4)) continue;
-    for (int k = 0; k < 3; k++) hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
+    if (!in_hull(old, component, s / 4, s % 4))
+      continue;
+    for (int k = 0; k < 3; k++)
+      hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
     hull->side[2 * n] = other < 0 ? -1 : component[other];
     hull->side[2 * n + 1] = component[s / 4];
     hull->number[n] = n + 1;
@@ -395,6 +466,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   m->ncell = tets.ncell;
   m->x = tets.x;
   m->cell = tets.cell;
+
   // locator among straight tets; curved edges between kept vertices
   if (old->edge_off) {
     PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
@@ -403,18 +475,24 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
       const PetscReal *off = old->edge_off + 3 * (size_t)i;
       PetscInt v[2];
 
-      if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
+      if (off[0] == 0 && off[1] == 0 && off[2] == 0)
+        continue;
       for (int k = 0; k < 2; k++)
-        PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
-      if (v[0] >= 0 && v[1] >= 0) at->curved[at->ncurved++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
+        PetscCall(
+          PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
+      if (v[0] >= 0 && v[1] >= 0)
+        at->curved[at->ncurved++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
     }
     SbKeysSort(at->ncurved, at->curved);
   }
   PetscCall(find_material(at, how, m));
-  if (m->flat) PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
-  for (PetscInt c = 0; c < m->ncell; c++) bend(at, m, c, -1);
+  if (m->flat)
+    PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
+  for (PetscInt c = 0; c < m->ncell; c++)
+    bend(at, m, c, -1);
   PetscCall(repair_tets(at, how, hull, m));
   PetscCall(check_quality(old, how, m));
+
   // the old tet that contains the centroid of each new one
   PetscCall(PetscMalloc1(m->ncell, &m->within));
   for (PetscInt c = 0; c < m->ncell; c++) {
@@ -422,14 +500,16 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 
     for (int k = 0; k < 3; k++) {
       middle[k] = 0;
-      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
+      for (int a = 0; a < 4; a++)
+        middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
     }
     (void)SbLocatorFind(at->old->rest, middle, &m->within[c], w);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
+PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how,
+                            SbNewMesh *m)
 {
   SbSurface hull = {0};
   Material at = {.old = old};
@@ -441,7 +521,8 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
   PetscCall(SbSurfaceDestroy(&hull));
   PetscCall(SbLocatorDestroy(&at.flat));
   PetscCall(PetscFree(at.curved));
-  if (ierr) PetscCall(SbNewMeshDestroy(m));
+  if (ierr)
+    PetscCall(SbNewMeshDestroy(m));
   PetscFunctionReturn(ierr);
 }
 

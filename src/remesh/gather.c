@@ -1,9 +1,10 @@
 /*
   Gathers a scene and its state on rank 0, scatters vectors back, hands history variables over.
 
-  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their
-  original numbers. Each cell is sent with its vertices, its sets, and the values of the vectors at its nodes:
-  the same for every element; a node of several cells is sent with each of them.
+  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by
+  their original numbers. Each cell is sent with its vertices, its sets, and the values of the
+  vectors at its nodes: the same for every element; a node of several cells is sent with each of
+  them.
 
   History variables of effects (active contact, friction) go to the new model like a checkpoint with
   renumbered nodes. Records of effects that do not say so (SbEffect.by_node) name no nodes.
@@ -16,15 +17,19 @@ static PetscInt vectors_of(SbRun run, Vec vec[3])
   PetscInt n = 0;
 
   vec[n++] = run->U;
-  if (run->V) vec[n++] = run->V;
-  if (run->A) vec[n++] = run->A;
+  if (run->V)
+    vec[n++] = run->V;
+  if (run->A)
+    vec[n++] = run->A;
   return n;
 }
 
 static PetscInt node_at(SbSpace s, PetscInt cell, PetscInt k)
 {
-  if (k < 4) return s->cell_node[4 * cell + k];
-  if (k < SB_EDGES) return s->dirichlet_node ? s->dirichlet_node[4 * cell + k - 4] : -1;
+  if (k < 4)
+    return s->cell_node[4 * cell + k];
+  if (k < SB_EDGES)
+    return s->dirichlet_node ? s->dirichlet_node[4 * cell + k - 4] : -1;
   return s->edge_node[6 * cell + k - SB_EDGES];
 }
 
@@ -33,7 +38,8 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   const SbModel m = run->model;
   const SbMesh mesh = m->mesh;
   const SbSpace s = m->space;
-  PetscMPIInt rank, supports = s->dirichlet_node ? 1 : 0;
+  PetscMPIInt rank;
+  PetscMPIInt supports = s->dirichlet_node ? 1 : 0;
   PetscReal(*centre)[4], *now;
   Vec vec[3];
   PetscSF sf;
@@ -57,15 +63,20 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     g->vert0[b + 1] = g->vert0[b] + m->body[b].nvert;
     g->cell0[b + 1] = g->cell0[b] + m->body[b].ncell;
   }
+
   // masses of the bodies
   PetscCall(PetscMalloc1(m->nbody, &centre));
   PetscCall(SbModelCentres(m, NULL, centre));
-  for (PetscInt b = 0; b < m->nbody; b++) g->mass[b] = centre[b][3];
+  for (PetscInt b = 0; b < m->nbody; b++)
+    g->mass[b] = centre[b][3];
   PetscCall(PetscFree(centre));
+
   // vertices and their sets to rank 0
   if (!rank)
-    PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
-  PetscCall(SbForestCreate(mesh->comm, rank ? 0 : mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+    PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert,
+                           &g->vert_set));
+  PetscCall(
+    SbForestCreate(mesh->comm, rank ? 0 : mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
   PetscCall(SbCornerPositions(s, run->U, now));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
@@ -73,11 +84,13 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(PetscFree(now));
   PetscCall(SbForestReduce(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(SbForestCreate(m->comm, rank ? 0 : mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
+  PetscCall(
+    SbForestCreate(m->comm, rank ? 0 : mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
+
   // cells with their vertices, materials and sets
   if (!rank)
-    PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
-                           &g->cell_set));
+    PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material,
+                           5 * (size_t)g->ncell, &g->cell_set));
   PetscCall(PetscMalloc2(4 * (size_t)n, &cell, 5 * (size_t)n, &set));
   for (PetscInt c = 0; c < n; c++) {
     for (int a = 0; a < 4; a++) {
@@ -90,14 +103,18 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(SbForestReduce(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
   PetscCall(SbForestReduce(sf, 5, MPI_UINT64_T, set, g->cell_set));
   PetscCall(PetscFree2(cell, set));
+
   // offsets of the nodes of curved edges
   if (mesh->edge_off) {
-    if (!rank) PetscCall(PetscMalloc1(18 * (size_t)g->ncell, &g->edge_off));
+    if (!rank)
+      PetscCall(PetscMalloc1(18 * (size_t)g->ncell, &g->edge_off));
     PetscCall(SbForestReduce(sf, 18, MPIU_REAL, mesh->edge_off, g->edge_off));
   }
+
   // the values of the vectors at the nodes of each cell
   each = g->width * g->nfield * 3;
-  if (!rank) PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
+  if (!rank)
+    PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
   PetscCall(PetscMalloc1((size_t)each * (size_t)n, &value));
   for (PetscInt f = 0; f < g->nfield; f++) {
     PetscCall(SbSpaceGetLocalRead(s, vec[f], &array));
@@ -150,7 +167,8 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
       const PetscInt node = node_at(s, i / g->width, i % g->width);
       const PetscReal *from = value + (g->nfield * i + f) * 3;
 
-      for (int k = 0; k < 3 && node >= 0 && from[0] < PETSC_MAX_REAL; k++) array[3 * node + k] = from[k];
+      for (int k = 0; k < 3 && node >= 0 && from[0] < PETSC_MAX_REAL; k++)
+        array[3 * node + k] = from[k];
     }
     PetscCall(SbSpaceRestoreLocalWrite(s, vec[f], &array));
   }
@@ -160,7 +178,8 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
 
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
 {
-  const SbModel a = from->model, b = to->model;
+  const SbModel a = from->model;
+  const SbModel b = to->model;
   const PetscReal *u;
 
   PetscFunctionBeginUser;
@@ -170,12 +189,16 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     PetscReal *records, *own;
     PetscInt n, nown, total;
 
-    if (!e->ops.save) continue;
+    if (!e->ops.save)
+      continue;
+
     // gather the records of all ranks on each rank
     SbEffectCall(e, save, a->space, &nown, &own);
-    PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
+    PetscCall(
+      SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
     n = e->nstate ? total / e->nstate : 0;
     PetscCall(PetscFree(own));
+
     // renumber the nodes that they begin with; drop those of removed nodes
     if (e->by_node) {
       total = n;
@@ -185,7 +208,8 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
         PetscInt place;
 
         PetscCall(PetscFindInt((PetscInt)record[0], renamed->n, renamed->from, &place));
-        if (place < 0) continue;
+        if (place < 0)
+          continue;
         record[0] = (PetscReal)renamed->to[place];
         PetscCall(PetscArraymove(records + e->nstate * n, record, e->nstate));
         n++;

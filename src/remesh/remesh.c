@@ -1,23 +1,23 @@
 /*
-  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and
-  the run continues.
+  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given
+  times, and the run continues.
 
-  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered
-  on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the scene is set up
-  again from its options with these meshes in memory, and the state is transferred: vectors, history variables
-  of effects, totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid
-  motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is
-  remesh_loss in the energy balance.
+  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is
+  gathered on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the
+  scene is set up again from its options with these meshes in memory, and the state is transferred:
+  vectors, history variables of effects, totals, output, ledger. Scaled densities conserve mass
+  (SbMemoryMesh.mass), a rigid motion added to the velocities conserves momenta (check.c). The
+  change of kinetic and strain energy is remesh_loss in the energy balance.
 
-  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its
-  quality has halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds after a mesh that is
-  hardly better: no body is re-meshed in every step.
+  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is
+  when its quality has halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds
+  after a mesh that is hardly better: no body is re-meshed in every step.
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
 #include "sblog.h"
 
-#define AGAIN 0.5          /* factor on the quality reached: below that a body may be re-meshed again */
+#define AGAIN 0.5 /* factor on the quality reached: below that a body may be re-meshed again */
 #define QUALITY_LEAST 1e-3 /* quality of new tets at rest and now below which vertices are moved */
 
 struct _p_SbRemesh {
@@ -44,28 +44,34 @@ struct _p_SbRemesh {
 
 const SbOption SbRemeshRows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "a body is re-meshed when the radius ratio 3 r/R (inscribed and circumscribed sphere) of a tet falls "
+   "a body is re-meshed when the radius ratio 3 r/R (inscribed and circumscribed sphere) of a tet "
+   "falls "
    "below this (1: regular, 0: flat, negative: inverted); 0: off"},
   {"remesh_times", SB_OPTION_NAMES, 1, "s", "", "",
    "times at which bodies are re-meshed, separated by commas"},
   {"remesh_failed", SB_OPTION_BOOL, 1, "", "false", "",
-   "when a step fails and halving does not help: re-mesh the body with the worst tet and repeat the step"},
+   "when a step fails and halving does not help: re-mesh the body with the worst tet and repeat "
+   "the step"},
   {"remesh_bodies", SB_OPTION_NAMES, 1, "", "", "", "bodies that may be re-meshed; empty: all"},
   {"remesh_from", SB_OPTION_CHOICE, 1, "", "deformed", "deformed|rest",
    "configuration that is filled with new tets: the current one, or the reference configuration"},
   {"remesh_size", SB_OPTION_REAL, 1, "", "1", "[0.1, 10]",
-   "edge length of new tets inside a body, relative to the mean edge of its surface, whose triangles are "
+   "edge length of new tets inside a body, relative to the mean edge of its surface, whose "
+   "triangles are "
    "kept"},
   {0},
 };
 const SbOption SbRemeshBodyRows[] = {
-  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "value for this body in place of -remesh_quality"},
+  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)",
+   "value for this body in place of -remesh_quality"},
   {0},
 };
 
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
-  PetscBool named = PETSC_FALSE, any = PETSC_FALSE, given;
+  PetscBool named = PETSC_FALSE;
+  PetscBool any = PETSC_FALSE;
+  PetscBool given;
   PetscInt n;
   SbScope own;
   SbRemesh r;
@@ -74,6 +80,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
 
   PetscFunctionBeginUser;
+
   // whether the scenario asks for re-meshing, by any option but the settings
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
     PetscCall(SbOptionGiven(&SbRunScope, keys[k], &given));
@@ -88,27 +95,37 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   *remesh = r;
   r->nbody = m->nbody;
   r->tried = -1;
-  PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
-                         m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
+  PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody,
+                         &r->bound, m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
+
   // times at which supports come and go after the start
   PetscCall(PetscMalloc1(2 * m->neffect, &r->change));
   for (PetscInt e = 0; e < m->neffect; e++) {
     const SbEffect effect = m->effect[e];
 
-    if (!effect->ops.prescribe) continue;
-    if (effect->from > 0.) r->change[r->nchange++] = effect->from;
-    if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
+    if (!effect->ops.prescribe)
+      continue;
+    if (effect->from > 0.)
+      r->change[r->nchange++] = effect->from;
+    if (effect->until > 0. && effect->until < PETSC_MAX_REAL)
+      r->change[r->nchange++] = effect->until;
   }
-  if (!named && !r->nchange) PetscCall(SbRemeshDestroy(remesh));
-  if (*remesh) PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
-  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!named && !r->nchange)
+    PetscCall(SbRemeshDestroy(remesh));
+  if (*remesh)
+    PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
+  if (!named)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   // the named bodies; all if none is named
   PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &words));
-  for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
+  for (PetscInt b = 0; b < m->nbody; b++)
+    r->named[b] = (PetscBool)!n;
   for (PetscInt i = 0; i < n; i++) {
     PetscInt b = 0;
 
-    while (b < m->nbody && strcmp(words[i], m->body[b].name)) b++;
+    while (b < m->nbody && strcmp(words[i], m->body[b].name))
+      b++;
     if (b < m->nbody)
       r->named[b] = PETSC_TRUE;
     else
@@ -117,16 +134,19 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCall(PetscFree(words));
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
+
   // their quality bounds
   PetscCall(SbOptionReal(&SbRunScope, "remesh_quality", &all));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    if (!r->named[b]) continue;
+    if (!r->named[b])
+      continue;
     r->asked[b] = all;
     SbScopeSet(&own, "body", "", m->body[b].name);
     PetscCall(SbOptionReal(&own, "remesh_quality", &r->asked[b]));
     r->bound[b] = r->asked[b];
     any = (PetscBool)(any || r->asked[b] > 0.);
   }
+
   // times of re-meshing
   PetscCall(SbOptionNames(&SbRunScope, "remesh_times", &r->ntime, &words));
   PetscCall(PetscMalloc1(r->ntime, &r->time));
@@ -139,14 +159,16 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   }
   PetscCall(PetscFree(words));
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them", wrong);
+             "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them",
+             wrong);
   PetscCall(SbOptionBool(&SbRunScope, "remesh_failed", &r->failed));
   PetscCall(SbOptionSecond(&SbRunScope, "remesh_from", &r->how.rest));
   PetscCall(SbOptionReal(&SbRunScope, "remesh_size", &r->how.size));
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;
   r->meshes = (PetscBool)(any || r->ntime || r->failed);
-  if (!r->meshes && !r->nchange) PetscCall(SbRemeshDestroy(remesh));
+  if (!r->meshes && !r->nchange)
+    PetscCall(SbRemeshDestroy(remesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,7 +183,8 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
   SbRemesh r = *remesh;
 
   PetscFunctionBeginUser;
-  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!r)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree7(r->named, r->due, r->asked, r->bound, r->worst, r->from, r->rest));
   PetscCall(PetscFree(r->time));
   PetscCall(PetscFree(r->change));
@@ -174,7 +197,8 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
 static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
                                     PetscBool *pause)
 {
-  const PetscReal ahead = 1e-6 * dt; /* tolerance for rounding: a step that ends there has reached the time */
+  const PetscReal ahead =
+    1e-6 * dt; /* tolerance for rounding: a step that ends there has reached the time */
   SbRemesh r = (SbRemesh)ctx;
   PetscBool time = PETSC_FALSE;
 
@@ -184,12 +208,15 @@ static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, Petsc
     time = (PetscBool)(time || (r->time[i] > t - dt + ahead && r->time[i] <= t + ahead));
   r->changes = PETSC_FALSE;
   for (PetscInt i = 0; i < r->nchange; i++)
-    r->changes = (PetscBool)(r->changes || (r->change[i] > t - dt + ahead && r->change[i] <= t + ahead));
+    r->changes =
+      (PetscBool)(r->changes || (r->change[i] > t - dt + ahead && r->change[i] <= t + ahead));
   *pause = r->changes;
   r->how.better = (PetscBool)!time;
-  if (r->meshes) PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+  if (r->meshes)
+    PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody && r->meshes; b++) {
-    const PetscBool bad = (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
+    const PetscBool bad =
+      (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
 
     r->due[b] = (PetscBool)(r->named[b] && (time || bad));
     *pause = (PetscBool)(*pause || r->due[b]);
@@ -217,9 +244,11 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody; b++) {
     r->due[b] = PETSC_FALSE;
-    if (r->named[b] && (worst < 0 || r->worst[b] < r->worst[worst])) worst = b;
+    if (r->named[b] && (worst < 0 || r->worst[b] < r->worst[worst]))
+      worst = b;
   }
-  if (worst < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (worst < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   r->due[worst] = *again = PETSC_TRUE;
   r->how.better = PETSC_FALSE;
   PetscCall(SbWarning(run->model->comm, "%s; body '%s' is re-meshed", run->stop_reason,
@@ -230,22 +259,26 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
 PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 {
   PetscFunctionBeginUser;
-  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!r)
+    PetscFunctionReturn(PETSC_SUCCESS);
   run->after.fn = check_quality;
   run->after.ctx = r;
-  if (!r->meshes) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!r->meshes)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
   PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));
   PetscCall(PetscArraycpy(r->column, run->column, run->ncolumn));
   r->column[run->ncolumn++] = (SbColumn){"remesh_loss", "J", &run->energies.remesh_loss};
   r->column[run->ncolumn++] = (SbColumn){"remesh_mass", "kg", &run->energies.remesh_mass};
-  r->column[run->ncolumn++] = (SbColumn){"remesh_momentum", "kg m/s", &run->energies.remesh_momentum};
+  r->column[run->ncolumn++] =
+    (SbColumn){"remesh_momentum", "kg m/s", &run->energies.remesh_momentum};
   run->column = r->column;
   run->want_energies = PETSC_TRUE;
   for (PetscInt b = 0; b < r->nbody; b++) {
     const SbMemoryMesh *in_memory = run->model->body[b].in_memory;
 
-    if (in_memory && in_memory->bound > 0.) r->bound[b] = PetscMin(r->bound[b], in_memory->bound);
+    if (in_memory && in_memory->bound > 0.)
+      r->bound[b] = PetscMin(r->bound[b], in_memory->bound);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -262,18 +295,21 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
   Scene s = {NULL, NULL, NULL};
   SbEnergies e[2] = {{0}};
-  PetscReal speed[2] = {0.}; /* largest speed, and acceleration, added to conserve momenta and their rates */
+  PetscReal speed[2] = {
+    0.}; /* largest speed, and acceleration, added to conserve momenta and their rates */
   SbRun run;
   const SbRun before = old->run;
   PetscReal(*momenta)[6];
 
   PetscFunctionBeginUser;
+
   // set up the scene from its options, on the new meshes; the solver is the one chosen before
   PetscCall(SbSceneCreate(old->model->comm, &s.model));
   PetscCall(SbRunCreate(s.model, &run));
   s.run = run;
   PetscCall(PetscStrncpy(run->solver_choice, before->solver, sizeof(run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(run, &s.ledger));
+
   // the bodies' meshes, on rank 0; the model owns them from now on
   for (PetscInt b = 0; b < s.model->nbody; b++) {
     PetscCall(SbMemoryMeshShare(s.model->comm, &result->in_memory[b]));
@@ -284,26 +320,34 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbRunSetUp(run));
   PetscCall(PetscStrncpy(run->solver_reason, before->solver_reason, sizeof(run->solver_reason)));
+
   // transfer the state
   PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
+
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations
   PetscCall(PetscCalloc1(old->model->nbody, &momenta));
   for (int i = 0; i < 2; i++) {
-    const Vec from = i ? before->A : before->V, to = i ? run->A : run->V;
+    const Vec from = i ? before->A : before->V;
+    const Vec to = i ? run->A : run->V;
 
-    if (!to) continue;
+    if (!to)
+      continue;
     PetscCall(SbBodyMomenta(old->model, before->U, from, momenta));
-    PetscCall(SbBodySetMomenta(s.model, run->U, to, r->due, (const PetscReal(*)[6])momenta, &speed[i]));
+    PetscCall(
+      SbBodySetMomenta(s.model, run->U, to, r->due, (const PetscReal(*)[6])momenta, &speed[i]));
   }
   PetscCall(PetscFree(momenta));
   PetscCall(SbEffectsHandOver(before, run, &result->renamed));
+
   // penalty of CR and DG for the new state, before accelerations and energies are computed
   if (run->J && s.model->dynamic && run->preset != SB_TIME_ALPHA2)
     PetscCall(SbSpaceFollowJumps(
-      s.model->space, run->U, run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME, NULL));
+      s.model->space, run->U, run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,
+      NULL));
   PetscCall(SbRunRestartAcceleration(run));
+
   // energy, mass and momentum of both states; the difference of energy is remesh_loss
   PetscCall(SbModelEnergies(old->model, before->U, before->V, &e[0]));
   PetscCall(SbModelEnergies(s.model, run->U, run->V, &e[1]));
@@ -311,9 +355,12 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
   run->energies.remesh_momentum += PetscSqrtReal(SbDistance2(e[0].momentum, e[1].momentum));
   PetscCall(SbLedgerAttach(s.ledger));
-  if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
+  if (s.ledger)
+    PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, run));
-  if (before->output) PetscCall(SbOutputReattach(before, run));
+  if (before->output)
+    PetscCall(SbOutputReattach(before, run));
+
   // one line for each body that was re-meshed
   for (PetscInt b = 0; b < r->nbody; b++) {
     const SbRemeshOutcome *o = &result->outcome[b];
@@ -327,7 +374,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
                         .speed = speed[0],
                         .shift = PetscSqrtReal(SbDistance2(e[0].centre, e[1].centre))};
 
-    if (!r->due[b]) continue;
+    if (!r->due[b])
+      continue;
     PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));
     PetscCall(SbReportRemeshed(run, &entry));
   }
@@ -351,16 +399,19 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
+
   // new meshes on rank 0; messages, counts and names are sent to all ranks
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   PetscCall(SbGather(run, &g));
   PetscCall(SbRemeshResultCreate(&g, &result));
-  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, &result));
+  if (!rank)
+    PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, &result));
   PetscCall(SbGatheredDestroy(&g));
-  PetscCallMPI(
-    MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)),
+                         MPI_BYTE, 0, m->comm));
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
-  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
+  if (rank)
+    PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   *any = r->changes;
@@ -370,21 +421,27 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
     const PetscReal reached = done ? result.outcome[b].quality : r->worst[b];
 
     *any = (PetscBool)(*any || done);
-    if (!r->due[b]) continue;
+    if (!r->due[b])
+      continue;
     if (!done)
       PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
                           m->body[b].name, run->step_now, result.outcome[b].message));
+
     // quality and step from which the body may be re-meshed again
-    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
+    if (reached > 0.)
+      r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
     r->rest[b] = done && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
     r->from[b] = run->step_now + r->rest[b];
-    if (result.in_memory[b] && done) result.in_memory[b]->bound = r->bound[b];
+    if (result.in_memory[b] && done)
+      result.in_memory[b]->bound = r->bound[b];
     r->due[b] = done; /* which replace() needs */
   }
-  if (*any) PetscCall(replace(r, scene, &result));
+  if (*any)
+    PetscCall(replace(r, scene, &result));
   PetscCall(SbRemeshResultDestroy(&result));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
+
   // without a new mesh the time loop resumes at the current step
   if (!*any) {
     run->step0 = run->step_now;
@@ -402,29 +459,38 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
   PetscBool again, any;
 
   PetscFunctionBeginUser;
+
   // a checkpoint before a due re-meshing contains the old meshes: a restart re-meshes first
   if (r && first->step0 && (first->after.dt > 0. || r->nchange)) {
     const PetscBool initial = (PetscBool) !(first->after.dt > 0.);
 
     first->step_now = first->step0;
     first->t_now = first->t0;
-    PetscCall(
-      check_quality(first, first->step0, first->t0, initial ? first->t0 : first->after.dt, r, &again));
-    // the new scene is in its initial state, as at the start of the first run: only supports come and go
-    for (PetscInt b = 0; b < r->nbody && initial; b++) r->due[b] = PETSC_FALSE;
-    if (initial ? r->changes : again) PetscCall(apply(r, &scene, &any));
+    PetscCall(check_quality(first, first->step0, first->t0, initial ? first->t0 : first->after.dt,
+                            r, &again));
+
+    // the new scene is in its initial state, as at the start of the first run: only supports come
+    // and go
+    for (PetscInt b = 0; b < r->nbody && initial; b++)
+      r->due[b] = PETSC_FALSE;
+    if (initial ? r->changes : again)
+      PetscCall(apply(r, &scene, &any));
   }
   do {
     PetscBool failed = PETSC_FALSE;
 
     PetscCall(SbRunSolve(scene.run));
     again = scene.run->paused;
-    if (r && !again) PetscCall(check_after_failure(r, scene.run, &failed));
-    if (again || failed) PetscCall(apply(r, &scene, &any));
-    if (failed) again = any;
+    if (r && !again)
+      PetscCall(check_after_failure(r, scene.run, &failed));
+    if (again || failed)
+      PetscCall(apply(r, &scene, &any));
+    if (failed)
+      again = any;
     *model = scene.model;
     *run = scene.run;
-    if (ledger) *ledger = scene.ledger;
+    if (ledger)
+      *ledger = scene.ledger;
   } while (again);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,32 +1,37 @@
 /*
-  remesh_impl.h - shared by the files of re-meshing: the old scene with its state on rank 0, and the new one.
+  remesh_impl.h - shared by the files of re-meshing: the old scene with its state on rank 0, and the
+  new one.
 */
 #pragma once
 #include "sbremesh.h"
 #include "sbtet.h"
 
-/* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0, NULL elsewhere. */
+/* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0, NULL
+   elsewhere. */
 typedef struct {
   PetscInt nbody, nvert, ncell;
-  PetscInt nfield;         /* number of vectors: U, then V, A if the run has them */
-  PetscInt width;          /* nodes per cell: 4; 8 with supports of its faces; 14 with P2's edge nodes */
+  PetscInt nfield; /* number of vectors: U, then V, A if the run has them */
+  PetscInt width;  /* nodes per cell: 4; 8 with supports of its faces; 14 with P2's edge nodes */
   PetscInt *vert0, *cell0; /* [nbody + 1] first vertex and cell of each body; on all ranks */
   PetscReal *mass;         /* [nbody] mass, kg; on all ranks */
-  PetscReal *X, *x;        /* [nvert][3] rest and current positions, CR and DG: means around vertices; m */
+  PetscReal *X, *x; /* [nvert][3] rest and current positions, CR and DG: means around vertices; m */
   uint64_t *vert_set;      /* [nvert] bits of sets */
   PetscInt *cell;          /* [ncell][4] vertices */
   PetscInt *cell_material; /* [ncell] material numbers */
   uint64_t *cell_set;      /* [ncell][5] bits of sets of the cell, then of its faces */
-  PetscReal *edge_off;     /* [ncell][6][3] edge offsets as in SbMesh; NULL: no cell is curved at rest */
-  PetscReal *value;        /* [ncell][width][nfield][3] values, SI; PETSC_MAX_REAL: no support, no node */
-#define SB_EDGES 8         /* index of the first edge node of a cell */
+  PetscReal
+    *edge_off;      /* [ncell][6][3] edge offsets as in SbMesh; NULL: no cell is curved at rest */
+  PetscReal *value; /* [ncell][width][nfield][3] values, SI; PETSC_MAX_REAL: no support, no node */
+#define SB_EDGES 8  /* index of the first edge node of a cell */
 } SbGathered;
 PetscErrorCode SbGather(SbRun run, SbGathered *g); /* collective; SbGatheredDestroy() */
 PetscErrorCode SbGatheredDestroy(SbGathered *g);
-/* Sets the vectors of a run from value, width and nfield of g, for cells of the run's mesh. Collective. */
+/* Sets the vectors of a run from value, width and nfield of g, for cells of the run's mesh.
+   Collective. */
 PetscErrorCode SbScatter(const SbGathered *g, SbRun run);
 
-/* Renumbered surface nodes by original numbers, ascending in `from`, on all ranks; PetscFree2(from, to). */
+/* Renumbered surface nodes by original numbers, ascending in `from`, on all ranks; PetscFree2(from,
+   to). */
 typedef struct {
   PetscInt n, *from, *to;
 } SbRenamed;
@@ -40,7 +45,8 @@ typedef struct {
   PetscBool rest;    /* the reference configuration is tetrahedralised, else the current one */
   PetscReal quality; /* least quality of tets at rest, and now (SbTetQuality) */
 } SbRemeshing;
-/* The old mesh; numbers from the body's first vertex and tet; positions and offsets are borrowed. */
+/* The old mesh; numbers from the body's first vertex and tet; positions and offsets are
+   borrowed. */
 typedef struct {
   PetscInt nvert, ncell;
   const PetscReal *X, *x;    /* [nvert][3] positions at rest, now; m */
@@ -53,23 +59,26 @@ typedef struct {
 /* The new mesh of the body; arrays owned, SbNewMeshDestroy(). */
 typedef struct {
   PetscInt nvert, ncell, nkept;
-  PetscReal *X, *x;    /* [nvert][3] positions at rest; now, interpolated on the old mesh; m */
-  PetscInt *cell;      /* [ncell][4] vertices */
-  PetscInt *kept;      /* [nkept] old numbers of the first vertices, which have kept their positions */
-  PetscInt *within;    /* [ncell] old tet that contains the centroid of the new one */
-  PetscReal *edge_off; /* [ncell][6][3] offsets of edge nodes from edge midpoints, m; NULL: no curved tets */
-  PetscReal *flat;     /* [nvert][3] rest positions for straight old tets, m; NULL: no curved tets */
-  PetscInt nmoved;     /* vertices moved for inverted or flat tets */
-  PetscReal quality;   /* quality of the worst tet, now */
+  PetscReal *X, *x; /* [nvert][3] positions at rest; now, interpolated on the old mesh; m */
+  PetscInt *cell;   /* [ncell][4] vertices */
+  PetscInt *kept;   /* [nkept] old numbers of the first vertices, which have kept their positions */
+  PetscInt *within; /* [ncell] old tet that contains the centroid of the new one */
+  PetscReal *
+    edge_off; /* [ncell][6][3] offsets of edge nodes from edge midpoints, m; NULL: no curved tets */
+  PetscReal *flat;   /* [nvert][3] rest positions for straight old tets, m; NULL: no curved tets */
+  PetscInt nmoved;   /* vertices moved for inverted or flat tets */
+  PetscReal quality; /* quality of the worst tet, now */
 } SbNewMesh;
 /* Errors (PETSC_ERR_USER_INPUT): those of the mesher; tets that stay inverted at rest or now. */
-PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *mesh);
+PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how,
+                            SbNewMesh *mesh);
 PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
 
 /*
   bodies.c - rank 0: re-meshes the bodies with due[b], and fills a SbRemeshResult.
 
-  Not collective. message: reason of a failure, with which a body keeps its mesh; "": re-meshed, or not due.
+  Not collective. message: reason of a failure, with which a body keeps its mesh; "": re-meshed, or
+  not due.
 */
 typedef struct {
   PetscInt nvert[2], ncell[2]; /* numbers before and after */
@@ -85,18 +94,19 @@ typedef struct {
 } SbRemeshResult;           /* SbRemeshResultDestroy() */
 PetscErrorCode SbRemeshResultCreate(const SbGathered *g, SbRemeshResult *result);
 PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *result);
-PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
-                              const SbRemeshing *how, SbRemeshResult *result);
+PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[],
+                              PetscInt step, const SbRemeshing *how, SbRemeshResult *result);
 
 /* check.c: qualities and momenta */
-/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells. Collective. */
+/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells.
+   Collective. */
 PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each named body, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
 /* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */
 PetscErrorCode SbBodyMomenta(SbModel model, Vec U, Vec V, PetscReal momenta[][6]);
-/* Adds rigid velocities to the named bodies, except at prescribed unknowns, so that they have these momenta.
-   Collective. `largest`: largest speed that was added, m/s. */
+/* Adds rigid velocities to the named bodies, except at prescribed unknowns, so that they have these
+   momenta. Collective. `largest`: largest speed that was added, m/s. */
 PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool named[],
                                 const PetscReal momenta[][6], PetscReal *largest);
 

@@ -1,8 +1,8 @@
 /*
   check.c - consistency checks of several options, before the computation.
 
-  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in
-  its folder. A static run without prescribed displacements has a singular matrix.
+  A missing mesh file is an error here, before other bodies are read; the message suggests similar
+  names in its folder. A static run without prescribed displacements has a singular matrix.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -12,10 +12,12 @@
 #define LARGE 2.  /* m; files of larger soft bodies are usually in mm */
 #define LIGHT 10. /* kg/m^3; no soft body in SI units has a lower density */
 
-/* Similar file names in the folder of `path`, with the folder; "" if there are none. Rank 0 only. */
+/* Similar file names in the folder of `path`, with the folder; "" if there are none. Rank 0
+   only. */
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
 {
-  const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+  const char *slash = strrchr(path, '/');
+  const char *name = slash ? slash + 1 : path;
   char folder[PETSC_MAX_PATH_LEN], found[PETSC_MAX_PATH_LEN];
   struct dirent **entry;
   const char **list;
@@ -25,12 +27,16 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   text[0] = 0;
   SbFormat(sizeof(folder), folder, "%.*s", (int)(name - path), path);
   n = scandir(slash ? folder : ".", &entry, NULL, alphasort);
-  if (n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (n < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &list));
-  for (int i = 0; i < n; i++) list[i] = entry[i]->d_name;
+  for (int i = 0; i < n; i++)
+    list[i] = entry[i]->d_name;
   SbSuggestNames(name, n, list, sizeof(found), found);
-  if (found[0]) SbFormat(size, text, "%s%s", folder, found);
-  for (int i = 0; i < n; i++) free(entry[i]);
+  if (found[0])
+    SbFormat(size, text, "%s%s", folder, found);
+  for (int i = 0; i < n; i++)
+    free(entry[i]);
   free(entry);
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -39,24 +45,31 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
 /* Rank 0 checks that the mesh file exists; collective. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
-  const char *mesh = body->mesh, *dot = strrchr(mesh, '.');
-  char near[PETSC_MAX_PATH_LEN] = "", other[PETSC_MAX_PATH_LEN + 8], advice[PETSC_MAX_PATH_LEN + 32] = "";
+  const char *mesh = body->mesh;
+  const char *dot = strrchr(mesh, '.');
+  char near[PETSC_MAX_PATH_LEN] = "";
+  char other[PETSC_MAX_PATH_LEN + 8];
+  char advice[PETSC_MAX_PATH_LEN + 32] = "";
   int error = 0;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+
   // the file, or the .node file of a TetGen mesh given by its stem
   SbFormat(sizeof(other), other, "%s.node", mesh);
   if (!rank && access(other, R_OK) && access(mesh, R_OK)) {
     error = errno;
 
-    /* advice: make it, if there is a .geo file as for meshes of the scenarios; a similar name; the folder */
+    /* advice: make it, if there is a .geo file as for meshes of the scenarios; a similar name; the
+       folder */
     if (error == ENOENT && dot && !strcmp(dot, ".msh") && !strncmp(mesh, "meshes/", 7)) {
       SbFormat(sizeof(other), other, "%.*s.geo", (int)(dot - mesh), mesh);
-      if (!access(other, R_OK)) SbFormat(sizeof(advice), advice, "; make %s makes it", mesh);
+      if (!access(other, R_OK))
+        SbFormat(sizeof(advice), advice, "; make %s makes it", mesh);
     }
-    if (error == ENOENT && !advice[0]) PetscCall(near_files(mesh, sizeof(near), near));
+    if (error == ENOENT && !advice[0])
+      PetscCall(near_files(mesh, sizeof(near), near));
     if (near[0]) {
       SbFormat(sizeof(advice), advice, "; did you mean %s?", near);
     } else if (!advice[0] && mesh[0] != '/') {
@@ -80,14 +93,17 @@ PetscErrorCode SbSceneCheck(SbModel model)
     constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
                               (model->effect[e]->ops.potential && model->effect[e]->springs));
   for (PetscInt i = 0; i < model->nbody; i++) {
-    if (strncmp(model->body[i].mesh, "box:", 4)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
-    PetscCheck(model->dynamic || (!model->start[i].moved && !model->start[i].state[0]), PETSC_COMM_SELF,
-               PETSC_ERR_USER, "-body_%s_%s is for dynamic runs: -time static begins without loads, at rest",
+    if (strncmp(model->body[i].mesh, "box:", 4))
+      PetscCall(check_mesh_file(model->comm, &model->body[i]));
+    PetscCheck(model->dynamic || (!model->start[i].moved && !model->start[i].state[0]),
+               PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-body_%s_%s is for dynamic runs: -time static begins without loads, at rest",
                model->body[i].name, model->start[i].moved ? "displacement" : "state");
   }
-  PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
-             "type fixed or prescribed_displacement");
+  PetscCheck(
+    constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
+    "type fixed or prescribed_displacement");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,21 +112,25 @@ PetscErrorCode SbSceneCheckSizes(SbModel model)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < model->nbody; i++) {
     const SbBody *body = &model->body[i];
-    const PetscReal length = PetscMax(PetscMax(body->bbox[3] - body->bbox[0], body->bbox[4] - body->bbox[1]),
-                                      body->bbox[5] - body->bbox[2]);
+    const PetscReal length =
+      PetscMax(PetscMax(body->bbox[3] - body->bbox[0], body->bbox[4] - body->bbox[1]),
+               body->bbox[5] - body->bbox[2]);
     SbScope scope;
     PetscBool given;
 
     /* a box has the size given by the user; densities below the limit are in t/mm^3 or g/cm^3 */
-    if (length < LARGE || body->density < LIGHT || !strncmp(body->mesh, "box:", 4)) continue;
-    if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of)) continue;
+    if (length < LARGE || body->density < LIGHT || !strncmp(body->mesh, "box:", 4))
+      continue;
+    if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of))
+      continue;
     SbScopeSet(&scope, "body", "", body->copy_of[0] ? body->copy_of : body->name);
     PetscCall(SbOptionGiven(&scope, "scale", &given));
     if (!given)
-      PetscCall(SbWarning(model->comm,
-                          "body '%s' is %.3g m long: if its file is in mm, give -body_%s_scale 0.001 (in cm: "
-                          "0.01); if it is in m, -body_%s_scale 1 says so",
-                          body->name, (double)length, scope.instance, scope.instance));
+      PetscCall(SbWarning(
+        model->comm,
+        "body '%s' is %.3g m long: if its file is in mm, give -body_%s_scale 0.001 (in cm: "
+        "0.01); if it is in m, -body_%s_scale 1 says so",
+        body->name, (double)length, scope.instance, scope.instance));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,9 @@
 /*
   command.c - the command line: options of the program itself, and errors that PETSc would ignore.
 
-  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1`
-  would become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the
-  other ranks wait: missing files are found before.
+  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0,
+  0, 1` would become `-translate 0,`. Such words are an error here. PETSc reads option files on rank
+  0 while the other ranks wait: missing files are found before.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -14,16 +14,20 @@ const SbOption SbCommandRows[] = {
   {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
    "print the stack of calls with every error, also of the input"},
   {"help", SB_OPTION_BOOL, 1, "", "false", "",
-   "print usage and topics, or the options of a topic, and end; -help all: every option; -help petsc runs "
+   "print usage and topics, or the options of a topic, and end; -help all: every option; -help "
+   "petsc runs "
    "and lists PETSc's own"},
-  {"version", SB_OPTION_BOOL, 1, "", "false", "", "print the versions of supple and of PETSc, and end"},
+  {"version", SB_OPTION_BOOL, 1, "", "false", "",
+   "print the versions of supple and of PETSc, and end"},
   {"options_file", SB_OPTION_STRING, 1, "", "", "",
    "the scenario, .opts or .yml; its name can also be the first word of the command line"},
   {"scenario_view", SB_OPTION_STRING, 1, "", "", "",
-   "check the scenario, write it with every default filled in to this file (without one: standard output), "
+   "check the scenario, write it with every default filled in to this file (without one: standard "
+   "output), "
    "and end"},
   {"options_table", SB_OPTION_STRING, 1, "", "", "",
-   "write the table of options as tab-separated text, one option per line, to this file (without one: "
+   "write the table of options as tab-separated text, one option per line, to this file (without "
+   "one: "
    "standard output), and end"},
   {0},
 };
@@ -34,7 +38,8 @@ static PetscBool is_option(const char *word, const char *key)
   return (PetscBool)!strcasecmp(word + 1 + (word[1] == '-'), key);
 }
 
-/* Whether rank 0 can read an option file, which is then recorded; else sets command->problem. Collective. */
+/* Whether rank 0 can read an option file, which is then recorded; else sets command->problem.
+   Collective. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
   int error = 0;
@@ -42,8 +47,10 @@ static PetscBool readable(const char *file, SbCommand *command)
   struct stat info;
 
   (void)MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (!rank && access(file, R_OK)) error = errno;
-  if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode)) error = EISDIR;
+  if (!rank && access(file, R_OK))
+    error = errno;
+  if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode))
+    error = EISDIR;
   (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
   if (!error) {
     if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
@@ -51,16 +58,18 @@ static PetscBool readable(const char *file, SbCommand *command)
     return PETSC_TRUE;
   }
   if (!command->problem[0])
-    (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
-                   strerror(error));
+    (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s",
+                   file, strerror(error));
   return PETSC_FALSE;
 }
 
-/* Handles one option with its value (NULL: none); returns whether it remains on the command line. */
+/* Handles one option with its value (NULL: none); returns whether it remains on the command
+   line. */
 static PetscBool take_option(const char *name, const char *value, SbCommand *command)
 {
   if (is_option(name, "help") || !strcmp(name, "-h")) {
-    if (value && !strcasecmp(value, "petsc")) return PETSC_TRUE;
+    if (value && !strcasecmp(value, "petsc"))
+      return PETSC_TRUE;
     command->help = value ? value : "";
   } else if (is_option(name, "scenario_view")) {
     command->view = value ? value : "";
@@ -68,7 +77,8 @@ static PetscBool take_option(const char *name, const char *value, SbCommand *com
     command->table = value ? value : "-";
   } else if (is_option(name, "version")) {
     command->version = PETSC_TRUE;
-  } else if (value && (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
+  } else if (value &&
+             (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
     SbErrorSetFile(value);
     return readable(value, command);
   } else {
@@ -84,29 +94,35 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
   PetscFunctionBeginUser;
   memset(command, 0, sizeof(*command));
   for (int i = 1; i < *argc;) {
-    PetscBool option, next_is_option = PETSC_TRUE;
+    PetscBool option;
+    PetscBool next_is_option = PETSC_TRUE;
     int words;
 
     PetscCall(PetscOptionsValidKey(argv[i], &option));
-    if (i + 1 < *argc) PetscCall(PetscOptionsValidKey(argv[i + 1], &next_is_option));
+    if (i + 1 < *argc)
+      PetscCall(PetscOptionsValidKey(argv[i + 1], &next_is_option));
     words = option && !next_is_option ? 2 : 1;
     if (option) {
       const PetscBool stays = take_option(argv[i], words == 2 ? argv[i + 1] : NULL, command);
 
-      if (stays) argv[kept++] = argv[i];
-      if (stays && words == 2 && !is_option(argv[i], "help")) argv[kept++] = argv[i + 1];
+      if (stays)
+        argv[kept++] = argv[i];
+      if (stays && words == 2 && !is_option(argv[i], "help"))
+        argv[kept++] = argv[i + 1];
     } else if (i == 1) {
       argv[kept++] = argv[1];
       SbErrorSetFile(argv[1]);
-      if (readable(argv[1], command)) command->scenario = argv[1];
+      if (readable(argv[1], command))
+        command->scenario = argv[1];
     } else if (!command->problem[0]) {
-      (void)snprintf(command->problem, sizeof(command->problem),
-                     strpbrk(argv[i], "./")
-                       ? "the word '%s' in the command line belongs to no option: a run has one option file, "
-                         "the first word; more come by -options_file"
-                       : "the word '%s' in the command line belongs to no option (an option begins with a "
-                         "dash, -%s; a value with blanks needs quotes)",
-                     argv[i], argv[i]);
+      (void)snprintf(
+        command->problem, sizeof(command->problem),
+        strpbrk(argv[i], "./")
+          ? "the word '%s' in the command line belongs to no option: a run has one option file, "
+            "the first word; more come by -options_file"
+          : "the word '%s' in the command line belongs to no option (an option begins with a "
+            "dash, -%s; a value with blanks needs quotes)",
+        argv[i], argv[i]);
     }
     i += words;
   }

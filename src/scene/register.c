@@ -1,5 +1,6 @@
 /*
-  register.c - registers all types that a scenario can name: a new one is a file in its folder, a line here.
+  register.c - registers all types that a scenario can name: a new one is a file in its folder, a
+  line here.
 */
 #include "sbremesh.h"
 #include "scene_impl.h"
@@ -19,12 +20,13 @@ PetscErrorCode SbRegisterAll(void)
   static const struct {
     const char *klass;
     const SbOption *rows;
-  } tables[] = {{"", SbRunRows},          {"body", SbBodyRows},       {"inclusion", SbInclusionRows},
-                {"effect", SbEffectRows}, {"", SbMeshRows},           {"body", SbTetRows},
-                {"", SbSpaceRows},        {"", SbTimeRows},           {"", SbSolverRows},
-                {"", SbOutputRows},       {"probe", SbProbeRows},     {"", SbLedgerRows},
-                {"", SbRemeshRows},       {"body", SbRemeshBodyRows}, {"", SbCommandRows},
-                {"set", SbSetRows}};
+  } tables[] = {
+    {"", SbRunRows},          {"body", SbBodyRows},       {"inclusion", SbInclusionRows},
+    {"effect", SbEffectRows}, {"", SbMeshRows},           {"body", SbTetRows},
+    {"", SbSpaceRows},        {"", SbTimeRows},           {"", SbSolverRows},
+    {"", SbOutputRows},       {"probe", SbProbeRows},     {"", SbLedgerRows},
+    {"", SbRemeshRows},       {"body", SbRemeshBodyRows}, {"", SbCommandRows},
+    {"set", SbSetRows}};
 
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
@@ -38,6 +40,7 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbElementRegisterAll());
   PetscCall(SbMaterialRegisterAll());
   PetscCall(SbTimeRegister());
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++)
+    PetscCall(SbEffectRegister(effects[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

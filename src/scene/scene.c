@@ -1,12 +1,15 @@
 /*
-  scene.c - builds the model from options, without computing: bodies with material and element, effects, sets.
+  scene.c - builds the model from options, without computing: bodies with material and element,
+  effects, sets.
 
-  Names of bodies, sets and effects are parts of option names: -body_<name>_young. These are case-insensitive
-  in PETSc, hence names must differ in more than case. PETSc also takes `-body_young` for a missing
-  `-body_1_young`: a part of a name that has only digits could read another name's option, and is an error.
+  Names of bodies, sets and effects are parts of option names: -body_<name>_young. These are
+  case-insensitive in PETSc, hence names must differ in more than case. PETSc also takes
+  `-body_young` for a missing `-body_1_young`: a part of a name that has only digits could read
+  another name's option, and is an error.
 
-  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. All such
-  names are collected before the mesh is read, because its sets are marked while the bodies are read.
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies.
+  All such names are collected before the mesh is read, because its sets are marked while the bodies
+  are read.
 */
 #include <ctype.h>
 #include "scene_impl.h"
@@ -19,9 +22,11 @@
 const SbOption SbRunRows[] = {
   {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, separated by commas"},
   {"sets", SB_OPTION_NAMES, 1, "", "", "",
-   "names of sets that are defined by a shape; physical groups of the meshes, bodies, `all` and `boundary` "
+   "names of sets that are defined by a shape; physical groups of the meshes, bodies, `all` and "
+   "`boundary` "
    "need no set"},
-  {"effects", SB_OPTION_NAMES, 1, "", "", "", "names of the effects: loads, supports, damping and contact"},
+  {"effects", SB_OPTION_NAMES, 1, "", "", "",
+   "names of the effects: loads, supports, damping and contact"},
   {"validate", SB_OPTION_BOOL, 1, "", "false", "",
    "check the invariants of the mesh and of the finite-element space after set-up"},
   {0},
@@ -32,19 +37,24 @@ const SbOption SbBodyRows[] = {
    "docs/reference/meshes.md), a closed surface to fill (.stl .obj .off .ply .poly .smesh), or "
    "box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
   {"mesh_step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
-   "when the mesh is the output of a run (fields.h5): number of the frame whose positions are taken; 0: "
+   "when the mesh is the output of a run (fields.h5): number of the frame whose positions are "
+   "taken; 0: "
    "reference configuration, -1: the last"},
   {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "factor on the coordinates of the mesh, before rotation; 0.001 for a file in mm"},
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
-  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "translation, after scaling and rotation"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
+   "translation, after scaling and rotation"},
   {"copies", SB_OPTION_STRING, 1, "", "", "",
-   "instances NAME1, NAME2, ... of this body, which share its options: a file with a line x y z [ax ay az "
-   "degrees [scale [vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scales multiply, rotations "
+   "instances NAME1, NAME2, ... of this body, which share its options: a file with a line x y z "
+   "[ax ay az "
+   "degrees [scale [vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scales multiply, "
+   "rotations "
    "compose, translations and velocities add up; empty: one body"},
   {"element", SB_OPTION_STRING, 1, "", "p1", "p1|p2|cr|dg",
-   "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate where the "
+   "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate "
+   "where the "
    "solution is smooth"},
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
@@ -52,9 +62,12 @@ const SbOption SbBodyRows[] = {
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0,0,0", "",
    "initial displacement: numbers or formulas of the reference position x, y, z"},
   {"state", SB_OPTION_STRING, 1, "", "", "",
-   "RUN or RUN,STEP: initial displacement and velocity are those of this body in the results of another run "
-   "(its folder or fields.h5; without STEP the last frame), which may have another mesh, element, material, "
-   "integrator and other effects; or of a checkpoint, in full precision if bodies, meshes and elements are "
+   "RUN or RUN,STEP: initial displacement and velocity are those of this body in the results of "
+   "another run "
+   "(its folder or fields.h5; without STEP the last frame), which may have another mesh, element, "
+   "material, "
+   "integrator and other effects; or of a checkpoint, in full precision if bodies, meshes and "
+   "elements are "
    "the same"},
   {"velocity", SB_OPTION_FORMULA, 3, "m/s", "0,0,0", "",
    "initial velocity: numbers or formulas of the reference position x, y, z"},
@@ -70,7 +83,8 @@ const SbOption SbInclusionRows[] = {
 const SbOption SbSetRows[] = {
   {"at", SB_OPTION_STRING, 1, "", NULL, "",
    "shape of the set in the reference configuration, after scale, rotate, translate (m): "
-   "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, halfspace:nx,ny,nz,d (n.x "
+   "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, "
+   "halfspace:nx,ny,nz,d (n.x "
    "<= d), or group:name, body:name, boundary"},
   {0},
 };
@@ -80,13 +94,17 @@ static const char *name_problem(const char *name)
 {
   PetscBool only_digits = PETSC_FALSE;
 
-  if (strlen(name) > NAME_LENGTH) return "is longer than 31 characters";
-  if (!isalpha((unsigned char)name[0])) return "does not begin with a letter";
+  if (strlen(name) > NAME_LENGTH)
+    return "is longer than 31 characters";
+  if (!isalpha((unsigned char)name[0]))
+    return "does not begin with a letter";
   for (const char *c = name; *c; c++)
-    if (!isalnum((unsigned char)*c) && *c != '_') return "may hold letters, digits and underscores only";
+    if (!isalnum((unsigned char)*c) && *c != '_')
+      return "may hold letters, digits and underscores only";
   for (const char *c = name; *c; c++) {
     if (*c == '_') {
-      if (!c[1] || c[1] == '_') return "has an underscore without a word after it";
+      if (!c[1] || c[1] == '_')
+        return "has an underscore without a word after it";
       only_digits = PETSC_TRUE;
     } else if (!isdigit((unsigned char)*c))
       only_digits = PETSC_FALSE;
@@ -98,31 +116,38 @@ static const char *name_problem(const char *name)
   return NULL;
 }
 
-/* Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has
-   letters, digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or
-   "effect". The caller frees the names with PetscFree(). */
-static PetscErrorCode read_names(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
+/* Reads the names of bodies, sets or effects from an option of class "": each begins with a letter
+   and has letters, digits and underscores, is not a reserved word, and occurs once. `what` is
+   "body", "set" or "effect". The caller frees the names with PetscFree(). */
+static PetscErrorCode read_names(const char *key, const char *what, PetscInt *n,
+                                 char (**names)[SB_NAME_MAX])
 {
   char problem[4 * SB_NAME_MAX] = "";
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionNames(&SbRunScope, key, n, names));
+
   // the first invalid name
   for (PetscInt i = 0; i < *n && !problem[0]; i++) {
-    const char *name = (*names)[i], *wrong = name_problem(name);
+    const char *name = (*names)[i];
+    const char *wrong = name_problem(name);
 
     if (!strcmp(what, "body") && !strcasecmp(name, SB_OPTION_DEFAULT))
       wrong = "stands for all bodies in -body_default_young and the like";
-    if (wrong) PetscCall(PetscSNPrintf(problem, sizeof(problem), "the name '%s' %s", name, wrong));
+    if (wrong)
+      PetscCall(PetscSNPrintf(problem, sizeof(problem), "the name '%s' %s", name, wrong));
     for (PetscInt j = 0; j < i && !problem[0]; j++) {
       const char *hint = strcmp(name, (*names)[j]) ? " (upper and lower case count as one)" : "";
 
-      if (strcasecmp(name, (*names)[j])) continue;
+      if (strcasecmp(name, (*names)[j]))
+        continue;
       PetscCall(PetscSNPrintf(problem, sizeof(problem),
-                              "two are named '%s'%s; every %s needs a name of its own", name, hint, what));
+                              "two are named '%s'%s; every %s needs a name of its own", name, hint,
+                              what));
     }
   }
-  if (problem[0]) PetscCall(PetscFree(*names));
+  if (problem[0])
+    PetscCall(PetscFree(*names));
   PetscCheck(!problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: %s", key, problem);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -138,7 +163,8 @@ static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunc
   SbOptionName(scope, key, sizeof(option), option);
   PetscCall(SbOptionString(scope, key, SB_NAME_MAX, word));
   PetscCall(PetscFunctionListFind(list, word, &constructor));
-  if (constructor) PetscFunctionReturn(PETSC_SUCCESS);
+  if (constructor)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbListAdvise(list, word, sizeof(all), all));
   PetscCheck(word[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: one of %s", option, all);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s", option, word, all);
@@ -169,16 +195,18 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscFunctionBeginUser;
   SbScopeSet(&scope, "body", "", body->name);
   PetscCall(SbOptionString(&scope, "mesh", sizeof(body->mesh), body->mesh));
-  PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file", body->name);
+  PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file",
+             body->name);
   PetscCall(SbTetOptionsRead(&scope, body->mesh, &body->tet));
   PetscCall(SbOptionInt(&scope, "mesh_step", &body->mesh_step));
   PetscCall(SbOptionReal(&scope, "scale", &body->scale));
   PetscCall(SbOptionReals(&scope, "rotate", body->rotate));
-  axis = PetscAbsReal(body->rotate[0]) + PetscAbsReal(body->rotate[1]) + PetscAbsReal(body->rotate[2]);
-  PetscCheck(
-    axis > 0 || body->rotate[3] == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-    "-body_%s_rotate: the axis 0,0,0 has no direction; give x,y,z of the axis, then the angle in degrees",
-    body->name);
+  axis =
+    PetscAbsReal(body->rotate[0]) + PetscAbsReal(body->rotate[1]) + PetscAbsReal(body->rotate[2]);
+  PetscCheck(axis > 0 || body->rotate[3] == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_rotate: the axis 0,0,0 has no direction; give x,y,z of the axis, then the "
+             "angle in degrees",
+             body->name);
   PetscCall(SbOptionReals(&scope, "translate", body->translate));
   PetscCall(read_type(&scope, "element", SbElementList, body->element));
   PetscCall(read_type(&scope, "material", SbMaterialList, body->material));
@@ -189,23 +217,26 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
   for (int k = 0; k < 3; k++) {
     /* constant velocities are stored in the body */
-    if (SbFormulaUses(model->start[i].velocity[k], 'x')) continue;
+    if (SbFormulaUses(model->start[i].velocity[k], 'x'))
+      continue;
     body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }
   PetscCall(SbOptionGiven(&scope, "displacement", &model->start[i].moved));
   PetscCall(SbOptionString(&scope, "state", sizeof(model->start[i].state), model->start[i].state));
-  PetscCheck(!model->start[i].state[0] || !model->start[i].moved, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-body_%s_state and -body_%s_displacement both say where the body begins: give one of them",
-             body->name, body->name);
+  PetscCheck(
+    !model->start[i].state[0] || !model->start[i].moved, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-body_%s_state and -body_%s_displacement both say where the body begins: give one of them",
+    body->name, body->name);
   PetscCall(SbOptionReals(&scope, "angular_velocity", body->angular_velocity));
 
   /* append the materials of its inclusions */
   PetscCall(SbOptionNames(&scope, "inclusions", &n, &inclusions));
   PetscCheck(n <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name, n,
-             SB_INCLUSION_MAX);
-  PetscCall(PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
+             "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d",
+             body->name, n, SB_INCLUSION_MAX);
+  PetscCall(
+    PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
   for (PetscInt k = 0; k < n; k++) {
     SbScopeSet(&scope, "inclusion", "", inclusions[k]);
     PetscCall(read_type(&scope, "material", SbMaterialList, law));
@@ -245,9 +276,11 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
       }
       for (PetscInt j = 0; j < b; j++)
         PetscCheck(strcasecmp(model->body[j].name, body->name), PETSC_COMM_SELF, PETSC_ERR_USER,
-                   "-bodies: two bodies are named '%s', which copies are too; rename one", body->name);
+                   "-bodies: two bodies are named '%s', which copies are too; rename one",
+                   body->name);
       PetscCall(read_body(model, b));
-      if (ncopy[i]) SbPlacementAdd(&copy[i][k], body);
+      if (ncopy[i])
+        SbPlacementAdd(&copy[i][k], body);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -264,7 +297,8 @@ static PetscErrorCode read_bodies(SbModel model)
   PetscCall(read_names("bodies", "body", &n, &names));
   PetscCall(PetscCalloc2(n, &ncopy, n, &copy));
   ierr = read_named_bodies(model, n, (const char(*)[SB_NAME_MAX])names, ncopy, copy);
-  for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(copy[i]));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(PetscFree(copy[i]));
   PetscCall(PetscFree2(ncopy, copy));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(ierr);
@@ -274,14 +308,16 @@ static PetscErrorCode read_bodies(SbModel model)
 static PetscInt find_body(SbModel model, const char *name)
 {
   for (PetscInt i = 0; i < model->nbody; i++)
-    if (!strcmp(model->body[i].name, name) || !strcmp(model->body[i].copy_of, name)) return i;
+    if (!strcmp(model->body[i].name, name) || !strcmp(model->body[i].copy_of, name))
+      return i;
   return -1;
 }
 
 static PetscInt find_set(SbModel model, const char *name)
 {
   for (PetscInt i = 0; i < model->nset; i++)
-    if (!strcmp(model->set[i].name, name)) return i;
+    if (!strcmp(model->set[i].name, name))
+      return i;
   return -1;
 }
 
@@ -292,15 +328,16 @@ static PetscErrorCode read_set(SbModel model, const char *name)
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCheck(find_body(model, name) < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-sets: '%s' is the name of a body and means the whole of it; give the set another name", name);
+  PetscCheck(
+    find_body(model, name) < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-sets: '%s' is the name of a body and means the whole of it; give the set another name", name);
   SbScopeSet(&scope, "set", "", name);
   SbOptionName(&scope, "at", sizeof(option), option);
   PetscCall(SbOptionString(&scope, "at", sizeof(text), text));
   PetscCall(SbSetParse(option, text, set));
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
-  PetscCheck(set->shape != SB_SET_BODY || find_body(model, set->group) >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s: the scenario has no body %s", option, text, set->group);
+  PetscCheck(set->shape != SB_SET_BODY || find_body(model, set->group) >= 0, PETSC_COMM_SELF,
+             PETSC_ERR_USER, "%s %s: the scenario has no body %s", option, text, set->group);
   model->nset++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -311,7 +348,8 @@ static PetscErrorCode use_name(SbModel model, const char *name)
   SbSet *set = &model->set[model->nset];
 
   PetscFunctionBeginUser;
-  if (find_set(model, name) >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (find_set(model, name) >= 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
   set->shape = find_body(model, name) >= 0 ? SB_SET_BODY
                : !strcmp(name, "all")      ? SB_SET_HALFSPACE
@@ -340,17 +378,21 @@ static PetscErrorCode read_sets(SbModel model)
   PetscCall(read_names("sets", "set", &n, &names));
   room = n;
   PetscCall(PetscCalloc1(n + SB_SET_MAX + 1, &model->set));
-  for (PetscInt i = 0; i < n && !ierr; i++) ierr = read_set(model, names[i]);
+  for (PetscInt i = 0; i < n && !ierr; i++)
+    ierr = read_set(model, names[i]);
   PetscCall(PetscFree(names));
   PetscCall(ierr);
   for (PetscInt e = 0; e < model->neffect; e++) {
     // sets of an effect; none if its type has no such option
     SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
-    if (!SbOptionFind(&scope, "on")) continue;
+    if (!SbOptionFind(&scope, "on"))
+      continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
-    for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
+    for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++)
+      PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
   }
+
   /* sets over which probes average */
   PetscCall(SbOptionNames(&SbRunScope, "probes", &n, &names));
   for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
@@ -358,7 +400,8 @@ static PetscErrorCode read_sets(SbModel model)
 
     SbScopeSet(&scope, "probe", "", names[i / 2]);
     PetscCall(SbOptionString(&scope, i % 2 ? "in" : "on", sizeof(name), name));
-    if (name[0]) PetscCall(use_name(model, name));
+    if (name[0])
+      PetscCall(use_name(model, name));
   }
   PetscCall(PetscFree(names));
   for (PetscInt b = 0; b < model->nbody; b++) {
@@ -383,7 +426,8 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   char(*names)[SB_NAME_MAX];
   PetscInt n;
   PetscErrorCode ierr = PETSC_SUCCESS;
-  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report", "validate"};
+  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report",
+                                     "validate"};
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(model));

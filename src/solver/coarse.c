@@ -1,13 +1,16 @@
 /*
-  The coarse space of two-level preconditioners: units by which nodes move, restriction and prolongation.
+  The coarse space of two-level preconditioners: units by which nodes move, restriction and
+  prolongation.
 
-  Modes that vanish, as the rotations of an aggregate of one node, are the eigenvectors of the Gram matrix sum
-  Z_i^T Z_i with eigenvalues near zero. Only they can make E = Z^T A Z singular (coarse_operator.c).
+  Modes that vanish, as the rotations of an aggregate of one node, are the eigenvectors of the Gram
+  matrix sum Z_i^T Z_i with eigenvalues near zero. Only they can make E = Z^T A Z singular
+  (coarse_operator.c).
 */
 #include "coarse.h"
 #include <petscblaslapack.h>
 
-#define VANISHING 1e-8 /* squared size of a mode, over the largest of its aggregate, that counts as zero */
+#define VANISHING \
+  1e-8 /* squared size of a mode, over the largest of its aggregate, that counts as zero */
 
 PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, SbCoarse *coarse)
 {
@@ -19,14 +22,19 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, Sb
   c->space = s;
   c->aggregated = (PetscBool)(wanted >= 0);
   PetscCall(PetscMalloc1(s->nnode_owned, &c->agg));
-  if (c->aggregated) PetscCall(SbAggregate(s, wanted, &c->nagg, c->agg));
-  if (!vertices || !s->edge_node) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c->aggregated)
+    PetscCall(SbAggregate(s, wanted, &c->nagg, c->agg));
+  if (!vertices || !s->edge_node)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(2 * s->nnode + 1, &c->parent));
-  for (PetscInt k = 0; k < 2 * s->nnode; k++) c->parent[k] = k / 2;
+  for (PetscInt k = 0; k < 2 * s->nnode; k++)
+    c->parent[k] = k / 2;
   for (PetscInt k = 0; k < 12 * s->mesh->ncell; k++) {
-    const PetscInt edge = k / 2, i = s->edge_node[edge];
+    const PetscInt edge = k / 2;
+    const PetscInt i = s->edge_node[edge];
 
-    if (i >= 0) c->parent[2 * i + k % 2] = s->cell_node[4 * (edge / 6) + SbTetEdge[edge % 6][k % 2]];
+    if (i >= 0)
+      c->parent[2 * i + k % 2] = s->cell_node[4 * (edge / 6) + SbTetEdge[edge % 6][k % 2]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -49,7 +57,8 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
   SbCoarse c = *coarse;
 
   PetscFunctionBeginUser;
-  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!c)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(free_pattern(c));
   PetscCall(SbBlockSolverDestroy(&c->direct));
   PetscCall(PCDestroy(&c->solver));
@@ -66,7 +75,8 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 /* c += Z_i^T f for one node: force and torque. */
 SB_INLINE void add_moments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])
 {
-  for (int k = 0; k < 3; k++) m[k] += f[k];
+  for (int k = 0; k < 3; k++)
+    m[k] += f[k];
   m[3] += d[1] * f[2] - d[2] * f[1];
   m[4] += d[2] * f[0] - d[0] * f[2];
   m[5] += d[0] * f[1] - d[1] * f[0];
@@ -83,10 +93,13 @@ SB_INLINE void motion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3]
 static SbWay way_of(SbCoarse c, PetscInt i, const uint8_t contact[])
 {
   const SbSpace s = c->space;
-  const PetscInt *v = c->parent ? c->parent + 2 * i : NULL, n = s->nnode_owned;
+  const PetscInt *v = c->parent ? c->parent + 2 * i : NULL;
+  const PetscInt n = s->nnode_owned;
 
-  if ((contact && contact[i]) || (c->aggregated && c->agg[i] < 0)) return SB_ITSELF;
-  if (v && v[0] != v[1]) return !c->aggregated || (v[0] < n && v[1] < n) ? SB_MEAN : SB_ITSELF;
+  if ((contact && contact[i]) || (c->aggregated && c->agg[i] < 0))
+    return SB_ITSELF;
+  if (v && v[0] != v[1])
+    return !c->aggregated || (v[0] < n && v[1] < n) ? SB_MEAN : SB_ITSELF;
   return c->aggregated && !(v && s->element[s->node_body[i]]->nodes_per[1]) ? SB_MEMBER : SB_ITSELF;
 }
 
@@ -99,23 +112,27 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   PetscInt *count;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc5(c->nall, &c->way, c->nall, &c->moved, 2 * c->nall, &c->unit, 3 * c->nall, &c->d,
-                         2 * c->nall, &c->other));
+  PetscCall(PetscMalloc5(c->nall, &c->way, c->nall, &c->moved, 2 * c->nall, &c->unit, 3 * c->nall,
+                         &c->d, 2 * c->nall, &c->other));
   PetscCall(PetscCalloc3(4 * c->nagg, &c->centre, 36 * c->nagg, &c->null, c->nagg, &c->row_of));
   PetscCall(PetscCalloc2(c->nagg, &count, 3 * s->nnode, &number));
 
-  /* block rows of nodes that move by themselves, then of aggregates, which lack nodes in contact; centres */
+  /* block rows of nodes that move by themselves, then of aggregates, which lack nodes in contact;
+     centres */
   c->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     c->way[i] = (uint8_t)way_of(c, i, contact);
     c->unit[2 * i] = c->way[i] == SB_ITSELF && (!c->aggregated || c->agg[i] >= 0) ? c->n++ : -1;
     c->unit[2 * i + 1] = -1;
-    if (c->way[i] != SB_MEMBER) continue;
-    for (int k = 0; k < 3; k++) c->centre[4 * c->agg[i] + k] += s->node_x[3 * i + k];
+    if (c->way[i] != SB_MEMBER)
+      continue;
+    for (int k = 0; k < 3; k++)
+      c->centre[4 * c->agg[i] + k] += s->node_x[3 * i + k];
     count[c->agg[i]]++;
   }
   for (PetscInt a = 0; a < c->nagg; a++) {
-    for (int k = 0; k < 3; k++) c->centre[4 * a + k] /= (PetscReal)PetscMax(1, count[a]);
+    for (int k = 0; k < 3; k++)
+      c->centre[4 * a + k] /= (PetscReal)PetscMax(1, count[a]);
     c->row_of[a] = count[a] ? c->n : -1;
     c->n += count[a] ? 2 : 0;
   }
@@ -123,30 +140,37 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
   PetscCall(PetscMalloc2(c->n, &c->weight, c->n + 1, &c->ia));
-  for (PetscInt k = 0; k < c->n; k++) c->weight[k] = 1.;
+  for (PetscInt k = 0; k < c->n; k++)
+    c->weight[k] = 1.;
 
   /* their radii; positions over them */
   for (PetscInt k = 0; k < 3 * n; k++) {
     const PetscInt a = c->way[k / 3] == SB_MEMBER ? c->agg[k / 3] : -1;
 
     c->d[k] = a < 0 ? 0. : s->node_x[k] - c->centre[4 * a + k % 3];
-    if (a >= 0) c->centre[4 * a + 3] += PetscSqr(c->d[k]) / (PetscReal)count[a];
+    if (a >= 0)
+      c->centre[4 * a + 3] += PetscSqr(c->d[k]) / (PetscReal)count[a];
   }
   for (PetscInt a = 0; a < c->nagg; a++) {
     c->centre[4 * a + 3] = count[a] > 1 ? PetscSqrtReal(c->centre[4 * a + 3]) : 0.;
-    if (count[a]) c->weight[c->row_of[a]] = c->weight[c->row_of[a] + 1] = 1. / (PetscReal)count[a];
+    if (count[a])
+      c->weight[c->row_of[a]] = c->weight[c->row_of[a] + 1] = 1. / (PetscReal)count[a];
   }
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal radius = c->way[i] == SB_MEMBER ? c->centre[4 * c->agg[i] + 3] : 0.;
 
-    for (int k = 0; k < 3; k++) c->d[3 * i + k] = radius > 0. ? c->d[3 * i + k] / radius : 0.;
-    if (c->way[i] == SB_MEMBER) c->unit[2 * i] = c->row_of[c->agg[i]];
-    if (c->unit[2 * i] >= 0) c->unit[2 * i] += c->first;
+    for (int k = 0; k < 3; k++)
+      c->d[3 * i + k] = radius > 0. ? c->d[3 * i + k] / radius : 0.;
+    if (c->way[i] == SB_MEMBER)
+      c->unit[2 * i] = c->row_of[c->agg[i]];
+    if (c->unit[2 * i] >= 0)
+      c->unit[2 * i] += c->first;
     number[3 * i] = (PetscReal)c->unit[2 * i];
   }
 
   /* edge nodes have those of their vertices */
-  if (c->parent) PetscCall(SbSpaceUpdateGhosts(s, number));
+  if (c->parent)
+    PetscCall(SbSpaceUpdateGhosts(s, number));
   for (PetscInt i = 0; i < n; i++) {
     c->moved[i] = 0;
     for (int q = 0; q < 2 && c->way[i] == SB_MEAN; q++) {
@@ -168,54 +192,67 @@ static PetscErrorCode find_vanishing(SbCoarse c)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int m = 0; m < 6 && c->way[i] == SB_MEMBER; m++) {
-      PetscReal unit[6] = {0.}, u[3];
+      PetscReal unit[6] = {0.};
+      PetscReal u[3];
 
       unit[m] = 1.;
       motion(c->d + 3 * i, unit, u);
-      for (int q = 0; q < 3; q++) u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
+      for (int q = 0; q < 3; q++)
+        u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
       add_moments(c->d + 3 * i, u, c->null + 36 * c->agg[i] + 6 * m);
     }
   }
   for (PetscInt a = 0; a < c->nagg; a++) {
-    PetscReal gram[36], eigen[6], work[64], *projector = c->null + 36 * a;
-    PetscBLASInt six = 6, nwork = 64, info;
+    PetscReal gram[36], eigen[6], work[64];
+    PetscReal *projector = c->null + 36 * a;
+    PetscBLASInt six = 6;
+    PetscBLASInt nwork = 64;
+    PetscBLASInt info;
 
     PetscCall(PetscArraycpy(gram, projector, 36));
     PetscCall(PetscArrayzero(projector, 36));
-    PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &six, gram, &six, eigen, work, &nwork, &info));
+    PetscCallBLAS("LAPACKsyev",
+                  LAPACKsyev_("V", "U", &six, gram, &six, eigen, work, &nwork, &info));
     PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
     for (int v = 0; v < 6 && eigen[v] <= VANISHING * eigen[5]; v++)
-      for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
+      for (int e = 0; e < 36; e++)
+        projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The units of the ghosts in the rows of A, from their owners; then units are renumbered, own ones first. */
+/* The units of the ghosts in the rows of A, from their owners; then units are renumbered, own ones
+   first. */
 static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
 {
-  const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
+  const PetscInt n = c->space->nnode_owned;
+  const PetscInt nghost = c->nall - n;
   PetscReal(*share)[6];
   Vec all;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(c->nall, &share));
   for (PetscInt i = 0; i < n; i++) {
-    for (int q = 0; q < 2; q++) share[i][q] = (PetscReal)c->unit[2 * i + q];
+    for (int q = 0; q < 2; q++)
+      share[i][q] = (PetscReal)c->unit[2 * i + q];
     share[i][2] = (PetscReal)(64 * c->way[i] + c->moved[i]);
-    for (int q = 0; q < 3; q++) share[i][3 + q] = c->d[3 * i + q];
+    for (int q = 0; q < 3; q++)
+      share[i][3 + q] = c->d[3 * i + q];
   }
   if (c->space->ghosted) {
-    PetscCall(
-      VecCreateGhostBlockWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, nghost, ghost, share[0], &all));
+    PetscCall(VecCreateGhostBlockWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, nghost, ghost,
+                                           share[0], &all));
     PetscCall(VecGhostUpdateBegin(all, INSERT_VALUES, SCATTER_FORWARD));
     PetscCall(VecGhostUpdateEnd(all, INSERT_VALUES, SCATTER_FORWARD));
     PetscCall(VecDestroy(&all));
   }
   for (PetscInt i = n; i < c->nall; i++) {
-    for (int q = 0; q < 2; q++) c->unit[2 * i + q] = (PetscInt)share[i][q];
+    for (int q = 0; q < 2; q++)
+      c->unit[2 * i + q] = (PetscInt)share[i][q];
     c->way[i] = (uint8_t)((PetscInt)share[i][2] / 64);
     c->moved[i] = (uint8_t)((PetscInt)share[i][2] % 64);
-    for (int q = 0; q < 3; q++) c->d[3 * i + q] = share[i][3 + q];
+    for (int q = 0; q < 3; q++)
+      c->d[3 * i + q] = share[i][3 + q];
   }
   PetscCall(PetscFree(share));
 
@@ -224,7 +261,8 @@ static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
   for (PetscInt k = 0; k < 2 * c->nall; k++) {
     const PetscInt u = c->unit[k];
 
-    if (u >= 0 && (u < c->first || u >= c->first + c->n)) c->other[c->nother++] = u;
+    if (u >= 0 && (u < c->first || u >= c->first + c->n))
+      c->other[c->nother++] = u;
   }
   PetscCall(PetscSortRemoveDupsInt(&c->nother, c->other));
   for (PetscInt k = 0; k < 2 * c->nall; k++) {
@@ -240,21 +278,27 @@ static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
 
 PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
 {
-  const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
+  const PetscInt n = s->nnode_owned;
+  const PetscInt nz = s->plan->di[n] + s->plan->oi[n];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(n + 1, ia, nz, ja));
   PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
-  for (PetscInt k = 0; k < nz; k++) (*ja)[k] = s->gnode[(*ja)[k]];
+  for (PetscInt k = 0; k < nz; k++)
+    (*ja)[k] = s->gnode[(*ja)[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of a unit have the units of its nodes' neighbours; ia, column: rows of A, own nodes and ghosts. */
+/* The rows of a unit have the units of its nodes' neighbours; ia, column: rows of A, own nodes and
+   ghosts. */
 static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscInt column[])
 {
-  PetscInt *start, *member, *mark, nz = 0, size = 0;
+  PetscInt *start, *member, *mark;
+  PetscInt nz = 0;
+  PetscInt size = 0;
 
   PetscFunctionBeginUser;
+
   /* nodes by unit; each is listed for each of its units */
   PetscCall(SbBucketByKey(2 * c->space->nnode_owned, c->unit, c->n, &start, &member));
   PetscCall(PetscCalloc1(c->n + c->nother, &mark));
@@ -264,9 +308,11 @@ static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscI
     c->ia[u] = nz;
     for (PetscInt m = start[u]; m < start[u + 1]; m++) {
       for (PetscInt k = 2 * ia[member[m] / 2]; k < 2 * ia[member[m] / 2 + 1]; k++) {
-        const PetscInt v = 2 * column[k / 2] + k % 2, b = c->unit[v];
+        const PetscInt v = 2 * column[k / 2] + k % 2;
+        const PetscInt b = c->unit[v];
 
-        if (b < 0 || mark[b] == stamp) continue;
+        if (b < 0 || mark[b] == stamp)
+          continue;
         mark[b] = stamp;
         PetscCall(SbReserve(nz + 2, sizeof(*c->ja), &size, &c->ja));
         for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++)
@@ -274,6 +320,7 @@ static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscI
       }
     }
     PetscCall(PetscSortInt(nz - c->ia[u], c->ja + c->ia[u]));
+
     /* the rotation of an aggregate has the members of its translation */
     if (start[u + 1] > start[u] && c->way[member[start[u]] / 2] == SB_MEMBER) {
       const PetscInt length = nz - c->ia[u];
@@ -295,8 +342,12 @@ static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscI
 PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const SbContactRows *rows)
 {
   const SbSpace s = c->space;
-  const PetscInt n = s->nnode_owned, *ghost = NULL;
-  PetscInt *ia = NULL, *ja = NULL, *column, nghost = 0;
+  const PetscInt n = s->nnode_owned;
+  const PetscInt *ghost = NULL;
+  PetscInt *ia = NULL;
+  PetscInt *ja = NULL;
+  PetscInt *column;
+  PetscInt nghost = 0;
   Mat far;
 
   PetscFunctionBeginUser;
@@ -319,26 +370,30 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const SbContactRows *rows)
   PetscCall(PetscMalloc1(ia[n], &column));
   for (PetscInt k = 0; k < ia[n]; k++) {
     column[k] = ja[k] - s->gnode_start;
-    if (column[k] >= 0 && column[k] < n) continue;
+    if (column[k] >= 0 && column[k] < n)
+      continue;
     PetscCall(PetscFindInt(ja[k], nghost / 3, ghost, &column[k]));
     column[k] += n;
   }
   c->widest = 1;
-  for (PetscInt i = 0; i < n; i++) c->widest = PetscMax(c->widest, 2 * (ia[i + 1] - ia[i]));
+  for (PetscInt i = 0; i < n; i++)
+    c->widest = PetscMax(c->widest, 2 * (ia[i + 1] - ia[i]));
   PetscCall(find_pattern(c, ia, column));
   PetscCall(PetscFree(column));
-  if (!rows) PetscCall(PetscFree2(ia, ja));
+  if (!rows)
+    PetscCall(PetscFree2(ia, ja));
   c->changed = PETSC_TRUE;
 
   /* vectors, with ghosts where nodes move by units of other ranks */
   c->wide = (PetscBool)(!c->aggregated && s->ghosted);
   if (s->ghosted)
-    PetscCall(
-      VecCreateGhostBlock(s->comm, 3, 3 * c->n, PETSC_DECIDE, c->wide ? c->nother : 0, c->other, &c->c));
+    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * c->n, PETSC_DECIDE, c->wide ? c->nother : 0,
+                                  c->other, &c->c));
   else
     PetscCall(VecCreateSeq(s->comm, 3 * c->n, &c->c));
   PetscCall(VecDuplicate(c->c, &c->y));
-  if (c->s) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c->s)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatCreateVecs(A, &c->s, &c->t));
   PetscCall(VecDuplicate(c->s, &c->w));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -359,25 +414,31 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
   PetscCall(VecGetArrayRead(R, &r));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt *unit = c->unit + 2 * i;
-    PetscReal f[3], moment[6] = {0.};
+    PetscReal f[3];
+    PetscReal moment[6] = {0.};
 
     for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++)
-      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) m[3 * unit[e / 3] + e % 3] += 0.5 * r[3 * i + e % 3];
-    if (unit[0] < 0 || c->way[i] == SB_MEAN) continue;
+      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e))
+        m[3 * unit[e / 3] + e % 3] += 0.5 * r[3 * i + e % 3];
+    if (unit[0] < 0 || c->way[i] == SB_MEAN)
+      continue;
     for (int q = 0; q < 3; q++) {
       f[q] = c->way[i] == SB_MEMBER && s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
       norm2[1] += f[q] * f[q];
     }
     add_moments(c->d + 3 * i, f, moment);
-    for (int q = 0; q < (c->way[i] == SB_MEMBER ? 6 : 3); q++) m[3 * unit[0] + q] += moment[q];
+    for (int q = 0; q < (c->way[i] == SB_MEMBER ? 6 : 3); q++)
+      m[3 * unit[0] + q] += moment[q];
   }
-  for (PetscInt k = 0; k < 3 * c->n; k++) norm2[0] += PetscSqr(m[k]) * c->weight[k / 3];
+  for (PetscInt k = 0; k < 3 * c->n; k++)
+    norm2[0] += PetscSqr(m[k]) * c->weight[k / 3];
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(VecRestoreArray(to, &m));
   PetscCall(VecGhostRestoreLocalForm(c->c, &to));
   PetscCall(VecGhostUpdateBegin(c->c, ADD_VALUES, SCATTER_REVERSE));
   PetscCall(VecGhostUpdateEnd(c->c, ADD_VALUES, SCATTER_REVERSE));
-  if (!share) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!share)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, s->comm));
   *share = norm2[1] > 0. ? PetscSqrtReal(norm2[0] / norm2[1]) : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -391,7 +452,8 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   Vec from;
 
   PetscFunctionBeginUser;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!c->N)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (c->direct)
     PetscCall(SbBlockSolverSolve(c->direct, c->c, c->y));
   else
@@ -406,11 +468,15 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
     PetscReal u[3];
 
     for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++)
-      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) z[3 * i + e % 3] += 0.5 * x[3 * unit[e / 3] + e % 3];
-    for (int q = 0; q < 3 && unit[0] >= 0 && c->way[i] == SB_ITSELF; q++) z[3 * i + q] += x[3 * unit[0] + q];
-    if (c->way[i] != SB_MEMBER) continue;
+      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e))
+        z[3 * i + e % 3] += 0.5 * x[3 * unit[e / 3] + e % 3];
+    for (int q = 0; q < 3 && unit[0] >= 0 && c->way[i] == SB_ITSELF; q++)
+      z[3 * i + q] += x[3 * unit[0] + q];
+    if (c->way[i] != SB_MEMBER)
+      continue;
     motion(c->d + 3 * i, x + 3 * unit[0], u);
-    for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
+    for (int q = 0; q < 3; q++)
+      z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
   }
   PetscCall(VecRestoreArray(Z, &z));
   PetscCall(VecRestoreArrayRead(from, &x));

@@ -1,17 +1,18 @@
 /*
-  coarse.h - coarse spaces: aggregates of nodes, single nodes, vertices of P2; their operator and its solver.
-  Used by pc_coarse.c.
+  coarse.h - coarse spaces: aggregates of nodes, single nodes, vertices of P2; their operator and
+  its solver. Used by pc_coarse.c.
 */
 #pragma once
 #include "block_solver.h"
 #include "sbassembly.h"
 
 /*
-  SbAggregate - partitions the free nodes of this rank into connected, round aggregates of about equal size.
+  SbAggregate - partitions the free nodes of this rank into connected, round aggregates of about
+  equal size.
 
-  Not collective. Input: space with its plan; wanted, approximate number of aggregates. Output: n, their
-  number; agg[nnode_owned], the aggregate of each node, -1 for fully prescribed nodes. An aggregate has nodes
-  of one body only.
+  Not collective. Input: space with its plan; wanted, approximate number of aggregates. Output: n,
+  their number; agg[nnode_owned], the aggregate of each node, -1 for fully prescribed nodes. An
+  aggregate has nodes of one body only.
 */
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
 
@@ -24,35 +25,45 @@ typedef struct {
   uint8_t *contact; /* [n] the node is in contact */
 } SbContactRows;
 
-/* Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns; by
-   unknowns of its own; of P2's edge nodes by the mean of two vertices. */
-typedef enum { SB_MEMBER, SB_ITSELF, SB_MEAN } SbWay;
+/* Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns;
+   by unknowns of its own; of P2's edge nodes by the mean of two vertices. */
+typedef enum {
+  SB_MEMBER,
+  SB_ITSELF,
+  SB_MEAN
+} SbWay;
 
-/* The coarse space, columns Z, and E = Z^T A Z, which consists of 3x3 blocks: one block row for a node that
-   moves by itself, two for an aggregate, translation t and rotation w. They are distributed over the ranks as
-   the nodes are. */
+/* The coarse space, columns Z, and E = Z^T A Z, which consists of 3x3 blocks: one block row for a
+   node that moves by itself, two for an aggregate, translation t and rotation w. They are
+   distributed over the ranks as the nodes are. */
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
   SbSpace space;
   PetscBool aggregated; /* nodes are aggregated; else all are themselves or means */
-  PetscInt nagg, *agg;  /* number of own aggregates; [nnode_owned] that of each node, -1: fully prescribed */
-  PetscInt *parent;     /* [nnode][2] vertices of an edge node of P2, else the node twice; NULL: not in use */
+  PetscInt nagg,
+    *agg; /* number of own aggregates; [nnode_owned] that of each node, -1: fully prescribed */
+  PetscInt
+    *parent; /* [nnode][2] vertices of an edge node of P2, else the node twice; NULL: not in use */
   /* of own nodes, then those of other ranks in the rows of A, ascending: */
   PetscInt nall;
-  uint8_t *way;      /* [nall] SbWay */
-  uint8_t *moved;    /* [nall] SB_MEAN: bits of the components that move by the first, by the second vertex */
-  PetscInt *unit;    /* [nall][2] block rows of E by which the node moves, own ones first, -1: none */
-  PetscReal *d;      /* [nall][3] position relative to the aggregate's centre, over its radius */
+  uint8_t *way; /* [nall] SbWay */
+  uint8_t *
+    moved; /* [nall] SB_MEAN: bits of the components that move by the first, by the second vertex */
+  PetscInt *unit; /* [nall][2] block rows of E by which the node moves, own ones first, -1: none */
+  PetscReal *d;   /* [nall][3] position relative to the aggregate's centre, over its radius */
   PetscReal *centre; /* [nagg][4] centre, m, and radius, m, 0 for a single node */
-  PetscReal *null;   /* [nagg][36] projector onto the modes that vanish (single nodes, nodes on a line) */
-  PetscInt *row_of;  /* [nagg] its first own block row, -1: it has no nodes */
-  PetscInt n, first, N;    /* number of own block rows, number of the first one, of those of all ranks */
-  PetscInt nother, *other; /* [nother] numbers of block rows of other ranks, ascending: units n, n + 1, ... */
-  PetscReal *weight;       /* [n] 1 / number of nodes of the row's aggregate */
-  PetscInt *ia, *ja;       /* pattern of the own rows: [n+1]; [ia[n]] numbers of columns, ascending */
-  PetscInt widest;         /* largest number of units in a row of A Z */
-  PetscReal *value;        /* [ia[n]][9] blocks, row-major, N/m */
-  PetscBool changed;       /* the pattern is new to the solver */
+  PetscReal
+    *null; /* [nagg][36] projector onto the modes that vanish (single nodes, nodes on a line) */
+  PetscInt *row_of; /* [nagg] its first own block row, -1: it has no nodes */
+  PetscInt n, first,
+    N; /* number of own block rows, number of the first one, of those of all ranks */
+  PetscInt nother,
+    *other; /* [nother] numbers of block rows of other ranks, ascending: units n, n + 1, ... */
+  PetscReal *weight; /* [n] 1 / number of nodes of the row's aggregate */
+  PetscInt *ia, *ja; /* pattern of the own rows: [n+1]; [ia[n]] numbers of columns, ascending */
+  PetscInt widest;   /* largest number of units in a row of A Z */
+  PetscReal *value;  /* [ia[n]][9] blocks, row-major, N/m */
+  PetscBool changed; /* the pattern is new to the solver */
   PetscBool ok;
   /* the solver: block_solver.c; or a factorisation, or multigrid, of E */
   SbBlockSolver direct;
@@ -64,33 +75,37 @@ struct _p_SbCoarse {
   Vec s, t, w;    /* work vectors of the nodes */
 };
 
-/* Collective. wanted: number of aggregates on this rank, negative: no node is aggregated; vertices: edge
-   nodes of P2 move by the mean of their vertices, in the presence of aggregates only if both are this
-   rank's. */
+/* Collective. wanted: number of aggregates on this rank, negative: no node is aggregated; vertices:
+   edge nodes of P2 move by the mean of their vertices, in the presence of aggregates only if both
+   are this rank's. */
 PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool vertices, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
-/* Finds the units and the pattern of E. A: BAIJ or SBAIJ; rows: its pattern, and nodes in contact, which move
-   by themselves; NULL: that of the space, and none. Collective. */
+/* Finds the units and the pattern of E. A: BAIJ or SBAIJ; rows: its pattern, and nodes in contact,
+   which move by themselves; NULL: that of the space, and none. Collective. */
 PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const SbContactRows *rows);
-/* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern. Collective. */
+/* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern.
+   Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
-/* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be positive
-   definite: with a factorisation always, with multigrid perhaps not. Collective. */
+/* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be
+   positive definite: with a factorisation always, with multigrid perhaps not. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
 /* The second half of SbCoarseSetUp(), after coarse->value. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
-/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z, or NULL. Collective. */
+/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z, or NULL.
+   Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
 /* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
 /* x += Z E^-1 Z^T (b - A x). Collective. */
 PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 
-/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not collective. */
+/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not
+   collective. */
 PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
 
 /* Position of a column in row r, whose columns are ascending; -1: none. */
-static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r, PetscInt column)
+static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r,
+                                 PetscInt column)
 {
   PetscInt place;
 
@@ -99,12 +114,13 @@ static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], Petsc
 }
 
 /*
-  SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev with the diagonal blocks, or Gauss-Seidel
-  for P2 bodies that are not too large, and an exactly solved coarse space: nodes in contact, and rigid-body
-  modes of aggregates of the others or the vertices of P2.
+  SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev with the diagonal blocks, or
+  Gauss-Seidel for P2 bodies that are not too large, and an exactly solved coarse space: nodes in
+  contact, and rigid-body modes of aggregates of the others or the vertices of P2.
 
-  Collective; space and rows are borrowed. The operator of pc is a matrix with these rows and the fast
-  product, another matrix when their pattern or the nodes in contact have changed. Output: the solver of the
-  coarse space, borrowed.
+  Collective; space and rows are borrowed. The operator of pc is a matrix with these rows and the
+  fast product, another matrix when their pattern or the nodes in contact have changed. Output: the
+  solver of the coarse space, borrowed.
 */
-PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc, SbBlockSolver *coarse);
+PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc,
+                                 SbBlockSolver *coarse);

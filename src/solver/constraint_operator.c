@@ -1,10 +1,11 @@
 /*
-  Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and
-  M_A^-1 = P M^-1 P around any preconditioner M. If K lacks a part of the tangent, A has the complete one, and
-  K is the preconditioner's matrix.
+  Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k
+  G) P, and M_A^-1 = P M^-1 P around any preconditioner M. If K lacks a part of the tangent, A has
+  the complete one, and K is the preconditioner's matrix.
 
-  With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A in the null
-  space, so that one iteration is enough, up to rounding. Without active constraints M itself is used.
+  With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A
+  in the null space, so that one iteration is enough, up to rounding. Without active constraints M
+  itself is used.
 */
 #include "solver_impl.h"
 #include "sblog.h"
@@ -42,19 +43,21 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBool singular, SbSaddle saddle,
-                                           Mat *A)
+PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBool singular,
+                                           SbSaddle saddle, Mat *A)
 {
   const PetscInt n = 3 * s->nnode_owned;
 
   PetscFunctionBeginUser;
   PetscCall(MatCreateShell(s->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, A));
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
-  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)(!s->constraints->nonsymmetric && whole == K)));
+  PetscCall(
+    MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)(!s->constraints->nonsymmetric && whole == K)));
   s->constraints->K = K;
   s->constraints->whole = whole;
   s->constraints->saddle = saddle;
-  if (singular && saddle != SB_SADDLE_DIRECT) PetscCall(PetscCalloc1(n, &s->constraints->added));
+  if (singular && saddle != SB_SADDLE_DIRECT)
+    PetscCall(PetscCalloc1(n, &s->constraints->added));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,8 +81,10 @@ static PetscErrorCode setup_wrapped(PC pc)
   PetscCall(PCSetOperators(w->inner, K, K));
   PetscCall(PCSetFailedReason(pc, PC_NOERROR));
   w->space->constraints->matrix++;
+
   /* no set-up of M: K alone may be singular */
-  if (SbConstraintsFactored(w->space)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (SbConstraintsFactored(w->space))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCSetUp(w->inner));
   PetscCall(PCGetFailedReason(w->inner, &reason));
   PetscCall(PCSetFailedReason(pc, reason));
@@ -96,7 +101,8 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
   PetscCall(PCShellGetContext(pc, &w));
   factored = SbConstraintsFactored(w->space);
   if (w->space->constraints->nexact) {
-    if (!w->r) PetscCall(VecDuplicate(r, &w->r));
+    if (!w->r)
+      PetscCall(VecDuplicate(r, &w->r));
     PetscCall(VecCopy(r, w->r));
     PetscCall(project(w->space, w->r));
     r = w->r;
@@ -107,8 +113,10 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
     PetscCall(PCApply(w->inner, r, z));
     PetscCall(PCGetFailedReason(w->inner, &reason));
   }
-  if (w->space->constraints->nexact && !reason) PetscCall(project(w->space, z));
-  if (reason || factored) PetscCall(PCSetFailedReason(pc, reason));
+  if (w->space->constraints->nexact && !reason)
+    PetscCall(project(w->space, z));
+  if (reason || factored)
+    PetscCall(PCSetFailedReason(pc, reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,7 +150,8 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace s, PC pc, PC *inner)
 
   PetscFunctionBeginUser;
   *inner = pc;
-  if (!SbConstraintsSeparate(s)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!SbConstraintsSeparate(s))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&w));
   w->space = s;
   PetscCall(PCCreate(s->comm, &w->inner));
@@ -168,8 +177,10 @@ PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context)
   PetscFunctionBeginUser;
   *(void **)context = NULL;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is) PetscCall(PCShellGetName(pc, &own));
-  if (own && !strcmp(own, name)) PetscCall(PCShellGetContext(pc, context));
+  if (is)
+    PetscCall(PCShellGetName(pc, &own));
+  if (own && !strcmp(own, name))
+    PetscCall(PCShellGetContext(pc, context));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

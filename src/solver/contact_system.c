@@ -1,20 +1,21 @@
 /*
-  contact_system.c - linear systems of bodies in contact: the sparse tangent plus contact blocks, which couple
-  nodes without a common cell.
+  contact_system.c - linear systems of bodies in contact: the sparse tangent plus contact blocks,
+  which couple nodes without a common cell.
 
-  Their sum is one matrix of 3x3 blocks, whose pattern grows as contact needs; blocks that contact has not
-  used for KEEP solves are dropped at the next growth. So most Newton iterations change values only, and the
-  symbolic factorisation and the coarse space are reused.
+  Their sum is one matrix of 3x3 blocks, whose pattern grows as contact needs; blocks that contact
+  has not used for KEEP solves are dropped at the next growth. So most Newton iterations change
+  values only, and the symbolic factorisation and the coarse space are reused.
 
-  Systems are solved by CG with the coarse space of pc_coarse.c, to a tolerance of FORCING in the norm of the
-  preconditioner, or factored on one rank (block_solver.c). The limit of CG's iterations costs as much as the
-  factorisation: the operations of both factorisations follow from the symbolic ones, the work of an iteration
-  from the numbers of blocks of the matrix and of the coarse factor. Unused iterations are credited to later
-  solves. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each
-  time that CG fails again at once. So thin bodies, those with much contact, and some near nu = 1/2 are
-  factored. A solve with a matrix that is not positive definite fails: by a pivot of the factor, or by a
-  direction of negative curvature in CG. With -pc_type or -contact_pc_type, PETSc's preconditioner of that
-  name replaces both; -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
+  Systems are solved by CG with the coarse space of pc_coarse.c, to a tolerance of FORCING in the
+  norm of the preconditioner, or factored on one rank (block_solver.c). The limit of CG's iterations
+  costs as much as the factorisation: the operations of both factorisations follow from the symbolic
+  ones, the work of an iteration from the numbers of blocks of the matrix and of the coarse factor.
+  Unused iterations are credited to later solves. A system that needs more is factored, and so are
+  those of the next PAUSE solves, twice as many each time that CG fails again at once. So thin
+  bodies, those with much contact, and some near nu = 1/2 are factored. A solve with a matrix that
+  is not positive definite fails: by a pivot of the factor, or by a direction of negative curvature
+  in CG. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name replaces both;
+  -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
   -sub_pc_type) apply here, too.
 */
 #include "coarse.h"
@@ -24,14 +25,16 @@
 #define KEEP 20      /* solves after which an unused block is dropped from the pattern */
 #define SMALL 2000   /* unknowns up to which all is factored: same numbers on any number of ranks */
 #define FORCING 1e-2 /* relative tolerance of CG, norm of the preconditioned residual */
-#define WORK 130     /* operations of a factorisation in the time that an iteration takes for one 3x3 block */
-#define SET_UP 4     /* set-up time of the coarse space without its factor, in iterations */
-#define SAVED 10     /* largest credit of iterations, over those that cost as much as a factorisation */
-#define PAUSE 20     /* solves that are factored after CG was slower */
-#define LARGE 100000 /* number of unknowns above which the cost of a factorisation is not computed */
-#define MOST 300     /* limit of iterations in any case */
-/* Relative tolerance with a preconditioner of the user: no factorisation follows, and its errors are in soft
-   modes, which make a step look short. */
+#define WORK \
+  130 /* operations of a factorisation in the time that an iteration takes for one 3x3 block */
+#define SET_UP 4 /* set-up time of the coarse space without its factor, in iterations */
+#define SAVED 10 /* largest credit of iterations, over those that cost as much as a factorisation */
+#define PAUSE 20 /* solves that are factored after CG was slower */
+#define LARGE \
+  100000         /* number of unknowns above which the cost of a factorisation is not computed */
+#define MOST 300 /* limit of iterations in any case */
+/* Relative tolerance with a preconditioner of the user: no factorisation follows, and its errors
+   are in soft modes, which make a step look short. */
 #define FORCING_USER 1e-4
 #define MOST_USER 5000
 
@@ -41,25 +44,29 @@ struct _p_SbContactSystem {
   SbContactRows rows;
   PetscInt *ka, *kj; /* pattern of the tangent: [n+1]; [ka[n]] global nodes */
   PetscInt *place;   /* [ka[n]] position of the tangent's blocks in rows.value */
-  PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
-  PetscInt *until;   /* [n] last solve for which the node is in contact, KEEP after it was, 0: never */
+  PetscInt
+    *used; /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
+  PetscInt
+    *until; /* [n] last solve for which the node is in contact, KEEP after it was, 0: never */
   PetscInt nsolve;
-  PetscInt limit, most;         /* limits of CG's iterations: by options; by the cost of a factorisation */
-  PetscInt budget;              /* credit of iterations */
-  PetscInt resume, pause;       /* number of the solve in which CG is tried again; solves until then */
-  PetscReal *tangent;           /* [ka[n]][9] blocks of the tangent */
-  PetscBool fresh[2];           /* matrix, factor: lack the current values */
-  PetscBool foreign[2];         /* matrix, factor: have an old pattern */
-  char method[32], type[32];    /* the user's Krylov method and preconditioner, "": none */
+  PetscInt limit, most; /* limits of CG's iterations: by options; by the cost of a factorisation */
+  PetscInt budget;      /* credit of iterations */
+  PetscInt resume, pause;    /* number of the solve in which CG is tried again; solves until then */
+  PetscReal *tangent;        /* [ka[n]][9] blocks of the tangent */
+  PetscBool fresh[2];        /* matrix, factor: lack the current values */
+  PetscBool foreign[2];      /* matrix, factor: have an old pattern */
+  char method[32], type[32]; /* the user's Krylov method and preconditioner, "": none */
   SbBlockSolver factor, coarse; /* of all; of the coarse space, borrowed */
   KSP ksp;
   Mat A;
 };
 
-/* The user's Krylov method, unless NULL, and preconditioner, "" if not set; room for 32 characters each. */
+/* The user's Krylov method, unless NULL, and preconditioner, "" if not set; room for 32 characters
+   each. */
 static PetscErrorCode user_types(char method[], char type[])
 {
-  static const char *const options[] = {"-ksp_type", "-contact_ksp_type", "-pc_type", "-contact_pc_type"};
+  static const char *const options[] = {"-ksp_type", "-contact_ksp_type", "-pc_type",
+                                        "-contact_pc_type"};
 
   PetscFunctionBeginUser;
   for (int k = method ? 0 : 2; k < 4; k++)
@@ -112,28 +119,35 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
 static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
   const PetscInt n = c->rows.n;
-  PetscInt *key, *first, *order, *ia, *ja, *used, nz = 0;
+  PetscInt *key, *first, *order, *ia, *ja, *used;
+  PetscInt nz = 0;
   const SbContactRows old = c->rows;
 
   PetscFunctionBeginUser;
+
   /* contact blocks by rows */
   PetscCall(PetscMalloc1(b->n, &key));
-  for (PetscInt k = 0; k < b->n; k++) key[k] = b->block[k].v[0];
+  for (PetscInt k = 0; k < b->n; k++)
+    key[k] = b->block[k].v[0];
   PetscCall(SbBucketByKey(b->n, key, n, &first, &order));
   PetscCall(PetscFree(key));
 
   /* each row: columns of the tangent, those of the old pattern still in use, those of contact */
-  PetscCall(PetscMalloc3(n + 1, &ia, c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
+  PetscCall(
+    PetscMalloc3(n + 1, &ia, c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
   ia[0] = 0;
   for (PetscInt r = 0; r < n; r++) {
-    PetscInt *column = ja + nz, *stamp = used + nz, m = 0;
+    PetscInt *column = ja + nz;
+    PetscInt *stamp = used + nz;
+    PetscInt m = 0;
 
     for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++, m++) {
       column[m] = c->kj[k];
       stamp[m] = -1;
     }
     for (PetscInt k = old.ia[r]; k < old.ia[r + 1]; k++) {
-      if (c->used[k] < 0 || c->used[k] + KEEP < c->nsolve) continue;
+      if (c->used[k] < 0 || c->used[k] + KEEP < c->nsolve)
+        continue;
       column[m] = old.ja[k];
       stamp[m++] = c->used[k];
     }
@@ -160,7 +174,8 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   c->used = used;
   PetscCall(PetscMalloc1(9 * (size_t)nz, &c->rows.value));
   for (PetscInt r = 0; r < n; r++)
-    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = SbRowFind(ia, ja, r, c->kj[k]);
+    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++)
+      c->place[k] = SbRowFind(ia, ja, r, c->kj[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -185,23 +200,29 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, NULL, c->ka, NULL, c->tangent));
+
   /* blocks of the tangent are overwritten, those of contact alone start from zero */
   for (PetscInt k = 0; k < rows->ia[rows->n]; k++)
-    if (c->used[k] >= 0) PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
+    if (c->used[k] >= 0)
+      PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
   for (PetscInt k = 0; k < c->ka[rows->n]; k++)
-    for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
+    for (int e = 0; e < 9; e++)
+      rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt place = SbRowFind(rows->ia, rows->ja, b->block[k].v[0], b->block[k].v[1]);
     PetscReal *to = rows->value + 9 * (size_t)place;
 
-    if (c->used[place] >= 0) c->used[place] = c->nsolve;
-    for (int e = 0; e < 9; e++) to[e] += b->block[k].H[e];
+    if (c->used[place] >= 0)
+      c->used[place] = c->nsolve;
+    for (int e = 0; e < 9; e++)
+      to[e] += b->block[k].H[e];
   }
   c->fresh[0] = c->fresh[1] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the rows into the parts of PETSc's matrix: column-major blocks, of SBAIJ from the diagonal on. */
+/* Copies the rows into the parts of PETSc's matrix: column-major blocks, of SBAIJ from the diagonal
+   on. */
 static PetscErrorCode fill_matrix(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
@@ -211,17 +232,21 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
 
   PetscFunctionBeginUser;
   PetscCall(SbMatGetBlocks(c->A, PETSC_FALSE, &b));
-  for (int q = 0; q < 2; q++) to[q] = b.value[q];
+  for (int q = 0; q < 2; q++)
+    to[q] = b.value[q];
   for (PetscInt i = 0; i < rows->n; i++) {
     for (PetscInt k = rows->ia[i]; k < rows->ia[i + 1]; k++) {
       const int q = rows->ja[k] < first || rows->ja[k] >= first + rows->n;
 
-      if (b.symmetric && rows->ja[k] < i) continue;
-      for (int e = 0; e < 9; e++) to[q][3 * (e % 3) + e / 3] = rows->value[9 * (size_t)k + (size_t)e];
+      if (b.symmetric && rows->ja[k] < i)
+        continue;
+      for (int e = 0; e < 9; e++)
+        to[q][3 * (e % 3) + e / 3] = rows->value[9 * (size_t)k + (size_t)e];
       to[q] += 9;
     }
   }
   PetscCall(SbMatRestoreBlocks(&b));
+
   /* assembles the sequential parts as well: their state increases */
   PetscCall(MatAssemblyBegin(c->A, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(c->A, MAT_FINAL_ASSEMBLY));
@@ -233,7 +258,8 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
 {
   const SbSpace s = c->space;
   const SbContactRows *rows = &c->rows;
-  PetscBool own = (PetscBool)!c->type[0], apart;
+  PetscBool own = (PetscBool)!c->type[0];
+  PetscBool apart;
   Mat P;
   PC pc;
 
@@ -244,20 +270,25 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
     PetscCall(MatSetBlockSize(c->A, 3));
     PetscCall(MatSetType(c->A, own && !s->ghosted ? MATSBAIJ : MATBAIJ));
-    if (own && !s->ghosted) PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
+    if (own && !s->ghosted)
+      PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
     PetscCall(MatSeqSBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatSeqBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatMPIBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
-    if (own) PetscCall(SbProductAttach(c->A));
+    if (own)
+      PetscCall(SbProductAttach(c->A));
   }
   PetscCall(fill_matrix(c));
   if (!c->ksp) {
     PetscCall(KSPCreate(s->comm, &c->ksp));
-    /* options for -pc_type, from its preset in solver.c and the user, have no prefix in the database */
+
+    /* options for -pc_type, from its preset in solver.c and the user, have no prefix in the
+       database */
     PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &apart));
-    if (own || apart) PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
-    PetscCall(
-      KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10, own ? MOST : MOST_USER));
+    if (own || apart)
+      PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
+    PetscCall(KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10,
+                               own ? MOST : MOST_USER));
     PetscCall(KSPGetPC(c->ksp, &pc));
     if (own)
       PetscCall(SbPCContactCreate(s, rows, pc, &c->coarse));
@@ -273,7 +304,8 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(MatSetOption(P, MAT_SYMMETRIC, PETSC_TRUE));
   }
   PetscCall(KSPSetOperators(c->ksp, P, P));
-  if (!own) PetscCall(MatDestroy(&P));
+  if (!own)
+    PetscCall(MatDestroy(&P));
   c->foreign[0] = c->fresh[0] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -282,11 +314,14 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
 static PetscErrorCode find_most(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
-  PetscReal nblock = (PetscReal)rows->ia[rows->n], flops[2], entries[2];
+  PetscReal nblock = (PetscReal)rows->ia[rows->n];
+  PetscReal flops[2], entries[2];
 
   PetscFunctionBeginUser;
   c->most = c->limit;
-  if (c->choice || 3 * c->space->Nnode > LARGE) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c->choice || 3 * c->space->Nnode > LARGE)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* a pattern with little more contact costs as much as the one examined last */
   if (!c->factor) {
     PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
@@ -297,8 +332,8 @@ static PetscErrorCode find_most(SbContactSystem c)
   PetscCall(SbBlockSolverCost(c->coarse, &flops[1], &entries[1]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nblock, 1, MPIU_REAL, MPI_SUM, c->space->comm));
   nblock += entries[1] / 9.;
-  c->most =
-    (PetscInt)PetscClipInterval((flops[0] - flops[1]) / (WORK * nblock) - SET_UP, 0., (PetscReal)c->limit);
+  c->most = (PetscInt)PetscClipInterval((flops[0] - flops[1]) / (WORK * nblock) - SET_UP, 0.,
+                                        (PetscReal)c->limit);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,17 +343,21 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   const PetscBool changed = c->foreign[0];
 
   PetscFunctionBeginUser;
-  if (c->fresh[0]) PetscCall(set_up_iteration(c));
+  if (c->fresh[0])
+    PetscCall(set_up_iteration(c));
+
   /* PETSc's log events count the set-up and the iteration */
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPSetUp(c->ksp));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (!c->type[0]) {
-    if (changed) PetscCall(find_most(c));
+    if (changed)
+      PetscCall(find_most(c));
     c->budget = PetscMin(c->budget + c->most, SAVED * c->most);
-    PetscCall(
-      KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PetscMin(c->limit, c->budget)));
-    if (!c->budget) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT,
+                               PetscMin(c->limit, c->budget)));
+    if (!c->budget)
+      PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPSolve(c->ksp, F, Y));
@@ -329,36 +368,45 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks, PetscBool fresh, Vec F,
-                                    Vec Y, KSPConvergedReason *reason, PetscInt *iterations)
+PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks,
+                                    PetscBool fresh, Vec F, Vec Y, KSPConvergedReason *reason,
+                                    PetscInt *iterations)
 {
   const SbContactRows *rows = &c->rows;
-  PetscBool factored, slow, ok = PETSC_TRUE;
+  PetscBool factored, slow;
+  PetscBool ok = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
+  if (fresh || !c->rows.value)
+    PetscCall(merge(c, K, blocks));
+
   /* factor by choice, if small, while CG pauses, or if a factor of these values exists */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
                           (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));
   *iterations = 0;
   *reason = KSP_DIVERGED_ITS;
-  if (!factored) PetscCall(iterate(c, F, Y, reason, iterations));
+  if (!factored)
+    PetscCall(iterate(c, F, Y, reason, iterations));
   slow = (PetscBool)(!factored && *reason == KSP_DIVERGED_ITS && !c->type[0]);
-  if (!factored) c->pause = slow ? PetscMax(PAUSE, 2 * c->pause) : 0;
+  if (!factored)
+    c->pause = slow ? PetscMax(PAUSE, 2 * c->pause) : 0;
   if (slow) {
     c->resume = c->nsolve + c->pause;
     c->budget = 0;
   }
   if (factored || slow) {
-    if (!c->factor) PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
+    if (!c->factor)
+      PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
     if (c->fresh[1]) {
-      PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value, c->foreign[1], &ok));
+      PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value,
+                                   c->foreign[1], &ok));
       c->foreign[1] = PETSC_FALSE;
     }
     c->fresh[1] = (PetscBool)!ok;
-    if (ok) PetscCall(SbBlockSolverSolve(c->factor, F, Y));
+    if (ok)
+      PetscCall(SbBlockSolverSolve(c->factor, F, Y));
     *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
     ++*iterations;
   }
@@ -371,7 +419,8 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   SbContactSystem c = *system;
 
   PetscFunctionBeginUser;
-  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!c)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));

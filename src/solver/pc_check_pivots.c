@@ -1,8 +1,9 @@
 /*
-  CHOLMOD through PETSc raises an error with a trace at a non-positive pivot: a body without supports, or a
-  tangent that is indefinite in compression. Here it is a failed factorisation, as with other packages: the
-  solve fails, and the step is halved or the run stops with one line. If the matrix is gathered on one rank
-  (pc_direct.c), all ranks get the failure. MUMPS can factor again after a failure.
+  CHOLMOD through PETSc raises an error with a trace at a non-positive pivot: a body without
+  supports, or a tangent that is indefinite in compression. Here it is a failed factorisation, as
+  with other packages: the solve fails, and the step is halved or the run stops with one line. If
+  the matrix is gathered on one rank (pc_direct.c), all ranks get the failure. MUMPS can factor
+  again after a failure.
 
   petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
 */
@@ -12,9 +13,9 @@
 #define ORIGINAL "SbPCSetUpOriginal_C"
 #define ORIGINAL_APPLY "SbPCApplyOriginal_C"
 
-/* PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as
-   the matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them during the
-   factorisation, and they are freed after a failure. */
+/* PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as
+   large as the matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them
+   during the factorisation, and they are freed after a failure. */
 static struct {
   PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
   PetscErrorCode (*release)(void *, int, const char[], const char[]);
@@ -36,7 +37,8 @@ static PetscErrorCode note_allocate(size_t size, PetscBool clear, int line, cons
 static PetscErrorCode note_release(void *p, int line, const char function[], const char file[])
 {
   for (int k = 0; k < noted.n; k++)
-    if (noted.wrapped[k] == p) noted.wrapped[k] = NULL;
+    if (noted.wrapped[k] == p)
+      noted.wrapped[k] = NULL;
   return (*noted.release)(p, line, function, file);
 }
 
@@ -50,12 +52,15 @@ static PetscErrorCode guarded_setup(PC pc)
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
-  // after a failure PETSc treats MUMPS' analysis as failed, and does not factor again: create a new factor
+
+  // after a failure PETSc treats MUMPS' analysis as failed, and does not factor again: create a new
+  // factor
   PetscCall(PCFactorGetMatSolverType(pc, &package));
   if (package && !strcmp(package, MATSOLVERMUMPS) && pc->setupcalled) {
     PetscCall(PCFactorGetMatrix(pc, &factor));
     PetscCall(MatFactorGetError(factor, &before));
-    if (before) pc->flag = DIFFERENT_NONZERO_PATTERN;
+    if (before)
+      pc->flag = DIFFERENT_NONZERO_PATTERN;
   }
   noted.allocate = PetscTrMalloc;
   noted.release = PetscTrFree;
@@ -68,7 +73,8 @@ static PetscErrorCode guarded_setup(PC pc)
   PetscTrMalloc = noted.allocate;
   PetscTrFree = noted.release;
   if (error == PETSC_ERR_MAT_CH_ZRPVT) {
-    for (int k = 0; k < noted.n; k++) PetscCall(PetscFree(noted.wrapped[k]));
+    for (int k = 0; k < noted.n; k++)
+      PetscCall(PetscFree(noted.wrapped[k]));
     PetscCall(PCSetFailedReason(pc, PC_FACTOR_NUMERIC_ZEROPIVOT));
     PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -92,7 +98,8 @@ static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Factors in the set-up instead of the first solve, and tells all ranks whether the factorisation failed. */
+/* Factors in the set-up instead of the first solve, and tells all ranks whether the factorisation
+   failed. */
 static PetscErrorCode gathered_setup(PC pc)
 {
   PetscErrorCode (*original)(PC) = NULL;
@@ -110,6 +117,7 @@ static PetscErrorCode gathered_setup(PC pc)
 
     /* idle ranks have no inner KSP */
     PetscCall(KSPGetPC(ksp, &inner));
+
     /* before the first set-up the telescope is empty: wrap the factorisation now */
     PetscCall(PCGetApplicationContext(pc, &package));
     if (package && !inner->setupcalled) {
@@ -122,7 +130,8 @@ static PetscErrorCode gathered_setup(PC pc)
     PetscCall(PCGetFailedReason(inner, &reason));
   }
   failed = (PetscMPIInt)reason;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)pc)));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)pc)));
   PetscCall(PCSetFailedReason(pc, (PCFailedReason)failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -134,8 +143,10 @@ PetscErrorCode SbPCCheckPivots(PC pc)
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factored, PCCHOLESKY, PCLU, ""));
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &gathered));
-  if (!factored && !gathered) PetscFunctionReturn(PETSC_SUCCESS);
-  if (pc->ops->setup == guarded_setup || pc->ops->setup == gathered_setup) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!factored && !gathered)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (pc->ops->setup == guarded_setup || pc->ops->setup == gathered_setup)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL, pc->ops->setup));
   PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL_APPLY, pc->ops->apply));
   pc->ops->setup = factored ? guarded_setup : gathered_setup;

@@ -1,14 +1,15 @@
 /*
   Direct solvers by MUMPS or SuiteSparse, on any number of ranks.
 
-  MUMPS factors a distributed matrix. CHOLMOD (positive definite matrices) and UMFPACK (any), both of
-  SuiteSparse, work on one rank: on several, PCTELESCOPE gathers the matrix and each right-hand side there,
-  and the others wait: cheaper than to factor the matrix on every rank (PCREDUNDANT), and up to
-  SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
+  MUMPS factors a distributed matrix. CHOLMOD (positive definite matrices) and UMFPACK (any), both
+  of SuiteSparse, work on one rank: on several, PCTELESCOPE gathers the matrix and each right-hand
+  side there, and the others wait: cheaper than to factor the matrix on every rank (PCREDUNDANT),
+  and up to SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
 */
 #include "solver_impl.h"
 
-PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package)
+PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite,
+                               const char **package)
 {
   const char *order[4];
   PetscBool reproducible;
@@ -18,16 +19,20 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
-  if (definite && (size == 1 || unknowns <= SB_DIRECT_SMALL)) order[n++] = MATSOLVERCHOLMOD;
-  if (size == 1 || !reproducible) order[n++] = MATSOLVERMUMPS;
-  if (definite) order[n++] = MATSOLVERCHOLMOD;
+  if (definite && (size == 1 || unknowns <= SB_DIRECT_SMALL))
+    order[n++] = MATSOLVERCHOLMOD;
+  if (size == 1 || !reproducible)
+    order[n++] = MATSOLVERMUMPS;
+  if (definite)
+    order[n++] = MATSOLVERCHOLMOD;
   order[n++] = MATSOLVERUMFPACK;
   *package = NULL;
   for (int k = 0; k < n && !*package; k++) {
     PetscBool has;
 
     PetscCall(SbHasPackage(order[k], &has));
-    if (has) *package = order[k];
+    if (has)
+      *package = order[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -40,16 +45,22 @@ PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, Pets
   PetscFunctionBeginUser;
   PetscCall(PetscStrToArray(options, ' ', &n, &word));
   for (int k = 0; k < n; k++) {
-    const char *key = word[k] + 1, *value = "";
-    char name[128], there[128] = "";
+    const char *key = word[k] + 1;
+    const char *value = "";
+    char name[128];
+    char there[128] = "";
     PetscBool given;
 
-    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
-    if (!strcmp(key, "ksp_type") || !strcmp(key, "pc_type")) continue;
+    if (k + 1 < n && word[k + 1][0] != '-')
+      value = word[++k];
+    if (!strcmp(key, "ksp_type") || !strcmp(key, "pc_type"))
+      continue;
     PetscCall(PetscSNPrintf(name, sizeof(name), "-%s%s", prefix, key));
     PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
-    if (!clear && !given) PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
-    if (clear && given && !strcmp(there, value)) PetscCall(PetscOptionsClearValue(NULL, name));
+    if (!clear && !given)
+      PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
+    if (clear && given && !strcmp(there, value))
+      PetscCall(PetscOptionsClearValue(NULL, name));
   }
   PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -74,11 +85,12 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
   } else {
     PetscCall(PCSetType(pc, PCTELESCOPE));
     PetscCall(PCTelescopeSetReductionFactor(pc, size));
-    PetscCall(
-      PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* its options are set at the first set-up */
+    PetscCall(PCSetApplicationContext(
+      pc, (void *)(uintptr_t)package)); /* its options are set at the first set-up */
   }
-  /* MUMPS counts all negative pivots only if the last front is not distributed; CHOLMOD otherwise factors
-     small indefinite matrices, by L D L^T, and a failure is the solver's reason */
+
+  /* MUMPS counts all negative pivots only if the last front is not distributed; CHOLMOD otherwise
+     factors small indefinite matrices, by L D L^T, and a failure is the solver's reason */
   PetscCall(SbSolverSetDefaults(prefix,
                                 mumps     ? "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"
                                 : umfpack ? "-mat_umfpack_ordering METIS"
@@ -94,7 +106,8 @@ PetscErrorCode SbPCDirectGathered(PC pc, const char **package)
   PetscFunctionBeginUser;
   *package = NULL;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &is));
-  if (is) PetscCall(PCGetApplicationContext(pc, (void *)package));
+  if (is)
+    PetscCall(PCGetApplicationContext(pc, (void *)package));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,11 +122,14 @@ PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative)
   PetscFunctionBeginUser;
   *negative = -1;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
-  if (cholesky) PetscCall(PCFactorGetMatSolverType(pc, &type));
-  if (!type || strcmp(type, MATSOLVERMUMPS)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (cholesky)
+    PetscCall(PCFactorGetMatSolverType(pc, &type));
+  if (!type || strcmp(type, MATSOLVERMUMPS))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCFactorGetMatrix(pc, &F));
   PetscCall(MatMumpsGetIcntl(F, 13, &serial_root));
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &nrank));
-  if (nrank == 1 || serial_root == 1) PetscCall(MatGetInertia(F, negative, NULL, NULL));
+  if (nrank == 1 || serial_root == 1)
+    PetscCall(MatGetInertia(F, negative, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

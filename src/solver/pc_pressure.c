@@ -1,27 +1,29 @@
 /*
   Nearly incompressible CR and DG: the pressures of the cells as unknowns of the iteration.
 
-  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is equivalent
-  to
+  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is
+  equivalent to
 
     [ A  B^T ] [u]   [r]
     [ B  -C  ] [p] = [0],      C = V / lambda,
 
-  which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the inf-sup
-  condition on every mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V / (2 mu)
-  approximates C + B A^-1 B^T. GMRES with the upper triangular preconditioner of A^ (pc_levels.c) and -S on
-  its right takes a number of iterations that depends neither on lambda nor on the mesh. Benzi, Golub and
-  Liesen (2005), Numerical solution of saddle point problems, sections 10 and 8.
+  which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the
+  inf-sup condition on every mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V /
+  (2 mu) approximates C + B A^-1 B^T. GMRES with the upper triangular preconditioner of A^
+  (pc_levels.c) and -S on its right takes a number of iterations that depends neither on lambda nor
+  on the mesh. Benzi, Golub and Liesen (2005), Numerical solution of saddle point problems, sections
+  10 and 8.
 
-  The outer iteration is iterative refinement: the residual f - K u is computed again and is the next
-  right-hand side. -ksp_rtol applies to it; the iterations reported are those of GMRES. f - K u = r_u - B^T
-  C^-1 r_p contains the residual of the cells times lambda, and GMRES minimises a norm with these weights, up
-  to lambda = 1e4 mu. Beyond that double precision is the limit: at nu = 0.499999 the rounding error of K u is
-  eps |B^T| C^-1 |B| |u| for any solver. A residual below four times this is accepted, with a line of -info,
-  unless it is so large that the matrix must be singular.
+  The outer iteration is iterative refinement: the residual f - K u is computed again and is the
+  next right-hand side. -ksp_rtol applies to it; the iterations reported are those of GMRES. f - K u
+  = r_u - B^T C^-1 r_p contains the residual of the cells times lambda, and GMRES minimises a norm
+  with these weights, up to lambda = 1e4 mu. Beyond that double precision is the limit: at nu =
+  0.499999 the rounding error of K u is eps |B^T| C^-1 |B| |u| for any solver. A residual below four
+  times this is accepted, with a line of -info, unless it is so large that the matrix must be
+  singular.
 
-  Not handled: inertia in S; time steps far below the time in which a shear wave crosses a cell take more
-  iterations.
+  Not handled: inertia in S; time steps far below the time in which a shear wave crosses a cell take
+  more iterations.
 
   petsc/private/kspimpl.h: else the outer solver would report its few corrections as iterations.
 */
@@ -33,7 +35,8 @@
 #define RESTART 120  /* restart length of GMRES: 80 took 97 iterations instead of 81 on 64 ranks */
 #define MARGIN 0.3   /* target of GMRES over the target of the whole solve */
 #define TIGHTER 0.03 /* factor on it after a correction that did not reduce the residual */
-#define OF_PART 1e-2 /* tolerance of GMRES where the operator has terms that K lacks, which FGMRES corrects */
+#define OF_PART \
+  1e-2 /* tolerance of GMRES where the operator has terms that K lacks, which FGMRES corrects */
 #define AT_MOST 1e-2 /* largest accepted residual over the right-hand side */
 #define ROUNDING 4.  /* accepted residual, over the rounding error of K u */
 
@@ -152,12 +155,14 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   Mat A, K;
 
   PetscFunctionBeginUser;
+
   // relative tolerance: target of the whole solve over the current residual
   PetscCall(PCShellGetContext(pc, &s));
   n = 3 * s->space->nnode_owned;
   PetscCall(PCGetOperators(pc, &A, &K));
   PetscCall(VecNorm(r, NORM_2, &norm));
   rtol = A == K ? PetscMin(0.5, PetscMax(1e-10, s->margin * s->target / norm)) : OF_PART;
+
   // the right-hand side, zero for the pressures
   PetscCall(VecZeroEntries(s->b));
   PetscCall(VecGetArray(s->b, &to));
@@ -165,13 +170,16 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscCall(PetscArraycpy(to, from, n));
   PetscCall(VecRestoreArrayRead(r, &from));
   PetscCall(VecRestoreArray(s->b, &to));
+
   // the solve; its iterations count against the limit
   PetscCall(KSPSetTolerances(s->inner, rtol, 0., PETSC_DEFAULT, PetscMax(1, s->limit - s->its)));
   PetscCall(KSPSolve(s->inner, s->b, s->x));
   PetscCall(KSPGetIterationNumber(s->inner, &its));
   PetscCall(KSPGetConvergedReason(s->inner, &reason));
   s->its += its;
-  if (reason < 0 && reason != KSP_DIVERGED_ITS) PetscCall(PCSetFailedReason(pc, PC_SUBPC_ERROR));
+  if (reason < 0 && reason != KSP_DIVERGED_ITS)
+    PetscCall(PCSetFailedReason(pc, PC_SUBPC_ERROR));
+
   // the displacements of the solution
   PetscCall(VecGetArrayRead(s->x, &from));
   PetscCall(VecGetArray(z, &to));
@@ -182,7 +190,8 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
 }
 
 /* PETSc's test; then whether the residual is one of rounding or stagnates. */
-static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConvergedReason *reason, void *ctx)
+static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConvergedReason *reason,
+                                void *ctx)
 {
   PetscReal level;
   Pressure *s;
@@ -197,7 +206,8 @@ static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConverg
     s->last = norm;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (s->its >= s->limit) *reason = KSP_DIVERGED_ITS;
+  if (s->its >= s->limit)
+    *reason = KSP_DIVERGED_ITS;
   if (norm > 0.5 * s->last) {
     s->slow++;
     s->margin *= TIGHTER;
@@ -205,8 +215,9 @@ static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConverg
   s->last = norm;
   PetscCall(KSPGetSolution(ksp, &x));
   PetscCall(SbPressureOperatorRounding(s->op, x, &level));
-  PetscCall(PetscInfo(ksp, "residual %g after %" PetscInt_FMT " iterations, wanted %g, rounding of K u %g\n",
-                      (double)norm, s->its, (double)s->target, (double)level));
+  PetscCall(PetscInfo(
+    ksp, "residual %g after %" PetscInt_FMT " iterations, wanted %g, rounding of K u %g\n",
+    (double)norm, s->its, (double)s->target, (double)level));
   if (norm <= PetscMin(ROUNDING * level, AT_MOST * s->size))
     *reason = KSP_CONVERGED_ATOL;
   else if (s->slow > 2)
@@ -245,7 +256,8 @@ static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   (void)b;
   (void)x;
   PetscCall(PCShellGetContext(pc, &s));
-  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " corrections, %" PetscInt_FMT " iterations\n", ksp->its, s->its));
+  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " corrections, %" PetscInt_FMT " iterations\n", ksp->its,
+                      s->its));
   ksp->its = s->its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -257,7 +269,8 @@ static PetscErrorCode PCView_Pressure(PC pc, PetscViewer viewer)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &s));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  nodes, and pressures of the cells as unknowns\n"));
-  if (s->inner) PetscCall(KSPView(s->inner, viewer));
+  if (s->inner)
+    PetscCall(KSPView(s->inner, viewer));
   if (s->op && s->op->levels->multigrid)
     PetscCall(PCView(s->op->levels->multigrid, viewer));
   else if (s->op)

@@ -2,32 +2,35 @@
   The tangent with a separate volumetric part: K = A + B^T C^-1 B.
 
   Every law's tangent is A + sum over cells of lambda / V b b^T, b_a = V D grad psi_a
-  (SbMaterialOps.volumetric). A does not contain lambda and is stored; a row of B is the vector b of a cell; C
-  is diagonal, V / lambda of each cell. K x is computed from these, without cancellation of terms with lambda.
+  (SbMaterialOps.volumetric). A does not contain lambda and is stored; a row of B is the vector b of
+  a cell; C is diagonal, V / lambda of each cell. K x is computed from these, without cancellation
+  of terms with lambda.
 
-  In the vectors of the iteration the pressures p of the cells follow the displacements of the nodes. A cell's
-  pressure belongs to the rank that owns the cell; B^T p updates those of the ghost cells. Prescribed
-  unknowns: their columns of B are zero.
+  In the vectors of the iteration the pressures p of the cells follow the displacements of the
+  nodes. A cell's pressure belongs to the rank that owns the cell; B^T p updates those of the ghost
+  cells. Prescribed unknowns: their columns of B are zero.
 */
 #include "pressure.h"
 #include "sbkernel.h"
 #include "sbsolver.h"
 
-#define S0 1.5             /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
 #define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
 
 static void clear_fixed(SbSpace s, PetscReal x[])
 {
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
-    const PetscInt i = s->fixed_node[k / 3], c = k % 3;
+    const PetscInt i = s->fixed_node[k / 3];
+    const PetscInt c = k % 3;
 
-    if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
+    if (s->fixed[i] & (1 << c))
+      x[3 * i + c] = 0.;
   }
 }
 
 /* d = B u; absolute: with |B|. */
-static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
-                                       PetscScalar d[])
+static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[],
+                                       PetscBool absolute, PetscScalar d[])
 {
   SbSpace s = op->space;
   PetscScalar *x;
@@ -35,28 +38,32 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(op->u, &x));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = absolute ? PetscAbsScalar(u[i]) : u[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    x[i] = absolute ? PetscAbsScalar(u[i]) : u[i];
   clear_fixed(s, x);
   PetscCall(VecRestoreArray(op->u, &x));
   PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
+
   /* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
   for (PetscInt b = 0; b < s->nbatch_owned; b++) {
     const SbRegion *region = s->batch_region[b];
     const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
-    SbPack cell_u[30], sum = {0};
+    SbPack cell_u[30];
+    SbPack sum = {0};
 
     sb_gather_strain(s, b, local, cell_u);
     for (int k = 0; k < 3 * region->nnode; k++)
       for (int l = 0; l < SB_BATCH; l++)
         sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
+    for (PetscInt l = 0; l < s->batch_n[b]; l++)
+      d[s->batch_cell[b] + l] = sum[l];
   }
   PetscCall(SbSpaceRestoreLocalRead(s, op->u, &local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
-                                             PetscReal factor, PetscScalar y[])
+PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[],
+                                             PetscBool absolute, PetscReal factor, PetscScalar y[])
 {
   SbSpace s = op->space;
   PetscReal *f;
@@ -67,26 +74,31 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
   PetscCall(PetscSFBcastEnd(s->mesh->cell_sf, MPIU_REAL, op->p, op->p, MPI_REPLACE));
   PetscCall(SbSpaceGetLocalWrite(s, op->u, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
+
   /* f = B^T p, complete on owned nodes */
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
     const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
     const PetscReal *value = op->p + s->batch_cell[b];
-    SbPack force[30], lane = {0};
+    SbPack force[30];
+    SbPack lane = {0};
 
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
+    for (PetscInt l = 0; l < s->batch_n[b]; l++)
+      lane[l] = value[l];
     for (int k = 0; k < 3 * region->nnode; k++)
-      for (int l = 0; l < SB_BATCH; l++) force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
+      for (int l = 0; l < SB_BATCH; l++)
+        force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
     sb_scatter_strain(s, b, force, f);
   }
   clear_fixed(s, f);
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    y[i] += factor * f[i];
   PetscCall(SbSpaceRestoreLocalWrite(s, op->u, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
-                                       PetscScalar y[], PetscScalar d[])
+PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[],
+                                       const PetscScalar p[], PetscScalar y[], PetscScalar d[])
 {
   PetscFunctionBeginUser;
   PetscCall(VecPlaceArray(op->a, u));
@@ -110,7 +122,8 @@ static PetscErrorCode add_volumetric(SbPressureOperator op, PetscBool absolute, 
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
   PetscCall(apply_divergence(op, x, absolute, d));
-  for (PetscInt c = 0; c < op->space->mesh->ncell_owned; c++) d[c] *= op->Cinv[c];
+  for (PetscInt c = 0; c < op->space->mesh->ncell_owned; c++)
+    d[c] *= op->Cinv[c];
   PetscCall(SbPressureOperatorAddGradient(op, d, absolute, 1., y));
   PetscCall(VecRestoreArrayRead(X, &x));
   PetscCall(VecRestoreArray(Y, &y));
@@ -157,15 +170,17 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   PetscCall(MatGetDiagonal(op->levels->A[0], D));
   s = op->space;
   PetscCall(PetscCalloc1(3 * s->nnode, &y));
-  /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned nodes. */
+
+  /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned
+     nodes. */
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
     const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
 
     for (PetscInt k = 0; k < 3 * region->nnode; k++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
-                        square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
+        const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.;
+        const PetscReal square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
         const PetscInt node = s->batch_clique[(s->width * b + k / 3) * SB_BATCH + l];
 
         y[3 * node + k % 3] += square * PetscSqr(weight);
@@ -177,7 +192,8 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   }
   clear_fixed(s, y);
   PetscCall(VecGetArray(D, &d));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) d[i] += y[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    d[i] += y[i];
   PetscCall(VecRestoreArray(D, &d));
   PetscCall(PetscFree(y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,7 +209,8 @@ static PetscErrorCode assemble(Mat K, const SbStage *stage)
   PetscCall(MatShellGetContext(K, &op));
   v = op->levels;
   v->stage = *stage;
-  if (v->spring) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->at[0]->nnode_owned));
+  if (v->spring)
+    PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->at[0]->nnode_owned));
   PetscCall(SbSpaceAssembleSplit(v->at[0], stage, v->n, v->at, v->A, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -207,9 +224,12 @@ static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const P
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
   v = op->levels;
-  if (v->multigrid || node >= v->at[0]->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->at[0]->nnode_owned, &v->spring));
-  for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
+  if (v->multigrid || node >= v->at[0]->nnode_owned)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v->spring)
+    PetscCall(PetscCalloc1(9 * (size_t)v->at[0]->nnode_owned, &v->spring));
+  for (int k = 0; k < 9; k++)
+    v->spring[9 * node + k] += factor * block[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -224,11 +244,13 @@ static PetscErrorCode finish(Mat K)
   PetscCall(SbLevelsShareSprings(op->levels));
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
+
   /* C, its inverse, S and weight of the cells, from the moduli of the last assembly */
   for (PetscInt b = 0; b < s->nbatch_owned; b++) {
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       const PetscInt c = s->batch_cell[b] + l;
-      const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
+      const PetscReal V = s->batch_V[b][l];
+      const PetscReal modulus = op->volume.modulus[b][l];
       PetscReal square = 0.;
 
       for (int k = 0; k < 3 * s->batch_region[b]->nnode; k++)
@@ -238,7 +260,8 @@ static PetscErrorCode finish(Mat K)
       op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
       op->weight[c] = 1.;
       if (modulus > 0.)
-        op->weight[c] = PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
+        op->weight[c] =
+          PetscSqrtReal(square) * PetscMin(modulus / V, LARGEST_WEIGHT / (op->S[c] - op->C[c]));
     }
   }
   PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* increases the object state */
@@ -268,23 +291,26 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   SbPressureOperator op;
 
   PetscFunctionBeginUser;
-  PetscCheck(!s->faces != !s->edge_node, s->comm, PETSC_ERR_USER,
-             "-solver pressure is for bodies with -body_<name>_element p2, or with cr or dg, %s: choose "
-             "auto, or cg_two_level",
-             s->faces ? "not for both in one run" : "and there are none");
+  PetscCheck(
+    !s->faces != !s->edge_node, s->comm, PETSC_ERR_USER,
+    "-solver pressure is for bodies with -body_<name>_element p2, or with cr or dg, %s: choose "
+    "auto, or cg_two_level",
+    s->faces ? "not for both in one run" : "and there are none");
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));
   op->volume.stride = s->edge_node ? 30 : 12;
-  PetscCall(PetscMalloc((size_t)(s->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
+  PetscCall(
+    PetscMalloc((size_t)(s->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
   op->volume.modulus = op->volume.b + op->volume.stride * s->nbatch;
   op->volume.shear = op->volume.modulus + s->nbatch;
-  PetscCall(PetscMalloc5(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->weight, s->mesh->ncell, &op->p));
+  PetscCall(
+    PetscMalloc5(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->weight, s->mesh->ncell, &op->p));
   PetscCall(SbSpaceCreateVec(s, &op->u));
   PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
-  PetscCall(
-    MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));
+  PetscCall(MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE,
+                           PETSC_DETERMINE, op, K));
   PetscCall(MatSetBlockSize(*K, 3));
   PetscCall(MatShellSetOperation(*K, MATOP_MULT, SB_OPERATION(MatMult_Pressure)));
   PetscCall(MatShellSetOperation(*K, MATOP_GET_DIAGONAL, SB_OPERATION(MatGetDiagonal_Pressure)));

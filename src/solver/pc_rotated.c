@@ -1,30 +1,32 @@
 /*
   A preconditioner that rarely factors: P^-1 = Q A0^-1 Q^T.
 
-  The tangent A of a rotated body is nearly the rotated old tangent A0: with Q block diagonal, one rotation
-  per node since the factorisation, P = Q A0 Q^T differs from A only as far as rotations vary across a cell.
-  Small variations hardly change the number of iterations; nodes with large ones are solved exactly
-  (exact_nodes.c). So one factorisation serves a whole run, and a step of a swinging bar takes six to ten
-  iterations to 1e-4.
+  The tangent A of a rotated body is nearly the rotated old tangent A0: with Q block diagonal, one
+  rotation per node since the factorisation, P = Q A0 Q^T differs from A only as far as rotations
+  vary across a cell. Small variations hardly change the number of iterations; nodes with large ones
+  are solved exactly (exact_nodes.c). So one factorisation serves a whole run, and a step of a
+  swinging bar takes six to ten iterations to 1e-4.
 
-  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior
-  nodes, and all ranks together solve the Schur complement on the interface nodes (interface.c): up to
-  rounding the same preconditioner as on one rank.
+  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its
+  interior nodes, and all ranks together solve the Schur complement on the interface nodes
+  (interface.c): up to rounding the same preconditioner as on one rank.
 
-  Prescribed unknowns: fully prescribed nodes are left out and divided by their diagonal; nodes with one or
-  two are not rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts only, so that runs
-  are repeatable.
+  Prescribed unknowns: fully prescribed nodes are left out and divided by their diagonal; nodes with
+  one or two are not rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts
+  only, so that runs are repeatable.
 */
 #include "rotated.h"
 #include "sblog.h"
 
-#define WORSE_FACTOR 4 /* refactor when a solve takes this many times the iterations of the first solve */
-#define WORSE_PLUS 16  /* and at least this many more */
+#define WORSE_FACTOR \
+  4 /* refactor when a solve takes this many times the iterations of the first solve */
+#define WORSE_PLUS 16 /* and at least this many more */
 
 typedef struct {
   SbSpace space;
   SbInterface face;
-  PetscInt n, nkeep; /* nodes of the factor: interior ones, then the nkeep interface nodes adjacent to them */
+  PetscInt n,
+    nkeep; /* nodes of the factor: interior ones, then the nkeep interface nodes adjacent to them */
   PetscInt *node;    /* [n] local nodes of the space */
   PetscInt *local;   /* [nnode] inverse of node, -1 for nodes not in the factor */
   PetscInt *ia, *ja; /* graph of the interior rows */
@@ -52,33 +54,41 @@ static PetscErrorCode number_nodes(Rotated *p)
 {
   SbSpace s = p->space;
   const SbPlan plan = s->plan;
-  PetscInt nz = 0, ninterior;
+  PetscInt nz = 0;
+  PetscInt ninterior;
 
   PetscFunctionBeginUser;
+
   // free nodes of the interior first
   PetscCall(PetscMalloc2(s->nnode, &p->node, s->nnode, &p->local));
-  for (PetscInt i = 0; i < s->nnode; i++) p->local[i] = -1;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    p->local[i] = -1;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (s->fixed[i] == 7 || p->face->index[i] >= 0) continue;
+    if (s->fixed[i] == 7 || p->face->index[i] >= 0)
+      continue;
     p->local[i] = p->n;
     p->node[p->n++] = i;
     nz += plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i];
   }
+
   // then the adjacent interface nodes, which are kept
   ninterior = p->n;
   for (PetscInt i = 0; i < s->nnode; i++) {
-    if (p->face->index[i] < 0) continue;
+    if (p->face->index[i] < 0)
+      continue;
     p->local[i] = p->n;
     p->node[p->n++] = i;
   }
   p->nkeep = p->n - ninterior;
+
   // rows of the interior: columns in the factor
   PetscCall(PetscMalloc2(ninterior + 1, &p->ia, nz, &p->ja));
   PetscCall(SbSpaceGetRows(s, NULL, ninterior, p->node, p->ia, p->ja, NULL));
   nz = 0;
   for (PetscInt k = 0, e = 0; k < ninterior; k++) {
     for (; e < p->ia[k + 1]; e++)
-      if (p->local[p->ja[e]] >= 0) p->ja[nz++] = p->local[p->ja[e]];
+      if (p->local[p->ja[e]] >= 0)
+        p->ja[nz++] = p->local[p->ja[e]];
     p->ia[k + 1] = nz;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -88,36 +98,48 @@ static PetscErrorCode number_nodes(Rotated *p)
 static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 {
   SbSpace s = p->space;
-  const PetscInt n = s->nnode_owned, ninterior = p->n - p->nkeep, *kept = p->node + ninterior;
-  const PetscInt *index = p->face->index, nall = s->plan->di[n] + s->plan->oi[n];
-  const size_t m = 3 * (size_t)p->face->n, nkept = 3 * (size_t)p->nkeep;
-  PetscInt *node, *ia, *ja, nz = 0, count = ninterior;
+  const PetscInt n = s->nnode_owned;
+  const PetscInt ninterior = p->n - p->nkeep;
+  const PetscInt *kept = p->node + ninterior;
+  const PetscInt *index = p->face->index;
+  const PetscInt nall = s->plan->di[n] + s->plan->oi[n];
+  const size_t m = 3 * (size_t)p->face->n;
+  const size_t nkept = 3 * (size_t)p->nkeep;
+  PetscInt *node, *ia, *ja;
+  PetscInt nz = 0;
+  PetscInt count = ninterior;
   PetscReal *block, *own, *schur;
 
   PetscFunctionBeginUser;
+
   /* the operator's rows of the interior, then those of interface and fully prescribed nodes */
   PetscCall(PetscMalloc4(n, &node, n + 1, &ia, nall, &ja, 9 * (size_t)nall, &block));
   PetscCall(PetscArraycpy(node, p->node, ninterior));
   for (PetscInt i = 0; i < n; i++)
-    if (index[i] >= 0 || s->fixed[i] == 7) node[count++] = i;
+    if (index[i] >= 0 || s->fixed[i] == 7)
+      node[count++] = i;
   PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
 
   /* factor the interior, without the columns of fully prescribed nodes */
   for (PetscInt at = 0; at < ia[ninterior]; at++) {
-    if (p->local[ja[at]] < 0) continue;
-    for (PetscInt e = 0; e < 9; e++) block[9 * nz + e] = block[9 * at + e];
+    if (p->local[ja[at]] < 0)
+      continue;
+    for (PetscInt e = 0; e < 9; e++)
+      block[9 * nz + e] = block[9 * at + e];
     nz++;
   }
   PetscCall(PetscCalloc2(nkept * nkept, &own, m * m, &schur));
   PetscCall(SbFactorNumeric(p->factor, p->ia, p->ja, block, own, ok));
 
-  /* Schur complement of the interface: its own rows, and the complement of the interior, numbered locally;
-     diagonals of prescribed nodes */
+  /* Schur complement of the interface: its own rows, and the complement of the interior, numbered
+     locally; diagonals of prescribed nodes */
   for (PetscInt k = ninterior; k < n; k++) {
     const PetscInt i = node[k];
 
     for (PetscInt at = ia[k]; at < ia[k + 1]; at++) {
-      const PetscInt j = ja[at], row = index[i], column = index[j];
+      const PetscInt j = ja[at];
+      const PetscInt row = index[i];
+      const PetscInt column = index[j];
 
       for (PetscInt c = 0; c < 3 && i == j && s->fixed[i] == 7; c++)
         p->diagonal[3 * i + c] = (float)(1. / block[9 * at + 4 * c]);
@@ -134,7 +156,8 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
     }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
-  if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * SbFactorBytes(p->factor), schur, ok));
+  if (*ok)
+    PetscCall(SbInterfaceFactorise(p->face, 2 * SbFactorBytes(p->factor), schur, ok));
   PetscCall(PetscFree2(own, schur));
   PetscCall(PetscFree4(node, ia, ja, block));
   p->nfactor++;
@@ -157,15 +180,17 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->factor) {
-    if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+    if (!s->plan)
+      PetscCall(SbPlanCreate(s, &s->plan));
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
     PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &p->factor));
-    PetscCall(
-      PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n, &p->diagonal));
-    PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n, &p->x,
-                           3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
+    PetscCall(PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n,
+                           &p->diagonal));
+    PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n,
+                           &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
   }
+
   /* the rotations of cells that belong to the operator */
   PetscCall(SbMatrixFreeGetRotations(A, &cells));
   if (!cells) {
@@ -175,10 +200,13 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(PetscObjectQuery((PetscObject)A, "sb_state", (PetscObject *)&state));
     PetscCheck(state || s->linear, s->comm, PETSC_ERR_ARG_WRONGSTATE,
                "The operator does not carry its displacement: compose it as sb_state");
-    if (!p->cells) PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &p->cells));
-    if (!s->linear) PetscCall(SbSpaceGetLocalRead(s, state, &u));
+    if (!p->cells)
+      PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &p->cells));
+    if (!s->linear)
+      PetscCall(SbSpaceGetLocalRead(s, state, &u));
     SbSpaceCellRotations(s, u, p->cells);
-    if (!s->linear) PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
+    if (!s->linear)
+      PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
     cells = (const SbPack *)p->cells;
   }
   PetscCall(SbSpaceAverageRotations(s, cells, p->turn, p->spread));
@@ -190,15 +218,18 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(PetscInfo(pc, "factorisation %" PetscInt_FMT "%s\n", p->nfactor,
                         ok ? "" : " failed: not positive definite"));
   }
+
   // the rotation of each node since the factorisation
   for (PetscInt i = 0; i < n; i++) {
     PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
 
-    if (!s->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
-    for (int k = 0; k < 9; k++) p->Q[9 * i + k] = (float)Q[k];
+    if (!s->fixed[i])
+      SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
+    for (int k = 0; k < 9; k++)
+      p->Q[9 * i + k] = (float)Q[k];
   }
-  PetscCall(
-    SbExactNodesSetUp(&p->exact, s, A, p->spread, p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
+  PetscCall(SbExactNodesSetUp(&p->exact, s, A, p->spread,
+                              p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
   PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -207,7 +238,8 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
 /* y = Q x of one node or, back, Q^T x. */
 SB_INLINE void turn(const float Q[9], int back, const float x[3], float y[3])
 {
-  const int row = back ? 1 : 3, column = back ? 3 : 1;
+  const int row = back ? 1 : 3;
+  const int column = back ? 3 : 1;
 
   for (int c = 0; c < 3; c++)
     y[c] = Q[row * c] * x[0] + Q[row * c + column] * x[1] + Q[row * c + 2 * column] * x[2];
@@ -231,15 +263,20 @@ static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
   ninterior = p->n - p->nkeep;
   r = p->r1;
   z = p->z;
+
   // the residual in single precision, without the part of the exact nodes
   PetscCall(VecGetArrayRead(R, &in));
-  for (PetscInt i = 0; i < n; i++) p->r[i] = r[i] = (float)(p->scale * in[i]);
+  for (PetscInt i = 0; i < n; i++)
+    p->r[i] = r[i] = (float)(p->scale * in[i]);
   PetscCall(VecRestoreArrayRead(R, &in));
   SbExactNodesBefore(&p->exact, r);
+
   // Q^T r in the interior, and forward substitution
-  for (PetscInt k = 0; k < ninterior; k++) turn(p->Q + 9 * p->node[k], 1, r + 3 * p->node[k], p->b + 3 * k);
+  for (PetscInt k = 0; k < ninterior; k++)
+    turn(p->Q + 9 * p->node[k], 1, r + 3 * p->node[k], p->b + 3 * k);
   PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
   SbFactorForward(p->factor, p->b, p->kept);
+
   // interface: right-hand side of own rows plus the contributions of the interior
   PetscCall(PetscArrayzero(p->edge, 3 * f->n));
   for (PetscInt k = 0; k < f->nmine; k++)
@@ -249,20 +286,25 @@ static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
   PetscCall(SbInterfaceSolve(f, p->edge));
   for (PetscInt k = 0; k < 3 * p->nkeep; k++)
     p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
+
   // backward substitution, and multiplication by Q
   SbFactorBackward(p->factor, p->kept, p->x);
-  for (PetscInt k = 0; k < ninterior; k++) turn(p->Q + 9 * p->node[k], 0, p->x + 3 * k, z + 3 * p->node[k]);
+  for (PetscInt k = 0; k < ninterior; k++)
+    turn(p->Q + 9 * p->node[k], 0, p->x + 3 * k, z + 3 * p->node[k]);
   for (PetscInt k = 0; k < f->nmine; k++)
     turn(p->Q + 9 * f->mine[k], 0, p->edge + 3 * f->index[f->mine[k]], z + 3 * f->mine[k]);
+
   // prescribed nodes: divide by the diagonal
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
     const PetscInt c = 3 * s->fixed_node[k / 3] + k % 3;
 
-    if (s->fixed[c / 3] == 7) z[c] = p->diagonal[c] * r[c];
+    if (s->fixed[c / 3] == 7)
+      z[c] = p->diagonal[c] * r[c];
   }
   SbExactNodesAfter(&p->exact, p->r, z);
   PetscCall(VecGetArrayWrite(Z, &out));
-  for (PetscInt i = 0; i < n; i++) out[i] = z[i] / p->scale;
+  for (PetscInt i = 0; i < n; i++)
+    out[i] = z[i] / p->scale;
   PetscCall(VecRestoreArrayWrite(Z, &out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -308,17 +350,20 @@ static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  if (!p->factor) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->factor)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SbFactorCost(p->factor, &flops, &entries);
+
   /* an application reads the factor of the interior twice */
-  all = most =
-    1e-6 * (PetscReal)(2 * SbFactorBytes(p->factor) + (PetscInt64)(sizeof(*p->face->word) * p->face->nword));
+  all = most = 1e-6 * (PetscReal)(2 * SbFactorBytes(p->factor) +
+                                  (PetscInt64)(sizeof(*p->face->word) * p->face->nword));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_REAL, MPI_SUM, p->space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, p->space->comm));
   PetscCall(PetscViewerASCIIPrintf(
     viewer,
     "  factor of a past operator turned with the nodes: %" PetscInt_FMT
-    " factorisations, rank 0: %g million entries, %" PetscInt_FMT " nodes exact, interface of %" PetscInt_FMT
+    " factorisations, rank 0: %g million entries, %" PetscInt_FMT
+    " nodes exact, interface of %" PetscInt_FMT
     " nodes; an application reads %g MB, at most %g of them on one rank\n",
     p->nfactor, 1e-6 * (double)entries, p->exact.n, p->face->n, (double)all, (double)most));
   PetscFunctionReturn(PETSC_SUCCESS);

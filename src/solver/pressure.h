@@ -1,13 +1,13 @@
 /*
-  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with the
-  pressures of the cells as unknowns, and the preconditioner of its displacement block.
+  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with
+  the pressures of the cells as unknowns, and the preconditioner of its displacement block.
 */
 #pragma once
 #include "sbassembly.h"
 
-/* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1 for every
-   body. The tangent without its volumetric part is assembled in each. With a P2 body only the space itself,
-   with pc_coarse.c. */
+/* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1
+   for every body. The tangent without its volumetric part is assembled in each. With a P2 body only
+   the space itself, with pc_coarse.c. */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   PetscInt n;    /* number of levels: 2, or 3 with a DG body, 1 with a P2 body */
@@ -19,7 +19,7 @@ struct _p_SbLevels {
   PetscInt *across;  /* [nnode] node on the other side of the face, -1: none */
   PetscReal *weight; /* [nnode] own weight in the mean of the two sides */
   PetscReal *jump;   /* [nnode_owned] inverse stiffness of the jump, m/N */
-  Mat P;             /* of at[n-2] and at[n-1]: a face has the mean of its vertices; else the node itself */
+  Mat P; /* of at[n-2] and at[n-1]: a face has the mean of its vertices; else the node itself */
   Vec r[3], z[3], t[3]; /* work vectors with ghosts; t[0] is the diagonal of A[0] with a DG body */
   PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none so far */
   PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before any rank has springs */
@@ -32,14 +32,14 @@ PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
 /* Adds the springs of all ranks to the other matrices, before their final assembly. Collective. */
 PetscErrorCode SbLevelsShareSprings(SbLevels levels);
-/* After the final assembly. *positive = false: a diagonal block is not positive definite, and SbLevelsApply()
-   must not be called. Collective. */
+/* After the final assembly. *positive = false: a diagonal block is not positive definite, and
+   SbLevelsApply() must not be called. Collective. */
 PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
 /* z = a symmetric approximation of A[0]^-1, applied to r. Collective. */
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 
-/* The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C =
-   V / lambda. The context of the matrix of SbPressureOperatorCreate(). */
+/* The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the
+   cells, C = V / lambda. The context of the matrix of SbPressureOperatorCreate(). */
 typedef struct _p_SbPressureOperator *SbPressureOperator;
 struct _p_SbPressureOperator {
   SbSpace space; /* borrowed */
@@ -56,10 +56,11 @@ struct _p_SbPressureOperator {
   Vec a, b;          /* vectors for A that borrow their arrays */
 };
 /* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts. Collective. */
-PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
-                                       PetscScalar y[], PetscScalar d[]);
+PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[],
+                                       const PetscScalar p[], PetscScalar y[], PetscScalar d[]);
 /* y[3 nnode_owned] += factor B^T p; absolute: with |B|. Collective. */
-PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
-                                             PetscReal factor, PetscScalar y[]);
-/* Norm of the rounding errors of K x from its volumetric part and from the diagonal of A, N. Collective. */
+PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[],
+                                             PetscBool absolute, PetscReal factor, PetscScalar y[]);
+/* Norm of the rounding errors of K x from its volumetric part and from the diagonal of A, N.
+   Collective. */
 PetscErrorCode SbPressureOperatorRounding(SbPressureOperator op, Vec x, PetscReal *level);

@@ -4,33 +4,37 @@
     [ K + F^T k G   F^T ] [ z ]   [ r ]
     [ G             0   ] [ m ] = [ 0 ]
 
-  Each constraint acts on one node, so that its multiplier m is eliminated there (src/fem/constraint.c): with
-  projectors P and Q of the nodes, s the sizes of their blocks and r = P r
+  Each constraint acts on one node, so that its multiplier m is eliminated there
+  (src/fem/constraint.c): with projectors P and Q of the nodes, s the sizes of their blocks and r =
+  P r
 
     (P (K + F^T k G) P + s Q) z = r.
 
-  This is regular even for a singular K, of a body that only constraints support. It is symmetric without
-  friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored again only when K
-  or the constraints have changed.
+  This is regular even for a singular K, of a body that only constraints support. It is symmetric
+  without friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored
+  again only when K or the constraints have changed.
 */
 #include "solver_impl.h"
 #include "rotated.h"
 
-#define DIRECT_STATIC 30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
+#define DIRECT_STATIC \
+  30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
-PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle, char reason[],
-                              size_t size)
+PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
+                              char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *package;
 
   PetscFunctionBeginUser;
   PetscCall(SbDirectPackage(s->comm, unknowns, PETSC_FALSE, &package));
-  PetscCheck(choice != 1 || package, s->comm, PETSC_ERR_USER,
-             "-saddle_solver direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
-             "-saddle_solver iterative");
-  if (!choice) choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
+  PetscCheck(
+    choice != 1 || package, s->comm, PETSC_ERR_USER,
+    "-saddle_solver direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
+    "-saddle_solver iterative");
+  if (!choice)
+    choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
   *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_NONE;
   if (choice == 1)
     PetscCall(PetscSNPrintf(reason, size, "multipliers of contact directly, by %s", package));
@@ -46,24 +50,30 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
   Mat A;
 
   PetscFunctionBeginUser;
+
   /* the factorisation of this K with these constraints is missing */
   if (!c->factored || c->factored_matrix != c->matrix || c->factored_version != c->version) {
-    const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
+    const PetscInt n = s->nnode_owned;
+    const PetscInt nz = s->plan->di[n] + s->plan->oi[n];
     PetscInt *ia, *ja;
     PetscReal *block;
 
     PetscCall(PCDestroy(&c->factored));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
+
     /* K as AIJ; MatConvert() would need parts of the block matrix that are in use */
     PetscCall(PetscMalloc3(n + 1, &ia, nz, &ja, 9 * (size_t)nz, &block));
     PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, ja, block));
     PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_AIJ, &A));
+
     /* springs are added and blocks projected while they are copied */
     for (PetscInt k = 0; k < n; k++) {
       for (PetscInt j = ia[k]; j < ia[k + 1]; j++) {
-        if (ja[j] == k) SbConstraintsAddSprings(s, k, block + 9 * j);
+        if (ja[j] == k)
+          SbConstraintsAddSprings(s, k, block + 9 * j);
         SbConstraintsProjectBlock(s, k, ja[j], 3, 1, block + 9 * j);
-        PetscCall(MatSetValuesBlocked(A, 1, &s->gnode[k], 1, &s->gnode[ja[j]], block + 9 * j, INSERT_VALUES));
+        PetscCall(MatSetValuesBlocked(A, 1, &s->gnode[k], 1, &s->gnode[ja[j]], block + 9 * j,
+                                      INSERT_VALUES));
       }
     }
     PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));

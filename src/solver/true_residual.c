@@ -1,21 +1,22 @@
 /*
   The norm in the convergence test of linear solves, and checks of their solutions.
 
-  The unpreconditioned (true) residual is used wherever the method computes it and the user does not choose a
-  norm; else (minres) the method's default.
+  The unpreconditioned (true) residual is used wherever the method computes it and the user does not
+  choose a norm; else (minres) the method's default.
 
   After a direct solve |b - A x| is computed once.
 
-  Threshold pivoting factors a singular matrix (a body that can still rotate) without an error; FGMRES, which
-  tests its recurrence, then reports convergence with a true residual larger than the right-hand side. Such a
-  solve fails here. Residuals of rounding are far below the bound: near nu = 1/2, with lambda / mu a million,
-  1e-5 of the right-hand side.
+  Threshold pivoting factors a singular matrix (a body that can still rotate) without an error;
+  FGMRES, which tests its recurrence, then reports convergence with a true residual larger than the
+  right-hand side. Such a solve fails here. Residuals of rounding are far below the bound: near nu =
+  1/2, with lambda / mu a million, 1e-5 of the right-hand side.
 
-  The same check follows a solve with another norm where no Newton step tests the residual, and one that ends
-  early by the absolute tolerance, as CG does when the preconditioner maps its residual to zero.
+  The same check follows a solve with another norm where no Newton step tests the residual, and one
+  that ends early by the absolute tolerance, as CG does when the preconditioner maps its residual to
+  zero.
 
-  petsc/private/kspimpl.h: the converged reason has no public setter, the supported norms of a method no
-  public getter.
+  petsc/private/kspimpl.h: the converged reason has no public setter, the supported norms of a
+  method no public getter.
 */
 #include "solver_impl.h"
 #include <petsc/private/kspimpl.h>
@@ -31,10 +32,13 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *early)
   Vec r;
 
   PetscFunctionBeginUser;
-  if (early && ksp->reason != KSP_CONVERGED_ATOL) PetscFunctionReturn(PETSC_SUCCESS);
+  if (early && ksp->reason != KSP_CONVERGED_ATOL)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+
   /* a fixed number of iterations is not convergence */
-  if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPGetOperators(ksp, &A, NULL));
   PetscCall(VecDuplicate(b, &r));
   PetscCall(MatMult(A, x, r));
@@ -44,15 +48,16 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *early)
   PetscCall(VecDestroy(&r));
   if (PetscIsInfOrNanReal(residual) ||
       residual > PetscMax(PetscMax(AT_MOST, 2. * ksp->rtol) * size, ksp->abstol)) {
-    PetscCall(
-      PetscInfo(ksp, "true residual %g of a right-hand side of %g\n", (double)residual, (double)size));
+    PetscCall(PetscInfo(ksp, "true residual %g of a right-hand side of %g\n", (double)residual,
+                        (double)size));
     ksp->reason = KSP_DIVERGED_BREAKDOWN;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* KSPConvergedDefault() with abstol as a tolerance of the true residual. */
-static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConvergedReason *reason, void *ctx)
+static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConvergedReason *reason,
+                                void *ctx)
 {
   PetscReal size;
 
@@ -106,29 +111,37 @@ PetscErrorCode SbKSPFinish(KSP ksp, PetscBool direct, PetscBool alone, PetscBool
   KSPType type;
 
   PetscFunctionBeginUser;
+
   /* whether the method has the norm and the side */
   for (norm = KSP_NORM_NONE; norm < KSP_NORM_MAX; norm++) {
-    if (!norm_support(ksp, norm)) continue;
+    if (!norm_support(ksp, norm))
+      continue;
     any += asked == KSP_NORM_DEFAULT || asked == norm;
     PetscCall(PetscStrlcat(norms, norms[0] ? ", " : "", sizeof(norms)));
     PetscCall(PetscStrlcat(norms, KSPNormTypes[norm], sizeof(norms)));
   }
   PetscCall(KSPGetType(ksp, &type));
   PetscCheck(any, PetscObjectComm((PetscObject)ksp), PETSC_ERR_USER,
-             "-ksp_type %s has no %s%s%s%s: choose -ksp_norm_type from %s, or -ksp_type fgmres", type,
-             asked == KSP_NORM_DEFAULT ? "" : "-ksp_norm_type ",
+             "-ksp_type %s has no %s%s%s%s: choose -ksp_norm_type from %s, or -ksp_type fgmres",
+             type, asked == KSP_NORM_DEFAULT ? "" : "-ksp_norm_type ",
              asked == KSP_NORM_DEFAULT ? "" : KSPNormTypes[asked],
              ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : " -ksp_pc_side ",
              ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : PCSides[ksp->pc_side_set],
              norms[0] ? norms : "none with that side");
-  /* inside Newton's method no check: its next residual is a better test than norms of different scale */
+
+  /* inside Newton's method no check: its next residual is a better test than norms of different
+     scale */
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &always));
   PetscCall(KSPGetNormType(ksp, &norm));
   other = (PetscBool)(norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL);
-  if ((direct && norm == KSP_NORM_UNPRECONDITIONED) || (alone && other)) always = PETSC_TRUE;
-  if (always || alone) PetscCall(KSPSetPostSolve(ksp, check_residual, always ? NULL : ksp));
+  if ((direct && norm == KSP_NORM_UNPRECONDITIONED) || (alone && other))
+    always = PETSC_TRUE;
+  if (always || alone)
+    PetscCall(KSPSetPostSolve(ksp, check_residual, always ? NULL : ksp));
+
   /* the absolute tolerance */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_convergence_test", &users));
-  if (forces && other && !users) PetscCall(KSPSetConvergenceTest(ksp, converged, NULL, NULL));
+  if (forces && other && !users)
+    PetscCall(KSPSetConvergenceTest(ksp, converged, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

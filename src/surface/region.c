@@ -1,23 +1,24 @@
 /*
-  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in
-  which more than two triangles share an edge.
+  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold
+  ones, in which more than two triangles share an edge.
 
-  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to
-  shells; compute shell volumes; find the nesting of surfaces by winding numbers; mark cavities and holes as
-  empty; number and name the remaining regions.
+  Steps: orient the triangles of each surface consistently; join sides of triangles that face each
+  other to shells; compute shell volumes; find the nesting of surfaces by winding numbers; mark
+  cavities and holes as empty; number and name the remaining regions.
 
-  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by
-  angle; the two sides that face each other between consecutive triangles bound the same region and are
-  joined. A connected set of sides is a shell: one with a positive volume is the outer boundary of a region,
-  one with a negative volume is a surface seen from the region around it. That region is bounded by the
-  smallest positive shell with a nonzero winding number there (sum of solid angles, van Oosterom and Strackee
-  1983).
+  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are
+  sorted by angle; the two sides that face each other between consecutive triangles bound the same
+  region and are joined. A connected set of sides is a shell: one with a positive volume is the
+  outer boundary of a region, one with a negative volume is a surface seen from the region around
+  it. That region is bounded by the smallest positive shell with a nonzero winding number there (sum
+  of solid angles, van Oosterom and Strackee 1983).
 
-  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first
-  oriented consistently, by majority. A surface with outward normals encloses material, also inside another
-  one (then a separate region); one with inward normals inside material is a cavity; an outermost one with
-  inward normals is reversed. For non-manifold surfaces, and in formats without orientation (.poly, .smesh),
-  every region is material except the holes given in the file.
+  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface
+  are first oriented consistently, by majority. A surface with outward normals encloses material,
+  also inside another one (then a separate region); one with inward normals inside material is a
+  cavity; an outermost one with inward normals is reversed. For non-manifold surfaces, and in
+  formats without orientation (.poly, .smesh), every region is material except the holes given in
+  the file.
 */
 #include "surface_impl.h"
 
@@ -47,16 +48,21 @@ typedef struct {
   SbKey *edge;       /* [3 ntri] edges, sorted */
   PetscInt *shell;   /* [2 ntri] shell of each side */
   PetscInt *surface; /* [ntri] surface of each triangle */
-  PetscInt *across;  /* [3 ntri] slot on the other side of an edge; -1: more than two triangles share it */
-  PetscInt *list;    /* [3 ntri] triangles that a search has reached, slots of the triangles around an edge */
-  PetscReal *angle;  /* [3 ntri] dihedral angles of the latter about their edge from the first one, rad */
-  int *sense; /* [ntri] 1: oriented as the first triangle that the search for its surface reached, else -1 */
+  PetscInt
+    *across; /* [3 ntri] slot on the other side of an edge; -1: more than two triangles share it */
+  PetscInt
+    *list; /* [3 ntri] triangles that a search has reached, slots of the triangles around an edge */
+  PetscReal
+    *angle; /* [3 ntri] dihedral angles of the latter about their edge from the first one, rad */
+  int *
+    sense; /* [ntri] 1: oriented as the first triangle that the search for its surface reached, else -1 */
   PetscInt nshell, nsurface;
   Shell *shells;
   Surface *surfaces;
 } Arrangement;
 
-/* Orients the triangles of each set connected by manifold edges consistently: the minority is reversed. */
+/* Orients the triangles of each set connected by manifold edges consistently: the minority is
+   reversed. */
 static PetscErrorCode orient_alike(Arrangement *s)
 {
   SbTriangles *t = s->t;
@@ -65,14 +71,18 @@ static PetscErrorCode orient_alike(Arrangement *s)
   PetscFunctionBeginUser;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    for (PetscInt k = 0; k < m; k++) s->across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
+    for (PetscInt k = 0; k < m; k++)
+      s->across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
   }
   PetscCall(PetscArrayzero(s->sense, t->ntri));
   for (PetscInt f = 0; f < t->ntri; f++) {
-    PetscInt nfound = 0, nother = 0;
+    PetscInt nfound = 0;
+    PetscInt nother = 0;
     int wrong;
 
-    if (s->sense[f]) continue;
+    if (s->sense[f])
+      continue;
+
     // breadth-first search from this triangle
     s->list[nfound++] = f;
     s->sense[f] = 1;
@@ -80,31 +90,37 @@ static PetscErrorCode orient_alike(Arrangement *s)
       const PetscInt old = s->list[done];
 
       for (PetscInt k = 3 * old; k < 3 * old + 3; k++) {
-        const PetscInt other = s->across[k], g = other / 3;
+        const PetscInt other = s->across[k];
+        const PetscInt g = other / 3;
         int expected;
 
-        if (other < 0) continue;
+        if (other < 0)
+          continue;
+
         // consistently oriented neighbours traverse their edge in opposite directions
         expected = t->tri[other] != t->tri[k] ? s->sense[old] : -s->sense[old];
         if (!s->sense[g]) {
           s->sense[g] = expected;
           s->list[nfound++] = g;
         }
-        PetscCheck(
-          s->sense[g] == expected, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
-          "and %lld; it encloses nothing, cut it there",
-          s->f->where, (long long)s->f->number[old], (long long)s->f->number[g]);
+        PetscCheck(s->sense[g] == expected, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                   "%s: the surface has one side only (a Moebius strip or Klein bottle) around "
+                   "triangles %lld "
+                   "and %lld; it encloses nothing, cut it there",
+                   s->f->where, (long long)s->f->number[old], (long long)s->f->number[g]);
       }
     }
+
     // reverse the smaller number of triangles
-    for (PetscInt i = 0; i < nfound; i++) nother += s->sense[s->list[i]] < 0;
+    for (PetscInt i = 0; i < nfound; i++)
+      nother += s->sense[s->list[i]] < 0;
     wrong = 2 * nother > nfound ? 1 : -1;
     for (PetscInt i = 0; i < nfound; i++) {
       PetscInt *v = t->tri + 3 * s->list[i];
       const PetscInt keep = v[1];
 
-      if (s->sense[s->list[i]] != wrong) continue;
+      if (s->sense[s->list[i]] != wrong)
+        continue;
       v[1] = v[2];
       v[2] = keep;
       s->m->nturned++;
@@ -114,7 +130,8 @@ static PetscErrorCode orient_alike(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Side of a triangle that faces increasing (ahead) or decreasing angles around the edge from vertex p. */
+/* Side of a triangle that faces increasing (ahead) or decreasing angles around the edge from vertex
+   p. */
 static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBool ahead)
 {
   return 2 * (slot / 3) + ((t->tri[slot] == p) == ahead ? 0 : 1);
@@ -123,15 +140,21 @@ static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBoo
 /* Joins the sides that face each other around one edge. */
 static PetscErrorCode join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[])
 {
-  const PetscInt p = (PetscInt)(edge[0].key >> 32), q = (PetscInt)(edge[0].key & 0xffffffff);
+  const PetscInt p = (PetscInt)(edge[0].key >> 32);
+  const PetscInt q = (PetscInt)(edge[0].key & 0xffffffff);
   const SbTriangles *t = s->t;
   PetscInt *slot = s->list;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) slot[i] = edge[i].slot;
+  for (PetscInt i = 0; i < n; i++)
+    slot[i] = edge[i].slot;
+
   // angles of triangles about the edge from p to q, relative to the first one
   if (n > 2) {
-    PetscReal axis[3], u[3] = {0}, v[3] = {0}, w[3], length;
+    PetscReal axis[3];
+    PetscReal u[3] = {0};
+    PetscReal v[3] = {0};
+    PetscReal w[3], length;
 
     SbSubtract(t->x + 3 * q, t->x + 3 * p, axis);
     length = PetscSqrtReal(SbDot3(axis, axis));
@@ -140,13 +163,16 @@ static PetscErrorCode join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[
       if (!i) { /* v = axis x w is normal to the first triangle, u = v x axis lies in it */
         SbCross(axis, w, v);
         SbCross(v, axis, u);
-        for (int k = 0; k < 3; k++) u[k] /= length;
+        for (int k = 0; k < 3; k++)
+          u[k] /= length;
       }
       s->angle[i] = i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0;
-      if (s->angle[i] < 0) s->angle[i] += 2 * PETSC_PI;
+      if (s->angle[i] < 0)
+        s->angle[i] += 2 * PETSC_PI;
     }
     PetscCall(PetscSortRealWithArrayInt(n, s->angle, slot));
   }
+
   // join facing sides of consecutive triangles
   for (PetscInt i = 0; i < n; i++)
     (void)SbUnionJoin(s->shell, facing(t, slot[i], p, PETSC_TRUE),
@@ -154,33 +180,43 @@ static PetscErrorCode join_at_edge(Arrangement *s, PetscInt n, const SbKey edge[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by edges. */
+/* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by
+   edges. */
 static PetscErrorCode find_shells(Arrangement *s)
 {
   const SbTriangles *t = s->t;
   const PetscInt n = 3 * t->ntri;
 
   PetscFunctionBeginUser;
+
   // union-find over sides and over triangles, edge by edge
-  for (PetscInt i = 0; i < 2 * t->ntri; i++) s->shell[i] = i;
-  for (PetscInt f = 0; f < t->ntri; f++) s->surface[f] = f;
+  for (PetscInt i = 0; i < 2 * t->ntri; i++)
+    s->shell[i] = i;
+  for (PetscInt f = 0; f < t->ntri; f++)
+    s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
     PetscCall(join_at_edge(s, m, s->edge + i));
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
+
   // numbers from 0
   s->nshell = SbUnionLabel(2 * t->ntri, s->shell);
   s->nsurface = SbUnionLabel(t->ntri, s->surface);
-  PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: the surface consists of %" PetscInt_FMT
-             " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
-             s->f->where, s->nsurface, PARTS_MAX);
-  // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from the origin
+  PetscCheck(
+    s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: the surface consists of %" PetscInt_FMT
+    " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
+    s->f->where, s->nsurface, PARTS_MAX);
+
+  // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from
+  // the origin
   PetscCall(PetscCalloc2(s->nshell, &s->shells, s->nsurface, &s->surfaces));
-  for (PetscInt k = 0; k < s->nshell; k++) s->shells[k].first = -1;
-  for (PetscInt k = 0; k < s->nsurface; k++) s->surfaces[k].first = s->surfaces[k].outer = -1;
+  for (PetscInt k = 0; k < s->nshell; k++)
+    s->shells[k].first = -1;
+  for (PetscInt k = 0; k < s->nsurface; k++)
+    s->surfaces[k].first = s->surfaces[k].outer = -1;
   for (PetscInt i = 0; i < 2 * t->ntri; i++) {
     Shell *p = &s->shells[s->shell[i]];
     PetscReal box[6];
@@ -195,17 +231,21 @@ static PetscErrorCode find_shells(Arrangement *s)
     p->volume +=
       (i % 2 ? 1 : -1) * SbTetVolumeTo(t->x, t->tri + 3 * (i / 2), t->x + 3 * t->tri[3 * p->first]);
     p->area += SbTriangleArea(t->x, t->tri + 3 * (i / 2), NULL);
-    if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
+    if (s->surfaces[s->surface[i / 2]].first < 0)
+      s->surfaces[s->surface[i / 2]].first = i / 2;
   }
+
   // non-manifold surfaces
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
+    if (m > 2)
+      s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smallest positive shell around a point, but for those of the surface `except`; OUTSIDE if there is none. */
+/* Smallest positive shell around a point, but for those of the surface `except`; OUTSIDE if there
+   is none. */
 static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
   PetscInt best = OUTSIDE;
@@ -216,12 +256,15 @@ static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscIn
     PetscBool within = (PetscBool)(p->volume > 0 && p->surface != except);
 
     // test the bounding box, then the winding number
-    for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
-    if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
+    for (int i = 0; i < 3; i++)
+      within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
+    if (!within || (best >= 0 && s->shells[best].volume <= p->volume))
+      continue;
     for (PetscInt i = 0; i < 2 * s->t->ntri; i++)
       if (s->shell[i] == k)
         around += (i % 2 ? 1 : -1) * SbTriangleSolidAngle(s->t->x, s->t->tri + 3 * (i / 2), o);
-    if (around > 2 * PETSC_PI) best = k;
+    if (around > 2 * PETSC_PI)
+      best = k;
   }
   return best;
 }
@@ -232,26 +275,32 @@ static PetscBool turned_outwards(const Arrangement *s, PetscInt k)
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
-/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all
-   surfaces inside it are taken as reversed. */
+/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and
+   all surfaces inside it are taken as reversed. */
 static void empty_cavities(Arrangement *s)
 {
   /* from outside to inside, so that it is known whether the region around a surface is material */
   for (PetscInt depth = 0; depth < s->nsurface; depth++) {
     for (PetscInt k = 0; k < s->nsurface; k++) {
-      PetscInt top = k, naround = 0;
+      PetscInt top = k;
+      PetscInt naround = 0;
       PetscBool outwards, cavity;
 
       // cavity: normals inward relative to the outermost surface around it, inside material
-      for (; s->surfaces[top].parent != OUTSIDE; naround++) top = s->shells[s->surfaces[top].parent].surface;
-      if (naround != depth || s->surfaces[k].branched) continue;
-      outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
+      for (; s->surfaces[top].parent != OUTSIDE; naround++)
+        top = s->shells[s->surfaces[top].parent].surface;
+      if (naround != depth || s->surfaces[k].branched)
+        continue;
+      outwards = (PetscBool)(turned_outwards(s, k) ==
+                             (turned_outwards(s, top) || s->surfaces[top].branched));
       cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
+
       // note reversed surfaces, count cavities
       s->t->turned = (PetscBool)(s->t->turned || (!turned_outwards(s, k) && !cavity));
       s->m->ncavity += cavity;
       for (PetscInt i = 0; cavity && i < s->nshell; i++)
-        if (s->shells[i].surface == k && s->shells[i].volume > 0) s->shells[i].empty = PETSC_TRUE;
+        if (s->shells[i].surface == k && s->shells[i].volume > 0)
+          s->shells[i].empty = PETSC_TRUE;
     }
   }
 }
@@ -264,27 +313,35 @@ static void groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, P
 
   *n = -1;
   for (PetscInt i = 0; i < 2 * s->t->ntri && *n; i++) {
-    const PetscInt set = s->f->tags[i / 2], start = im->tags_start[set], end = im->tags_start[set + 1];
+    const PetscInt set = s->f->tags[i / 2];
+    const PetscInt start = im->tags_start[set];
+    const PetscInt end = im->tags_start[set + 1];
     PetscInt kept = 0;
 
-    if (s->shell[i] != shell || set == last) continue;
+    if (s->shell[i] != shell || set == last)
+      continue;
     last = set;
+
     // intersection of the groups
     if (*n < 0) {
       *n = PetscMin(end - start, 16);
-      for (PetscInt k = 0; k < *n; k++) group[k] = im->tags_group[start + k];
+      for (PetscInt k = 0; k < *n; k++)
+        group[k] = im->tags_group[start + k];
     }
     for (PetscInt k = 0; k < *n; k++) {
       PetscInt at = start;
 
-      while (at < end && im->tags_group[at] != group[k]) at++;
-      if (at < end) group[kept++] = group[k];
+      while (at < end && im->tags_group[at] != group[k])
+        at++;
+      if (at < end)
+        group[kept++] = group[k];
     }
     *n = kept;
   }
 }
 
-/* Groups of each region: region_1, ...; NAME_region if its boundary is in the group NAME; as in the file. */
+/* Groups of each region: region_1, ...; NAME_region if its boundary is in the group NAME; as in the
+   file. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->im;
@@ -293,9 +350,12 @@ static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
-    PetscInt group[66], surface[16], n = 0, nsurface;
+    PetscInt group[66], surface[16];
+    PetscInt n = 0;
+    PetscInt nsurface;
 
-    if (p->volume < 0 || p->region < 0) continue;
+    if (p->volume < 0 || p->region < 0)
+      continue;
     (void)snprintf(name, sizeof(name), "region_%" PetscInt_FMT, p->region + 1);
     PetscCall(SbImportGroup(im, 3, -1 - p->region, name, &group[n++]));
     groups_of_shell(s, k, &nsurface, surface);
@@ -317,29 +377,37 @@ static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 /* Finds the regions in the steps of the file header. */
 static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 {
-  PetscInt n = 0, kept = 0;
+  PetscInt n = 0;
+  PetscInt kept = 0;
   const SbTriangles *t = s->t;
 
   PetscFunctionBeginUser;
+
   /* orientation, shells and their volumes */
   SbTrianglesEdges(s->t, s->edge);
-  if (!s->f->sheets) PetscCall(orient_alike(s));
+  if (!s->f->sheets)
+    PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
-  // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
+
+  // each shell must enclose a volume, and each surface must have exactly one shell of negative
+  // volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
     PetscInt *outer = &s->surfaces[p->surface].outer;
 
-    PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
-               PETSC_ERR_USER_INPUT,
-               "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
-               s->f->where, (long long)s->f->number[p->first]);
-    if (p->volume < 0) *outer = *outer == -1 ? k : -2; /* -2: several */
+    PetscCheck(
+      PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
+      PETSC_ERR_USER_INPUT,
+      "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
+      s->f->where, (long long)s->f->number[p->first]);
+    if (p->volume < 0)
+      *outer = *outer == -1 ? k : -2; /* -2: several */
   }
   for (PetscInt k = 0; k < s->nsurface; k++)
     PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
-               (long long)s->f->number[s->surfaces[k].first]);
+               "%s: the triangles around triangle %lld cut each other; join the parts into one",
+               s->f->where, (long long)s->f->number[s->surfaces[k].first]);
+
   // shell around each surface, found from the centre of one of its triangles
   for (PetscInt k = 0; k < s->nsurface; k++) {
     const PetscInt *v = t->tri + 3 * s->surfaces[k].first;
@@ -349,7 +417,9 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
       middle[i] = (t->x[3 * v[0] + i] + t->x[3 * v[1] + i] + t->x[3 * v[2] + i]) / 3;
     s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
   }
-  if (!s->f->sheets) empty_cavities(s);
+  if (!s->f->sheets)
+    empty_cavities(s);
+
   // points in the file: each must lie in a region; those of holes are empty
   for (PetscInt i = 0; i < s->f->nhole + s->f->nregion; i++) {
     const PetscBool hole = (PetscBool)(i < s->f->nhole);
@@ -357,24 +427,31 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     const PetscInt k = shell_around(s, seed->x, -1);
 
     PetscCheck(k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: %s %lld at (%.6g, %.6g, %.6g) m lies in no region; move it%s, or remove it", s->f->where,
-               hole ? "hole" : "the point of region", (long long)seed->number, (double)seed->x[0],
-               (double)seed->x[1], (double)seed->x[2], hole ? " into the cavity" : "");
+               "%s: %s %lld at (%.6g, %.6g, %.6g) m lies in no region; move it%s, or remove it",
+               s->f->where, hole ? "hole" : "the point of region", (long long)seed->number,
+               (double)seed->x[0], (double)seed->x[1], (double)seed->x[2],
+               hole ? " into the cavity" : "");
     s->m->ncavity += hole && !s->shells[k].empty;
-    if (hole) s->shells[k].empty = PETSC_TRUE;
+    if (hole)
+      s->shells[k].empty = PETSC_TRUE;
   }
-  // number the positive shells with material; a negative shell has the number of the region around it
+
+  // number the positive shells with material; a negative shell has the number of the region around
+  // it
   for (Shell *p = s->shells; p < s->shells + s->nshell; p++)
     p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
   for (const Surface *u = s->surfaces; u < s->surfaces + s->nsurface; u++)
-    if (u->parent != OUTSIDE) s->shells[u->outer].region = s->shells[u->parent].region;
+    if (u->parent != OUTSIDE)
+      s->shells[u->outer].region = s->shells[u->parent].region;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
+
   // output triangles with material on at least one side, and their vertices
   PetscCall(SbSurfaceCreate(t->nvert, t->ntri, n, out));
   PetscCall(PetscArraycpy(out->x, t->x, 3 * (size_t)t->nvert));
   for (PetscInt f = 0; f < t->ntri; f++) {
-    const PetscInt front = s->shells[s->shell[2 * f]].region, back = s->shells[s->shell[2 * f + 1]].region;
+    const PetscInt front = s->shells[s->shell[2 * f]].region;
+    const PetscInt back = s->shells[s->shell[2 * f + 1]].region;
 
     if (front == OUTSIDE && back == OUTSIDE) {
       s->m->nidle++;
@@ -388,7 +465,8 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   }
   out->ntri = kept;
   PetscCall(SbDropUnusedPoints(&out->nvert, out->x, 3 * kept, out->tri));
-  if (s->f->body) PetscCall(name_regions(s, out));
+  if (s->f->body)
+    PetscCall(name_regions(s, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -399,8 +477,8 @@ PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSu
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc7(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, 3 * n, &s.list, n,
-                         &s.sense, 3 * n, &s.angle));
+  PetscCall(PetscMalloc7(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, 3 * n,
+                         &s.list, n, &s.sense, 3 * n, &s.angle));
   ierr = find_regions(&s, out);
   PetscCall(PetscFree2(s.shells, s.surfaces));
   PetscCall(PetscFree7(s.edge, s.shell, s.surface, s.across, s.list, s.sense, s.angle));

@@ -1,6 +1,6 @@
 /*
-  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes
-  small ones by smoothing.
+  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners,
+  and removes small ones by smoothing.
 
   Candidate pairs by a bounding volume hierarchy, exact test in src/geometry/intersection.c.
 */
@@ -32,8 +32,10 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
 
     SbTriangleBox(t->x, t->tri + 3 * i, box);
     for (SbBoxNearestBegin(&tree, box, 0, &query); SbBoxNearestNext(&query, &other);) {
-      if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other)) continue;
-      if (s->n < NAMED) PetscCall(PetscArraycpy(s->pair[s->n], ((const PetscInt[2]){i, other}), 2));
+      if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other))
+        continue;
+      if (s->n < NAMED)
+        PetscCall(PetscArraycpy(s->pair[s->n], ((const PetscInt[2]){i, other}), 2));
       s->crossing[i] = s->crossing[other] = PETSC_TRUE;
       s->n++;
     }
@@ -42,12 +44,15 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours. Work space: sum. */
+/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours. Work space:
+   sum. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])
 {
-  for (PetscInt v = 0; v < t->nvert; v++) sum[v][0] = sum[v][1] = sum[v][2] = sum[v][3] = 0;
+  for (PetscInt v = 0; v < t->nvert; v++)
+    sum[v][0] = sum[v][1] = sum[v][2] = sum[v][3] = 0;
   for (PetscInt i = 0; i < 3 * t->ntri; i++) {
-    const PetscInt a = t->tri[i], b = t->tri[SbSlotNext(i)];
+    const PetscInt a = t->tri[i];
+    const PetscInt b = t->tri[SbSlotNext(i)];
 
     for (int k = 0; k < 3; k++) {
       sum[a][k] += t->x[3 * b + k];
@@ -61,15 +66,16 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
       t->x[3 * v + k] = 0.5 * t->x[3 * v + k] + 0.5 * sum[v][k] / sum[v][3];
 }
 
-/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else
-   restores positions. s: pairs before, then remaining pairs. */
+/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m;
+   else restores positions. s: pairs before, then remaining pairs. */
 static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSurfaceRepairs *m)
 {
   PetscBool *active, *before;
   PetscReal *x0, (*sum)[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc4(t->nvert, &active, t->nvert, &before, 3 * (size_t)t->nvert, &x0, t->nvert, &sum));
+  PetscCall(
+    PetscCalloc4(t->nvert, &active, t->nvert, &before, 3 * (size_t)t->nvert, &x0, t->nvert, &sum));
   PetscCall(PetscArraycpy(x0, t->x, 3 * (size_t)t->nvert));
   for (int pass = 0; pass < PASSES && s->n && m->untangled <= reach; pass++) {
     PetscReal most = 0;
@@ -95,7 +101,8 @@ static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSur
     m->untangled = PetscSqrtReal(most);
     PetscCall(find_pairs(t, s));
   }
-  if (s->n || m->untangled > reach) PetscCall(PetscArraycpy(t->x, x0, 3 * (size_t)t->nvert));
+  if (s->n || m->untangled > reach)
+    PetscCall(PetscArraycpy(t->x, x0, 3 * (size_t)t->nvert));
   PetscCall(PetscFree4(active, before, x0, sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,25 +112,28 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
   SbTriangles *t = f->t;
   Search search, left;
   PetscInt ncrossing = 0;
-  char why[192] = "", option[SB_IMPORT_OPTION_MAX];
+  char why[192] = "";
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(t->ntri, &search.crossing));
   PetscCall(find_pairs(t, &search));
-  for (PetscInt i = 0; i < t->ntri; i++) ncrossing += search.crossing[i];
+  for (PetscInt i = 0; i < t->ntri; i++)
+    ncrossing += search.crossing[i];
   m->npairs = search.n;
   left = search;
   if (search.n && (PetscReal)ncrossing > FEW * (PetscReal)t->ntri)
     (void)snprintf(why, sizeof(why),
-                   "with %" PetscInt_FMT " of %" PetscInt_FMT " triangles it is no small fold", ncrossing,
-                   t->ntri);
+                   "with %" PetscInt_FMT " of %" PetscInt_FMT " triangles it is no small fold",
+                   ncrossing, t->ntri);
   else if (search.n && reach > 0) {
     PetscCall(untangle(t, reach, &left, m));
     if (left.n || m->untangled > reach)
-      (void)snprintf(why, sizeof(why), "smoothing did not part them within %.3g m (%s)", (double)reach,
-                     SbImportOption(f->im, "untangle", option));
+      (void)snprintf(why, sizeof(why), "smoothing did not part them within %.3g m (%s)",
+                     (double)reach, SbImportOption(f->im, "untangle", option));
   } else if (search.n)
-    (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it", SbImportOption(f->im, "untangle", option));
+    (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it",
+                   SbImportOption(f->im, "untangle", option));
   PetscCall(PetscFree(search.crossing));
   if (why[0]) {
     const PetscReal *x = t->x + 3 * t->tri[3 * search.pair[0][0]];
@@ -131,14 +141,15 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
 
     // message: some of the pairs, and the position of the first one
     for (PetscInt k = 0; k < PetscMin(search.n, NAMED); k++)
-      SbAppend(sizeof(text), text, "%s%lld and %lld", k ? ", " : "", (long long)f->number[search.pair[k][0]],
-               (long long)f->number[search.pair[k][1]]);
+      SbAppend(sizeof(text), text, "%s%lld and %lld", k ? ", " : "",
+               (long long)f->number[search.pair[k][0]], (long long)f->number[search.pair[k][1]]);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
             "%s: the surface cuts or touches itself at %" PetscInt_FMT
-            " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one (meshlab, "
+            " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one "
+            "(meshlab, "
             "blender: boolean union), or move them apart",
-            f->where, search.n, search.n == 1 ? "" : "s", text, search.n > NAMED ? ", ..." : "", (double)x[0],
-            (double)x[1], (double)x[2], why);
+            f->where, search.n, search.n == 1 ? "" : "s", text, search.n > NAMED ? ", ..." : "",
+            (double)x[0], (double)x[1], (double)x[2], why);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /*
-  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name. Areas, edges,
-  volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
+  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name. Areas,
+  edges, volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
 
   For a gmsh file the surface is the boundary of its tets, or, without tets, its triangles.
 */
@@ -21,7 +21,8 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path)
   const char *dot = strrchr(path, '.');
 
   for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(formats); i++)
-    if (!strcasecmp(dot, formats[i].extension)) return &formats[i];
+    if (!strcasecmp(dot, formats[i].extension))
+      return &formats[i];
   return NULL;
 }
 
@@ -43,24 +44,28 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
     // gmsh: boundary of the tets, else the triangles
     im->surface = PETSC_TRUE;
     PetscCall(SbImportRead_Gmsh(path, im));
-    if (im->item[3].n) ierr = SbImportCheck(im, &faces);
+    if (im->item[3].n)
+      ierr = SbImportCheck(im, &faces);
     for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {
       const PetscInt *v = im->item[3].vert + 4 * (s / 4);
       const int *a = SbFaceVertex[s % 4];
 
-      if (faces.neighbour[s] >= 0) continue;
+      if (faces.neighbour[s] >= 0)
+        continue;
       ierr = SbTrianglesAdd(f, v[a[0]], v[a[1]], v[a[2]], f->t->ntri + 1);
     }
     PetscCall(SbFacesDestroy(&faces));
     PetscCall(ierr);
     for (PetscInt i = 0; !im->item[3].n && i < tri->n; i++)
-      PetscCall(
-        SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));
-    for (PetscInt v = 0; v < im->nvert; v++) PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
+      PetscCall(SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2],
+                               tri->number[i]));
+    for (PetscInt v = 0; v < im->nvert; v++)
+      PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
   }
   PetscCall(PetscFree(im->scan.data));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
+             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra",
+             f->where);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,7 +81,9 @@ PetscErrorCode SbTrianglesDestroy(SbTriangles *t)
 
 PetscReal SbTriangleArea(const PetscReal x[], const PetscInt v[3], PetscBool *flat)
 {
-  PetscReal e[3][3], n[3], longest2 = 0, twice;
+  PetscReal e[3][3], n[3];
+  PetscReal longest2 = 0;
+  PetscReal twice;
 
   for (int k = 0; k < 3; k++) {
     SbSubtract(x + 3 * v[(k + 1) % 3], x + 3 * v[k], e[k]);
@@ -84,7 +91,8 @@ PetscReal SbTriangleArea(const PetscReal x[], const PetscInt v[3], PetscBool *fl
   }
   SbCross(e[0], e[1], n);
   twice = PetscSqrtReal(SbDot3(n, n));
-  if (flat) *flat = (PetscBool) !(twice > SB_TRIANGLE_FLAT * longest2);
+  if (flat)
+    *flat = (PetscBool) !(twice > SB_TRIANGLE_FLAT * longest2);
   return 0.5 * twice;
 }
 
@@ -113,7 +121,8 @@ PetscReal SbTetVolumeTo(const PetscReal x[], const PetscInt v[3], const PetscRea
 {
   PetscReal a[3][3], n[3];
 
-  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k], o, a[k]);
+  for (int k = 0; k < 3; k++)
+    SbSubtract(x + 3 * v[k], o, a[k]);
   SbCross(a[0], a[1], n);
   return SbDot3(n, a[2]) / 6;
 }
@@ -127,7 +136,7 @@ PetscReal SbTriangleSolidAngle(const PetscReal x[], const PetscInt v[3], const P
     l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
   }
   SbCross(a[0], a[1], n);
-  down =
-    l[0] * l[1] * l[2] + SbDot3(a[0], a[1]) * l[2] + SbDot3(a[1], a[2]) * l[0] + SbDot3(a[2], a[0]) * l[1];
+  down = l[0] * l[1] * l[2] + SbDot3(a[0], a[1]) * l[2] + SbDot3(a[1], a[2]) * l[0] +
+         SbDot3(a[2], a[0]) * l[1];
   return 2 * atan2(SbDot3(n, a[2]), down);
 }

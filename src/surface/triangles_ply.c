@@ -1,14 +1,17 @@
 /*
-  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte
-  orders.
+  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both
+  byte orders.
 
-  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`,
-  the list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an
-  error.
+  The header lists the properties of each element with their order and types. Read: x, y and z of
+  `vertex`, the list vertex_indices (or vertex_index) of `face`; everything else is skipped.
+  Triangle strips are an error.
 */
 #include "surface_impl.h"
 
-enum { ELEMENTS_MAX = 16, PROPERTIES_MAX = 64 };
+enum {
+  ELEMENTS_MAX = 16,
+  PROPERTIES_MAX = 64
+};
 
 typedef struct {
   SbNumberType type, count; /* type of values; of a list's length, size 0: a single value */
@@ -37,7 +40,8 @@ static PetscErrorCode read_property(Ply *p)
   const char *before;
 
   PetscFunctionBeginUser;
-  if (!p->nelement) SB_SCAN_ERROR(p->s, "a property stands before the first element");
+  if (!p->nelement)
+    SB_SCAN_ERROR(p->s, "a property stands before the first element");
   e = &p->element[p->nelement - 1];
   if (e->nproperty == PROPERTIES_MAX)
     SB_SCAN_ERROR(p->s, "an element has more than %d properties", PROPERTIES_MAX);
@@ -53,8 +57,8 @@ static PetscErrorCode read_property(Ply *p)
   (void)SbScanWord(p->s, sizeof(word), word);
   if (!strcmp(e->name, "vertex") && word[0] >= 'x' && word[0] <= 'z' && !word[1] && !q->count.size)
     q->axis = word[0] - 'x';
-  if (!strcmp(e->name, "face") && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")) &&
-      q->count.size)
+  if (!strcmp(e->name, "face") &&
+      (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")) && q->count.size)
     q->axis = 3;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,21 +66,28 @@ static PetscErrorCode read_property(Ply *p)
 static PetscErrorCode read_header(Ply *p)
 {
   char word[32];
-  PetscBool format = PETSC_FALSE, binary = PETSC_FALSE;
+  PetscBool format = PETSC_FALSE;
+  PetscBool binary = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+
   // first line, then one keyword per line
   (void)SbScanWord(p->s, sizeof(word), word);
-  if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
+  if (strcmp(word, "ply"))
+    SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
     SbScanEndOfLine(p->s);
-    if (!SbScanWord(p->s, sizeof(word), word)) SB_SCAN_ENDS(p->s, "'%s'", "end_header");
-    if (!strcmp(word, "end_header")) break;
+    if (!SbScanWord(p->s, sizeof(word), word))
+      SB_SCAN_ENDS(p->s, "'%s'", "end_header");
+    if (!strcmp(word, "end_header"))
+      break;
     if (!strcmp(word, "format")) {
       // text, or binary in either byte order
       (void)SbScanWord(p->s, sizeof(word), word);
-      if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") && strcmp(word, "binary_big_endian"))
-        SB_SCAN_ERROR(p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
+      if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") &&
+          strcmp(word, "binary_big_endian"))
+        SB_SCAN_ERROR(
+          p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
       binary = (PetscBool)(word[0] == 'b');
       p->big_endian = (PetscBool)!strcmp(word, "binary_big_endian");
       format = PETSC_TRUE;
@@ -97,7 +108,8 @@ static PetscErrorCode read_header(Ply *p)
     else if (strcmp(word, "comment") && strcmp(word, "obj_info"))
       SB_SCAN_ERROR(p->s, "'%s' is no line of a PLY header", word);
   }
-  if (!format) SB_SCAN_ERROR(p->s, "the header has no line 'format'");
+  if (!format)
+    SB_SCAN_ERROR(p->s, "the header has no line 'format'");
   SbScanEndOfLine(p->s);
   p->s->binary = p->s->bytes = binary;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -114,7 +126,8 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   s->token = s->at;
-  if (s->end - s->at < type.size) SB_SCAN_ENDS(s, "the %s", what);
+  if (s->end - s->at < type.size)
+    SB_SCAN_ENDS(s, "the %s", what);
   SbNumbersConvert(type, p->big_endian, 1, s->at, value);
   s->at += type.size;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -122,7 +135,8 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
 
 PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
-  Ply ply = {.s = s}, *p = &ply;
+  Ply ply = {.s = s};
+  Ply *p = &ply;
 
   PetscFunctionBeginUser;
   PetscCall(read_header(p));
@@ -137,9 +151,12 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
     }
     if (!strcmp(e->name, "vertex") && axes != 7)
       SB_SCAN_ERROR(s, "the vertices have no properties x, y and z");
-    if (!strcmp(e->name, "face") && axes != 8) SB_SCAN_ERROR(s, "the faces have no list vertex_indices");
-    if (!bytes && e->n) SB_SCAN_ERROR(s, "the element '%s' has no properties", e->name);
+    if (!strcmp(e->name, "face") && axes != 8)
+      SB_SCAN_ERROR(s, "the faces have no list vertex_indices");
+    if (!bytes && e->n)
+      SB_SCAN_ERROR(s, "the element '%s' has no properties", e->name);
     PetscCall(SbScanRoom(s, e->name, e->n, PetscMax(1, 2 * e->nproperty), PetscMax(1, bytes)));
+
     // all properties of one vertex, face or other item
     for (int64_t i = 0; i < e->n; i++) {
       PetscReal x[3] = {0, 0, 0};
@@ -158,18 +175,23 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
         }
         for (int64_t c = 0; c < n; c++) {
           PetscCall(read_value(p, q->type, what, &value));
-          if (q->axis != 3) continue;
+          if (q->axis != 3)
+            continue;
           if (!(value >= 0 && value < (double)f->t->nvert))
             SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
                           (long long)i + 1, value, (long long)f->t->nvert);
           PetscCall(SbTrianglesAddCorner(s, i + 1, (int64_t)value, f));
         }
-        if (q->axis == 3) PetscCall(SbTrianglesAddFace(s, i + 1, f));
-        if (q->axis < 0 || q->axis == 3) continue;
-        if (!isfinite(value)) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
+        if (q->axis == 3)
+          PetscCall(SbTrianglesAddFace(s, i + 1, f));
+        if (q->axis < 0 || q->axis == 3)
+          continue;
+        if (!isfinite(value))
+          SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
         x[q->axis] = value;
       }
-      if (!strcmp(e->name, "vertex")) PetscCall(SbTrianglesAddVertex(f, x));
+      if (!strcmp(e->name, "vertex"))
+        PetscCall(SbTrianglesAddVertex(f, x));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,15 +1,16 @@
 /*
   triangles_read.c - readers of .stl (text and binary), .obj and .off surfaces.
 
-  Groups of bodies: the solids of a text STL file (solid_1, ... without a name), the objects (o) and groups
-  (g) of an OBJ file.
+  Groups of bodies: the solids of a text STL file (solid_1, ... without a name), the objects (o) and
+  groups (g) of an OBJ file.
 
-  STL lists the three corners of each triangle; equal corners are merged later (clean.c). Normals in the file
-  are ignored: the order of corners is the orientation. A file is binary if its size matches its number of
-  triangles (80 bytes, the count, 50 bytes per triangle), whatever its first word is, or if it is larger and
-  has a zero byte near its beginning; bytes after the triangles are then ignored with a warning. Keywords in
-  text may be upper case, and `end solid` may be two words. OBJ: the lines v, f, o and g. OFF: the basic
-  format. Faces with more than three corners are triangulated, see triangles_add.c.
+  STL lists the three corners of each triangle; equal corners are merged later (clean.c). Normals in
+  the file are ignored: the order of corners is the orientation. A file is binary if its size
+  matches its number of triangles (80 bytes, the count, 50 bytes per triangle), whatever its first
+  word is, or if it is larger and has a zero byte near its beginning; bytes after the triangles are
+  then ignored with a warning. Keywords in text may be upper case, and `end solid` may be two words.
+  OBJ: the lines v, f, o and g. OFF: the basic format. Faces with more than three corners are
+  triangulated, see triangles_add.c.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -31,25 +32,30 @@ static PetscBool stl_next(SbScan *s, char word[32])
 {
   const PetscBool there = SbScanWord(s, 32, word);
 
-  if (!strcasecmp(word, "end")) (void)SbScanWord(s, 32 - 3, word + 3);
+  if (!strcasecmp(word, "end"))
+    (void)SbScanWord(s, 32 - 3, word + 3);
   return there;
 }
 
 /* Reads one or more solids, which together are the surface. */
 static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
 {
-  static const char *const facet[] = {"outer", "loop", "vertex", "vertex", "vertex", "endloop", "endfacet"};
+  static const char *const facet[] = {"outer",  "loop",    "vertex",  "vertex",
+                                      "vertex", "endloop", "endfacet"};
   char word[32];
   PetscInt nsolid = 0;
   PetscBool open = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+
   /* padding bytes that some programs write at the end */
-  while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a)) s->end--;
+  while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a))
+    s->end--;
   while (stl_next(s, word) || !nsolid) {
     if (!nsolid && strcasecmp(word, "solid"))
-      SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
-                       "file, or truncated");
+      SB_SCAN_ERROR(
+        s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
+           "file, or truncated");
     if (!strcasecmp(word, "solid")) {
       // the rest of the line is the name of the solid
       char name[SB_NAME_MAX], *last;
@@ -61,10 +67,12 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       (void)SbScanMore(s, '\n');
       begin = s->at;
       SbScanEndOfLine(s);
-      (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(s->at - begin, (ptrdiff_t)sizeof(name) - 1),
-                     begin);
-      for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);) *--last = 0;
-      if (!name[0]) (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
+      (void)snprintf(name, sizeof(name), "%.*s",
+                     (int)PetscMin(s->at - begin, (ptrdiff_t)sizeof(name) - 1), begin);
+      for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);)
+        *--last = 0;
+      if (!name[0])
+        (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
       PetscCall(SbTrianglesGroups(f, 1, names));
     } else if (!strcasecmp(word, "endsolid")) {
       open = PETSC_FALSE;
@@ -73,15 +81,20 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       // the normal is ignored
       SbScanEndOfLine(s);
       for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(facet); k++) {
-        if (!stl_next(s, word)) SB_SCAN_ENDS(s, "'%s'", facet[k]);
-        if (strcasecmp(word, facet[k])) SB_SCAN_ERROR(s, "expected '%s', found '%s'", facet[k], word);
-        if (facet[k][0] == 'v') PetscCall(add_vertex(s, f));
+        if (!stl_next(s, word))
+          SB_SCAN_ENDS(s, "'%s'", facet[k]);
+        if (strcasecmp(word, facet[k]))
+          SB_SCAN_ERROR(s, "expected '%s', found '%s'", facet[k], word);
+        if (facet[k][0] == 'v')
+          PetscCall(add_vertex(s, f));
       }
-      PetscCall(SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
+      PetscCall(
+        SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
     } else
       SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
   }
-  if (open) SB_SCAN_ENDS(s, "'%s'", "endsolid");
+  if (open)
+    SB_SCAN_ENDS(s, "'%s'", "endsolid");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,15 +105,17 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
   size_t known;
 
   PetscFunctionBeginUser;
-  if (size >= 84) SbNumbersConvert((SbNumberType){'u', 4}, PETSC_FALSE, 1, s->data + 80, &n);
+  if (size >= 84)
+    SbNumbersConvert((SbNumberType){'u', 4}, PETSC_FALSE, 1, s->data + 80, &n);
   known = 84 + 50 * (size_t)n;
   if (size != known && !(size > known && n > 0 && memchr(s->data, 0, PetscMin(known, 134)))) {
     PetscCall(stl_text(s, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (size > known)
-    PetscCall(SbWarning(PETSC_COMM_SELF, "%s: %zu bytes behind the %.0f triangles are left out", f->where,
-                        size - known, n));
+    PetscCall(SbWarning(PETSC_COMM_SELF, "%s: %zu bytes behind the %.0f triangles are left out",
+                        f->where, size - known, n));
+
   // binary: 84 bytes, then 50 per triangle: normal, three vertices, 2 bytes
   s->bytes = PETSC_TRUE;
   for (size_t at = 84; at < known; at += 50) {
@@ -112,7 +127,8 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
       if (!isfinite(x[k]))
         SB_SCAN_ERROR(s, "a coordinate of triangle %lld is not a finite number; repair the file",
                       (long long)f->t->ntri + 1);
-      if (k % 3 == 2) PetscCall(SbTrianglesAddVertex(f, x + k - 2));
+      if (k % 3 == 2)
+        PetscCall(SbTrianglesAddVertex(f, x + k - 2));
     }
     PetscCall(SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
   }
@@ -122,15 +138,18 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
-  char name[9][SB_NAME_MAX], more[SB_NAME_MAX]; /* the object (o), then the groups (g) of what follows */
+  char name[9][SB_NAME_MAX],
+    more[SB_NAME_MAX]; /* the object (o), then the groups (g) of what follows */
   PetscInt nname[2] = {0, 0};
   char word[16];
 
   PetscFunctionBeginUser;
   while (SbScanWord(s, sizeof(word), word)) {
-    if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex;
-       indices after a slash are ignored */
+    if (!strcmp(word, "v"))
+      PetscCall(add_vertex(s, f));
+
+    /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last
+       vertex; indices after a slash are ignored */
     if (!strcmp(word, "f")) {
       nface++;
       while (SbScanMore(s, '#')) {
@@ -139,7 +158,8 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 
         if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
           SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
-        for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
+        for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);)
+          s->at++;
         PetscCall(SbTrianglesAddCorner(s, nface, v > 0 ? v - 1 : f->t->nvert + v, f));
       }
       PetscCall(SbTrianglesAddFace(s, nface, f));
@@ -155,8 +175,10 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
         (void)SbScanWord(s, SB_NAME_MAX, room ? name[kind + nname[kind]] : more);
         nname[kind] += room;
       }
-      if (nname[0]) all[n++] = name[0];
-      for (PetscInt i = 0; i < nname[1]; i++) all[n++] = name[1 + i];
+      if (nname[0])
+        all[n++] = name[0];
+      for (PetscInt i = 0; i < nname[1]; i++)
+        all[n++] = name[1 + i];
       PetscCall(SbTrianglesGroups(f, n, all));
     }
     SbScanEndOfLine(s);
@@ -173,7 +195,8 @@ PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
   s->comment = '#';
   (void)SbScanWord(s, sizeof(word), word);
   if (strcmp(word, "OFF"))
-    SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read", word);
+    SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read",
+                  word);
   PetscCall(SbScanCount(s, "vertices", 6, 6, &nvert));
   PetscCall(SbScanCount(s, "faces", 8, 8, &nface));
   PetscCall(SbScanText(s, "number of edges", &nedge));

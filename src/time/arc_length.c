@@ -1,26 +1,29 @@
 /*
-  Arc-length method for static runs: an unknown load factor lambda, and the length l of a step prescribed,
+  Arc-length method for static runs: an unknown load factor lambda, and the length l of a step
+  prescribed,
 
     R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
 
-  so that the path continues past limit points of load and displacement. |d| is the mass-weighted root mean
-  square, in m, with prescribed displacements: a cylindrical constraint (Crisfield, Comput. Struct. 13, 1981).
-  Both equations are linearised together (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59,
-  1986). With the exact tangent K and q = -dR/dlambda an iteration takes two solves with one factorisation,
+  so that the path continues past limit points of load and displacement. |d| is the mass-weighted
+  root mean square, in m, with prescribed displacements: a cylindrical constraint (Crisfield,
+  Comput. Struct. 13, 1981). Both equations are linearised together (Schweizerhof and Wriggers,
+  Comput. Methods Appl. Mech. Eng. 59, 1986). With the exact tangent K and q = -dR/dlambda an
+  iteration takes two solves with one factorisation,
 
     K r = -R,   K v = q,   dlambda = ((l^2 - |d|^2)/2 - (d, r)) / (d, v),   du = r + dlambda v.
 
-  The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng, Comput. Methods
-  Appl. Mech. Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at
-  limit points and after bifurcations. The first step has the load increment 1 / static_steps, later ones are
-  longer while iterations are few. A step that does not converge, or ends at a large angle to its predictor
-  (on another branch), is halved.
+  The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng,
+  Comput. Methods Appl. Mech. Eng. 179, 1999): unlike the sign of the determinant or of the work of
+  the loads it is right at limit points and after bifurcations. The first step has the load
+  increment 1 / static_steps, later ones are longer while iterations are few. A step that does not
+  converge, or ends at a large angle to its predictor (on another branch), is halved.
 
-  q is a finite difference of residuals, exact for loads proportional to lambda; with moving supports and
-  formulas of t (here lambda) its step is small. The last step is solved at lambda = 1.
+  q is a finite difference of residuals, exact for loads proportional to lambda; with moving
+  supports and formulas of t (here lambda) its step is small. The last step is solved at lambda = 1.
 
-  K has negative eigenvalues after limit loads. If the factorisation counts them, a change of their number
-  while the load does not turn is a bifurcation: reported, not followed. Not handled: contact, re-meshing.
+  K has negative eigenvalues after limit loads. If the factorisation counts them, a change of their
+  number while the load does not turn is a bifurcation: reported, not followed. Not handled:
+  contact, re-meshing.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -34,16 +37,17 @@ typedef struct {
   SbRun run;
   union {
     struct {
-      Vec weight;               /* mass of each displacement over the total mass */
-      Vec X, d, r, v, q, begin; /* end of the step; d, r, v, q as above; v at the start of the step */
-      Vec w, du;                /* work vector; correction of X */
+      Vec weight; /* mass of each displacement over the total mass */
+      Vec X, d, r, v, q,
+        begin;   /* end of the step; d, r, v, q as above; v at the start of the step */
+      Vec w, du; /* work vector; correction of X */
     };
     Vec all[9]; /* the same vectors */
   };
   PetscReal factor, delta; /* lambda at X; its finite difference step for q */
   PetscReal load;          /* |q| at the start of the run, N */
-  PetscInt negative;       /* negative eigenvalues of K at the start of the last step; -1: unknown */
-  PetscReal turned;        /* sign of dlambda at the start of the last step */
+  PetscInt negative; /* negative eigenvalues of K at the start of the last step; -1: unknown */
+  PetscReal turned;  /* sign of dlambda at the start of the last step */
 } Path;
 
 /* Weighted product (a, b), m^2. */
@@ -90,8 +94,8 @@ static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
   p->run->linear_step += its;
   *ok = (PetscBool)(reason > 0);
   if (!*ok)
-    PetscCall(SbRunFail(p->run, "load factor %g: the linear solver ended with %s", (double)p->factor,
-                        KSPConvergedReasons[reason]));
+    PetscCall(SbRunFail(p->run, "load factor %g: the linear solver ended with %s",
+                        (double)p->factor, KSPConvergedReasons[reason]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,6 +108,7 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   PetscFunctionBeginUser;
   PetscCall(SNESComputeJacobian(run->snes, p->X, run->operator, run->J));
   run->newton_step++;
+
   /* q; w: derivative of the prescribed displacements by lambda */
   PetscCall(VecCopy(p->X, p->w));
   PetscCall(put_at(p, factor + p->delta));
@@ -119,29 +124,34 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
 /* Newton's method from X for R and the length l of the step; l = 0: for R at fixed lambda. */
 static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok)
 {
-  PetscReal atol, rtol, norm, dd, dr, dv, more = 0.;
+  PetscReal atol, rtol, norm, dd, dr, dv;
+  PetscReal more = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(p->run->snes, &atol, &rtol, NULL, NULL, NULL));
   for (*its = 0;; (*its)++) {
     PetscCall(residual(p, &norm));
     *ok = (PetscBool)(norm <= PetscMax(atol, rtol * p->load));
-    if (*ok) break;
+    if (*ok)
+      break;
     if (PetscIsInfOrNanReal(norm) || PetscIsInfOrNanReal(p->factor)) {
-      PetscCall(SbRunFail(p->run, "forces that are no numbers after %" PetscInt_FMT " iterations", *its));
+      PetscCall(
+        SbRunFail(p->run, "forces that are no numbers after %" PetscInt_FMT " iterations", *its));
       break;
     }
     if (*its == MOST) {
-      PetscCall(SbRunFail(p->run,
-                          "load factor %g: the residual is still %g N after %" PetscInt_FMT " iterations",
-                          (double)p->factor, (double)norm, *its));
+      PetscCall(SbRunFail(
+        p->run, "load factor %g: the residual is still %g N after %" PetscInt_FMT " iterations",
+        (double)p->factor, (double)norm, *its));
       break;
     }
     PetscCall(tangent(p, ok));
-    if (!*ok) break;
+    if (!*ok)
+      break;
     PetscCall(VecAXPBY(p->q, -1., 0., p->r));
     PetscCall(solve(p, p->q, p->du, ok));
-    if (!*ok) break;
+    if (!*ok)
+      break;
     if (l > 0.) {
       PetscCall(VecWAXPY(p->d, -1., p->run->U, p->X));
       PetscCall(product(p, p->d, p->d, &dd));
@@ -156,13 +166,15 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts a step of length l from U with the load factor `from`; sign: of the initial change of the load. */
+/* Attempts a step of length l from U with the load factor `from`; sign: of the initial change of
+   the load. */
 static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal sign, PetscInt *its,
                               PetscBool *ok)
 {
   const SbRun run = p->run;
   PetscReal vv, dd, dv;
-  PetscBool far, again = (PetscBool)(run->post_solve.fn != NULL);
+  PetscBool far;
+  PetscBool again = (PetscBool)(run->post_solve.fn != NULL);
   PetscInt more;
 
   PetscFunctionBeginUser;
@@ -170,6 +182,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->U));
   PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
   PetscCall(correct(p, l, its, ok));
+
   /* too large an angle: another branch */
   PetscCall(VecWAXPY(p->d, -1., run->U, p->X));
   PetscCall(product(p, p->d, p->d, &dd));
@@ -179,7 +192,9 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
     PetscCall(SbRunFail(run, "load factor %g: the path turns too sharply", (double)p->factor));
   }
   PetscCall(SbRunTooFar(run, p->X, &far));
-  if (far) *ok = PETSC_FALSE;
+  if (far)
+    *ok = PETSC_FALSE;
+
   /* past the end of the path: solve at lambda = 1 */
   if (*ok && from < 1. && p->factor > 1.) {
     PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->U));
@@ -192,7 +207,8 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
 
     again = PETSC_FALSE;
     PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
-    if (again) PetscCall(correct(p, l, &more, ok));
+    if (again)
+      PetscCall(correct(p, l, &more, ok));
   }
   PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->U, p->X}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,21 +225,25 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscCall(SbSpaceFollowJumps(run->model->space, run->U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecCopy(p->v, p->begin));
-  if (p->load == 0.) PetscCall(VecNorm(p->q, NORM_2, &p->load));
+  if (p->load == 0.)
+    PetscCall(VecNorm(p->q, NORM_2, &p->load));
   PetscCall(product(p, run->path, p->begin, &along));
   *sign = along < 0. ? -1. : 1.;
   PetscCall(SbSolverCountNegativeEigenvalues(run->snes, run->model->space, &negative));
-  if (run->nonsymmetric.U) negative = -1; /* the matrix lacks a part of K: its inertia is unknown */
-  if (negative >= 0 && p->negative >= 0 && PetscAbsInt(negative - p->negative) != (*sign != p->turned) &&
-      !run->bifurcations++)
-    PetscCall(SbWarning(run->model->comm,
-                        "load factor %g: the tangent has %" PetscInt_FMT
-                        " negative eigenvalues, a step before %" PetscInt_FMT
-                        ", and the load does not turn: a bifurcation was passed, and other equilibria may be "
-                        "reached by a small imperfection",
-                        (double)p->factor, negative, p->negative));
+  if (run->nonsymmetric.U)
+    negative = -1; /* the matrix lacks a part of K: its inertia is unknown */
+  if (negative >= 0 && p->negative >= 0 &&
+      PetscAbsInt(negative - p->negative) != (*sign != p->turned) && !run->bifurcations++)
+    PetscCall(SbWarning(
+      run->model->comm,
+      "load factor %g: the tangent has %" PetscInt_FMT
+      " negative eigenvalues, a step before %" PetscInt_FMT
+      ", and the load does not turn: a bifurcation was passed, and other equilibria may be "
+      "reached by a small imperfection",
+      (double)p->factor, negative, p->negative));
   p->negative = negative;
   p->turned = *sign;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -232,45 +252,59 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->nbegin_step ? m->begin_step[0]->name : m->npotential ? m->potential[0]->name : "";
+  const char *name = m->nbegin_step  ? m->begin_step[0]->name
+                     : m->npotential ? m->potential[0]->name
+                                     : "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCheck(!m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
-             "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
-             "dynamic run with damping",
-             name);
+  PetscCheck(
+    !m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
+    "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
+    "dynamic run with damping",
+    name);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
   PetscCall(PetscStrcmp(run->solver, "cholmod", &cholmod));
-  PetscCheck(!cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
-             "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave "
-             "-solver to auto, or give mumps or umfpack",
-             run->solver);
+  PetscCheck(
+    !cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
+    "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave "
+    "-solver to auto, or give mumps or umfpack",
+    run->solver);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbArcLengthSolve(SbRun run)
 {
-  PetscReal factor = run->t0, sign = 1., l, length;
-  PetscInt step = run->step0, cuts = 0, its;
-  PetscBool last = (PetscBool)(factor == 1.), known = PETSC_FALSE, ok;
+  PetscReal factor = run->t0;
+  PetscReal sign = 1.;
+  PetscReal l, length;
+  PetscInt step = run->step0;
+  PetscInt cuts = 0;
+  PetscInt its;
+  PetscBool last = (PetscBool)(factor == 1.);
+  PetscBool known = PETSC_FALSE;
+  PetscBool ok;
   const SbModel m = run->model;
   Path p = {.run = run, .negative = -1};
 
   PetscFunctionBeginUser;
   PetscCheck(!run->after.fn, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
-  for (int k = 0; k < 9; k++) PetscCall(VecDuplicate(run->U, &p.all[k]));
+  for (int k = 0; k < 9; k++)
+    PetscCall(VecDuplicate(run->U, &p.all[k]));
   PetscCall(VecAXPBY(p.weight, 1. / m->mass, 0., run->mass));
+
   /* whether R is linear in lambda */
   PetscCall(VecZeroEntries(p.X));
   PetscCall(put_at(&p, 1.));
   PetscCall(VecNorm(p.X, NORM_INFINITY, &length));
   p.delta = length > 0. ? FINE : 1.;
-  for (PetscInt e = 0; e < m->nforce; e++) p.delta = m->force[e]->steady ? p.delta : FINE;
-  for (PetscInt e = 0; e < m->nprescribe; e++) p.delta = m->prescribe[e]->steady ? p.delta : FINE;
+  for (PetscInt e = 0; e < m->nforce; e++)
+    p.delta = m->force[e]->steady ? p.delta : FINE;
+  for (PetscInt e = 0; e < m->nprescribe; e++)
+    p.delta = m->prescribe[e]->steady ? p.delta : FINE;
   PetscCall(VecCopy(run->U, p.X));
   PetscCall(put_at(&p, factor));
   PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
@@ -282,17 +316,20 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       PetscCall(VecCopy(run->U, p.X));
       PetscCall(put_at(&p, factor));
       PetscCall(begin_step(&p, &sign, &ok));
-      if (!ok) break;
+      if (!ok)
+        break;
       known = PETSC_TRUE;
     }
 
-    /* first step: by the load increment 1 / static_steps or, after a load path, its displacement per load */
+    /* first step: by the load increment 1 / static_steps or, after a load path, its displacement
+       per load */
     if (l == 0.) {
       PetscReal rate, uu;
 
       PetscCall(product(&p, p.begin, p.begin, &rate));
       PetscCheck(rate > 0., m->comm, PETSC_ERR_USER_INPUT,
-                 "-static_control arc_length: no effect loads or moves the bodies more with the load factor");
+                 "-static_control arc_length: no effect loads or moves the bodies more with the "
+                 "load factor");
       rate = PetscSqrtReal(rate);
       if (factor > 0.) {
         PetscCall(product(&p, run->U, run->U, &uu));
@@ -311,7 +348,8 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
         break;
       }
       l *= 0.5;
-      if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first) continue;
+      if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first)
+        continue;
       break;
     }
 
@@ -341,11 +379,12 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     last = (PetscBool)(last || p.factor == 1.);
     if (!last && step + 1 - run->step0 == run->arc.steps) {
       last = PETSC_TRUE;
-      PetscCall(SbWarning(m->comm,
-                          "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
-                          run->arc.steps, (double)p.factor));
+      PetscCall(SbWarning(
+        m->comm, "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
+        run->arc.steps, (double)p.factor));
     }
-    if (!last) PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
+    if (!last)
+      PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
     last = (PetscBool)(last || run->stopped);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;
@@ -358,14 +397,17 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
     PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
     if (body >= 0 && !run->steps_total)
-      PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
-                          (double)factor, m->body[body].name, motion));
+      PetscCall(
+        SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
+                  (double)factor, m->body[body].name, motion));
     else
-      PetscCall(SbRunFail(run,
-                          "the path reached the load factor %.7g, and no step of %.1e of the first one's "
-                          "length was found to go on: %s",
-                          (double)factor, (double)(2. * l / run->arc.first), why));
+      PetscCall(
+        SbRunFail(run,
+                  "the path reached the load factor %.7g, and no step of %.1e of the first one's "
+                  "length was found to go on: %s",
+                  (double)factor, (double)(2. * l / run->arc.first), why));
   }
-  for (int k = 0; k < 9; k++) PetscCall(VecDestroy(&p.all[k]));
+  for (int k = 0; k < 9; k++)
+    PetscCall(VecDestroy(&p.all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

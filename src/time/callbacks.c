@@ -1,20 +1,23 @@
 /*
-  Callbacks of PETSc's TS and SNES. A tangent that cannot have changed (linear laws, loads independent of the
-  displacement, the same shifts) is not assembled again, and the preconditioner is reused.
+  Callbacks of PETSc's TS and SNES. A tangent that cannot have changed (linear laws, loads
+  independent of the displacement, the same shifts) is not assembled again, and the preconditioner
+  is reused.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
 
 #define TINY 1e-10 /* relative difference of shifts that are the same */
 
-static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V,
-                                   Mat P)
+static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a,
+                                   Vec U, Vec V, Mat P)
 {
   PetscFunctionBeginUser;
-  if (run->model->linear && run->tangent_known && PetscAbsReal(run->shift_v - shift_v) <= TINY * shift_v &&
+  if (run->model->linear && run->tangent_known &&
+      PetscAbsReal(run->shift_v - shift_v) <= TINY * shift_v &&
       PetscAbsReal(run->shift_a - shift_a) <= TINY * shift_a)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
+
   /* a rotated preconditioner needs the displacement of the matrix */
   if (run->solver_used->precondition)
     PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
@@ -36,8 +39,8 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &run));
   PetscCall(VecCopy(x, run->nonsymmetric.x));
-  PetscCall(SbModelNonsymmetric(run->model, run->nonsymmetric.t, run->nonsymmetric.U, run->nonsymmetric.x,
-                                run->nonsymmetric.y));
+  PetscCall(SbModelNonsymmetric(run->model, run->nonsymmetric.t, run->nonsymmetric.U,
+                                run->nonsymmetric.x, run->nonsymmetric.y));
   PetscCall(MatMult(run->J, x, y));
   PetscCall(VecAXPY(y, 1., run->nonsymmetric.y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -51,7 +54,8 @@ PetscErrorCode SbFormCreateOperator(SbRun run)
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.U));
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.x));
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.y));
-  PetscCall(MatCreateShell(run->model->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, run, &run->operator));
+  PetscCall(
+    MatCreateShell(run->model->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, run, &run->operator));
   PetscCall(MatShellSetOperation(run->operator, MATOP_MULT, SB_OPERATION(multiply)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -64,8 +68,8 @@ PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
-                                Mat J, Mat P, void *ctx)
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v,
+                                PetscReal shift_a, Mat J, Mat P, void *ctx)
 {
   PetscFunctionBeginUser;
   (void)ts;
@@ -116,7 +120,8 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBoo
     KSP ksp;
     PC pc;
 
-    /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a division */
+    /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a
+       division */
     PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &M));
     PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));

@@ -1,9 +1,11 @@
 /*
-  The solves of a step; with contact an active-set iteration: solve and update the active set until it stays.
+  The solves of a step; with contact an active-set iteration: solve and update the active set until
+  it stays.
 
-  Later solves start near their solution, and a tolerance relative to their first residual could be below the
-  rounding of large contact forces. So all solves of a step have the absolute tolerance of the first one;
-  while the active set changes, that in time steps is a thousand times larger ("rough" solves).
+  Later solves start near their solution, and a tolerance relative to their first residual could be
+  below the rounding of large contact forces. So all solves of a step have the absolute tolerance of
+  the first one; while the active set changes, that in time steps is a thousand times larger
+  ("rough" solves).
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -12,8 +14,9 @@
 #define LOOSER 1e3      /* factor on the tolerance of rough solves */
 #define ROUGH 1e-3      /* largest tolerance of rough solves, over the first residual */
 #define ROUGH_ROUNDS 10 /* number of iterations after which solves are no longer rough */
-#define ROUNDS 250      /* largest number of solves per step; response augmented may take more than 100 */
-#define APART 0.05      /* least distance of a time of impact from the ends of a step, over its length */
+#define ROUNDS \
+  250 /* largest number of solves per step; response augmented may take more than 100 */
+#define APART 0.05 /* least distance of a time of impact from the ends of a step, over its length */
 
 /* Tolerances of the solvers as set by the user. */
 typedef struct {
@@ -21,8 +24,10 @@ typedef struct {
   KSP ksp;
 } Aim;
 
-/* Sets the tolerances of a step with the first residual `size`, N; 0: the user's. least: rounding, N. */
-static PetscErrorCode set_aim(SbRun run, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
+/* Sets the tolerances of a step with the first residual `size`, N; 0: the user's. least: rounding,
+   N. */
+static PetscErrorCode set_aim(SbRun run, const Aim *aim, PetscReal size, PetscReal least,
+                              PetscBool rough)
 {
   const PetscReal rtol = run->single ? aim->linear_rtol : aim->rtol;
   const PetscReal part = rough ? PetscMax(rtol, PetscMin(ROUGH, LOOSER * rtol)) : rtol;
@@ -30,9 +35,10 @@ static PetscErrorCode set_aim(SbRun run, const Aim *aim, PetscReal size, PetscRe
   const PetscReal linear = (run->single ? 1 : 0.1) * PetscMax(least, part * size);
 
   PetscFunctionBeginUser;
-  PetscCall(SNESSetTolerances(run->snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT,
-                             PETSC_DEFAULT));
+  PetscCall(
+    SNESSetTolerances(run->snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear),
+                             PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -57,9 +63,12 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   const SNES snes = run->snes;
   const SbSolvedStep *step = &attempt->step;
   const Vec U = step->U;
-  const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsSeparate(m->space));
-  PetscBool again = PETSC_TRUE, rough, constrained;
-  PetscReal size, least = 0;
+  const PetscBool projected =
+    (PetscBool)(m->space->constraints && !SbConstraintsSeparate(m->space));
+  PetscBool again = PETSC_TRUE;
+  PetscBool rough, constrained;
+  PetscReal size;
+  PetscReal least = 0;
   Aim aim;
 
   PetscFunctionBeginUser;
@@ -67,7 +76,8 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     PetscCall(solve(run, U, reason));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!run->R) PetscCall(VecDuplicate(U, &run->R));
+  if (!run->R)
+    PetscCall(VecDuplicate(U, &run->R));
 
   /* tolerances as set by the user */
   PetscCall(SNESGetKSP(snes, &aim.ksp));
@@ -78,10 +88,13 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->V, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
+
   /* the matrix has the old constraints */
-  if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
+  if (projected || !m->dynamic)
+    run->tangent_known = PETSC_FALSE;
   if (constrained) {
-    /* scale of rounding: contact and support forces, as a body at rest has a residual of rounding only */
+    /* scale of rounding: contact and support forces, as a body at rest has a residual of rounding
+       only */
     PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
@@ -90,14 +103,18 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   /* the tolerance of all solves of this step: that of the first one */
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
-  if (PetscIsInfOrNanReal(size)) size = 0;
+  if (PetscIsInfOrNanReal(size))
+    size = 0;
 
-  /* solves until the active set does not change; the first one without contact has the user's tolerances */
+  /* solves until the active set does not change; the first one without contact has the user's
+     tolerances */
   for (PetscInt round = 1;; round++) {
-    if (constrained || round > 1) PetscCall(set_aim(run, &aim, size, least, rough));
+    if (constrained || round > 1)
+      PetscCall(set_aim(run, &aim, size, least, rough));
     PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
     PetscCall(solve(run, U, reason));
-    if (*reason <= 0) break;
+    if (*reason <= 0)
+      break;
     run->contact_round = round;
     PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
     m->space->rough = rough;
@@ -106,13 +123,19 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
       /* the first time of impact, if the step may end there */
       for (PetscInt e = 0; e < m->ntime_of_impact; e++)
         SbEffectCall(m->time_of_impact[e], time_of_impact, &run->time_of_impact);
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &run->time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
-      if (run->time_of_impact < APART || run->time_of_impact > 1. - APART) run->time_of_impact = 1.;
-      if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
+      PetscCallMPI(
+        MPI_Allreduce(MPI_IN_PLACE, &run->time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
+      if (run->time_of_impact < APART || run->time_of_impact > 1. - APART)
+        run->time_of_impact = 1.;
+      if (run->time_of_impact < 1.)
+        *reason = SNES_CONVERGED_ITERATING;
     }
-    if ((!again && !rough) || !*reason) break;
-    if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
-    if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
+    if ((!again && !rough) || !*reason)
+      break;
+    if (!again || round == ROUGH_ROUNDS)
+      rough = PETSC_FALSE;
+    if (projected || !m->dynamic)
+      run->tangent_known = PETSC_FALSE;
     PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
     if (run->stopped || round == ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;

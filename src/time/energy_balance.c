@@ -1,11 +1,12 @@
 /*
-  Energy balance. R: residual without constraints (reaction on prescribed unknowns), f: loads. The work in a
-  step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the change of their
-  potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment times angle); damping
-  dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own work (src/effect/barrier.c), as
-  the energy of its gaps may change much in a step. The rest of the difference between the energies at the
-  start and now was dissipated (negative: added) by the integrator. A stable implicit one adds little; if one
-  adds most of the energy, it is unstable, and the run means nothing from there on.
+  Energy balance. R: residual without constraints (reaction on prescribed unknowns), f: loads. The
+  work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
+  change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
+  times angle); damping dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own
+  work (src/effect/barrier.c), as the energy of its gaps may change much in a step. The rest of the
+  difference between the energies at the start and now was dissipated (negative: added) by the
+  integrator. A stable implicit one adds little; if one adds most of the energy, it is unstable, and
+  the run means nothing from there on.
 */
 #include "time_impl.h"
 
@@ -35,7 +36,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 {
   SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal work[4], power = 0., own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
+  PetscReal work[4], power = 0.,
+                     own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
@@ -43,21 +45,27 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(VecDuplicate(run->U, &loads));
   PetscCall(VecDuplicate(run->U, &reaction));
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
+
   /* loads without barrier contact, which has its own work */
-  if (m->npotential) PetscCall(SbModelPotentialGradient(m, run->U, 1., PETSC_FALSE, NULL, loads));
-  for (PetscInt k = 0; k < m->npotential; k++) own[0] += m->potential[k]->work;
+  if (m->npotential)
+    PetscCall(SbModelPotentialGradient(m, run->U, 1., PETSC_FALSE, NULL, loads));
+  for (PetscInt k = 0; k < m->npotential; k++)
+    own[0] += m->potential[k]->work;
   PetscCall(SbRunReactions(run, t, reaction));
-  if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
+  if (run->damped)
+    PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
     const PetscScalar *before, *now;
     Vec moved;
 
-    /* twice the work of loads and reactions: at prescribed unknowns, and where contact acts or just did */
+    /* twice the work of loads and reactions: at prescribed unknowns, and where contact acts or just
+       did */
     PetscCall(VecDuplicate(run->U, &moved));
     PetscCall(VecWAXPY(moved, -1., run->previous, run->U));
     PetscCall(VecDot(loads, moved, &work[0]));
     PetscCall(VecDot(run->loads, moved, &work[1]));
-    if (!m->space->constraints) PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, moved));
+    if (!m->space->constraints)
+      PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, moved));
     PetscCall(VecDot(reaction, moved, &work[2]));
     PetscCall(VecDot(run->reaction, moved, &work[3]));
     PetscCall(VecDestroy(&moved));
@@ -66,7 +74,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(VecGetArrayRead(run->reaction, &before));
     PetscCall(VecGetArrayRead(reaction, &now));
     for (PetscInt k = 0; k < m->nprescribe; k++) {
-      if (!m->prescribe[k]->ops.turning_work) continue;
+      if (!m->prescribe[k]->ops.turning_work)
+        continue;
       SbEffectCall(m->prescribe[k], turning_work, m->space, t - dt, t, before, now, &own[1]);
     }
     PetscCall(VecRestoreArrayRead(reaction, &now));
@@ -82,18 +91,19 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   run->energy_most = PetscMax(run->energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->gain_said && -e->integrator_loss > GIVEN * run->energy_most) {
     run->gain_said = PETSC_TRUE;
-    PetscCall(
-      SbWarning(m->comm,
-                "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
-                "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
-                (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
+    PetscCall(SbWarning(
+      m->comm,
+      "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
+      "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
+      (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
   }
   run->damping_power = power;
   PetscCall(VecDestroy(&run->loads));
   PetscCall(VecDestroy(&run->reaction));
   run->loads = loads;
   run->reaction = reaction;
-  if (!run->previous) PetscCall(VecDuplicate(run->U, &run->previous));
+  if (!run->previous)
+    PetscCall(VecDuplicate(run->U, &run->previous));
   PetscCall(VecCopy(run->U, run->previous));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,21 +1,23 @@
 /*
   Rejects steps that invert tets, with -time_inverted reject.
 
-  det F <= 0 in a tet is no admissible deformation; with laws of finite energy a run could go on, with
-  meaningless results. A step that increases the number of such tets is rejected, so inverted initial states
-  may recover. It is repeated with half its length; below 2^-time_max_halvings of the nominal length the run
-  stops: shorter steps would only approach the flat tet.
+  det F <= 0 in a tet is no admissible deformation; with laws of finite energy a run could go on,
+  with meaningless results. A step that increases the number of such tets is rejected, so inverted
+  initial states may recover. It is repeated with half its length; below 2^-time_max_halvings of the
+  nominal length the run stops: shorter steps would only approach the flat tet.
 */
 #include "time_impl.h"
 
-PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok)
+PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
+                                   PetscBool *ok)
 {
   PetscInt n[2];
   PetscReal least[2];
 
   PetscFunctionBeginUser;
   run->rejected_inverted = PETSC_FALSE;
-  if (!run->reject_inverted || !*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->reject_inverted || !*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) {
     const SbSpace s = run->model->space;
     PetscReal energy, volume;
@@ -28,15 +30,16 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n[k], 1, MPIU_INT, MPI_SUM, run->model->comm));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least[k], 1, MPIU_REAL, MPI_MIN, run->model->comm));
   }
-  if (n[1] <= n[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (n[1] <= n[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_FALSE;
   run->rejected_inverted = PETSC_TRUE;
-  PetscCall(SbRunFail(run,
-                      "%s %g to %g would invert %" PetscInt_FMT
-                      " more tet%s (smallest det F %.3g, before it %.3g), which -time_inverted reject; "
-                      "re-mesh the body before that (-remesh_quality), or give it a finer mesh",
-                      run->ts ? "the step from t, s =" : "the step from the load factor", (double)t,
-                      (double)(t + dt), n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1],
-                      (double)least[0]));
+  PetscCall(SbRunFail(
+    run,
+    "%s %g to %g would invert %" PetscInt_FMT
+    " more tet%s (smallest det F %.3g, before it %.3g), which -time_inverted reject; "
+    "re-mesh the body before that (-remesh_quality), or give it a finer mesh",
+    run->ts ? "the step from t, s =" : "the step from the load factor", (double)t, (double)(t + dt),
+    n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,16 +1,17 @@
 /*
-  Rigid motions without resistance (free motions) of a part of a body, which make a static problem singular
-  for any length of the load steps.
+  Rigid motions without resistance (free motions) of a part of a body, which make a static problem
+  singular for any length of the load steps.
 
-  A part is a set of nodes connected by cells, Z its six rigid motions, P the projection onto admissible
-  displacements (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
+  A part is a set of nodes connected by cells, Z its six rigid motions, P the projection onto
+  admissible displacements (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
 
-  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x: by geometry, Z x is admissible if l is zero up to rounding.
-  2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the last solve's operator, D the
+  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x: by geometry, Z x is admissible if l is zero up to
+  rounding. 2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the last
+  solve's operator, D the
      diagonal of its matrix: free if l is zero, as neither springs nor friction nor stress resist.
 
-  Not found: parts that are free only together, connected by contact. A part on springs whose stiffness is
-  within the rounding of that of its cells counts as free.
+  Not found: parts that are free only together, connected by contact. A part on springs whose
+  stiffness is within the rounding of that of its cells counts as free.
 */
 #include "sbgeometry.h"
 #include "time_impl.h"
@@ -18,9 +19,10 @@
 
 #define ALLOWED 1e-13 /* largest l of an admissible motion: rounding */
 #define FREE 1e-13    /* largest l of a free motion: sums over the nodes have rounding of 1e-15 */
-#define FAR 1e6       /* displacement over the body's size beyond which a static system was singular */
+#define FAR 1e6 /* displacement over the body's size beyond which a static system was singular */
 
-/* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees it. */
+/* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees
+   it. */
 static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 {
   PetscInt *parent, *lowest;
@@ -28,17 +30,21 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   PetscReal *all;
 
   PetscFunctionBeginUser;
+
   /* union of the nodes of each local cell, with their supports */
   PetscCall(PetscMalloc2(s->nnode, &parent, s->nnode, &lowest));
-  for (PetscInt i = 0; i < s->nnode; i++) parent[i] = i;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    parent[i] = i;
   for (PetscInt k = 0; k < 4 * s->mesh->ncell; k++) {
     (void)SbUnionJoin(parent, s->cell_node[k - k % 4], s->cell_node[k]);
     if (s->dirichlet_node && s->dirichlet_node[k] >= 0)
       (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
+
   /* the cells of DG have separate nodes: united across faces; edge nodes of P2 follow */
   for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++)
-    if (s->edge_node[i] >= 0) (void)SbUnionJoin(parent, s->cell_node[4 * (i / 6)], s->edge_node[i]);
+    if (s->edge_node[i] >= 0)
+      (void)SbUnionJoin(parent, s->cell_node[4 * (i / 6)], s->edge_node[i]);
   for (PetscInt b = 0; s->batch_weight && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
@@ -47,8 +53,10 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     }
   }
 
-  /* the lowest number in parts on several ranks: exchanged with the owners until it does not change */
-  for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
+  /* the lowest number in parts on several ranks: exchanged with the owners until it does not
+     change */
+  for (PetscInt i = 0; i < s->nnode; i++)
+    lowest[i] = s->gnode[i];
   PetscCall(PetscCalloc1(3 * s->nnode, &all));
   while (changed) {
     changed = PETSC_FALSE;
@@ -57,10 +65,12 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 
       lowest[root] = PetscMin(lowest[root], lowest[i]);
     }
-    for (PetscInt i = 0; i < s->nnode_owned; i++) all[3 * i] = (PetscReal)lowest[SbUnionRoot(parent, i)];
+    for (PetscInt i = 0; i < s->nnode_owned; i++)
+      all[3 * i] = (PetscReal)lowest[SbUnionRoot(parent, i)];
     PetscCall(SbSpaceUpdateGhosts(s, all));
     for (PetscInt i = 0; i < s->nnode; i++) {
-      const PetscInt other = (PetscInt)all[3 * i], root = SbUnionRoot(parent, i);
+      const PetscInt other = (PetscInt)all[3 * i];
+      const PetscInt root = SbUnionRoot(parent, i);
 
       changed = (PetscBool)(changed || other < lowest[root]);
       lowest[i] = PetscMin(lowest[root], other);
@@ -68,7 +78,8 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   }
   PetscCall(PetscMalloc1(s->nnode_owned, label));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) (*label)[i] = lowest[SbUnionRoot(parent, i)];
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    (*label)[i] = lowest[SbUnionRoot(parent, i)];
   PetscCall(PetscFree(all));
   PetscCall(PetscFree2(parent, lowest));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,10 +90,11 @@ typedef struct {
   PetscInt label, body;
   PetscReal centre[3], size; /* centre and size of its nodes, m */
   PetscInt nfree;            /* number of free motions */
-  PetscReal motion[6];       /* one of them: translations; rotations about the centre times size; m */
+  PetscReal motion[6]; /* one of them: translations; rotations about the centre times size; m */
 } Part;
 
-/* Coordinate of a node in the configuration of the tangent: the reference configuration for linear laws. */
+/* Coordinate of a node in the configuration of the tangent: the reference configuration for linear
+   laws. */
 static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 {
   return s->node_x[k] + (s->linear ? 0. : u[k]);
@@ -98,16 +110,21 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayRead(run->U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (label[i] != part->label) continue;
+    if (label[i] != part->label)
+      continue;
     sum[0] += 1.;
-    for (PetscInt c = 0; c < 3; c++) sum[1 + c] += coordinate(s, u, 3 * i + c);
+    for (PetscInt c = 0; c < 3; c++)
+      sum[1 + c] += coordinate(s, u, 3 * i + c);
     sum[5] += s->node_body[i];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 6, MPIU_REAL, MPI_SUM, s->comm));
-  for (int c = 0; c < 3; c++) part->centre[c] = sum[1 + c] / sum[0];
+  for (int c = 0; c < 3; c++)
+    part->centre[c] = sum[1 + c] / sum[0];
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (label[i] != part->label) continue;
-    for (PetscInt c = 0; c < 3; c++) sum[4] += PetscSqr(coordinate(s, u, 3 * i + c) - part->centre[c]);
+    if (label[i] != part->label)
+      continue;
+    for (PetscInt c = 0; c < 3; c++)
+      sum[4] += PetscSqr(coordinate(s, u, 3 * i + c) - part->centre[c]);
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum[4], 1, MPIU_REAL, MPI_SUM, s->comm));
@@ -116,10 +133,16 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Eigenvalues of E x = value M x, n <= 6, ascending; M-orthonormal eigenvectors in E. ok: M is definite. */
-static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6], PetscBool *ok)
+/* Eigenvalues of E x = value M x, n <= 6, ascending; M-orthonormal eigenvectors in E. ok: M is
+   definite. */
+static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6],
+                            PetscBool *ok)
 {
-  PetscBLASInt one = 1, six = 6, m, lwork = 64, info = 0;
+  PetscBLASInt one = 1;
+  PetscBLASInt six = 6;
+  PetscBLASInt m;
+  PetscBLASInt lwork = 64;
+  PetscBLASInt info = 0;
   PetscScalar work[64];
 
   PetscFunctionBeginUser;
@@ -129,7 +152,8 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of several free motions the message describes the first along or about an axis, if any. lost: Z - P Z. */
+/* Of several free motions the message describes the first along or about an axis, if any. lost: Z -
+   P Z. */
 static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
   PetscReal off, on, stiffness, size;
@@ -140,13 +164,16 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
   for (int k = 0; k < 6; k++) {
     PetscCall(VecNorm(lost[k], NORM_2, &off));
     PetscCall(VecNorm(z[k], NORM_2, &on));
-    if (off * off > ALLOWED * on * on) continue;
+    if (off * off > ALLOWED * on * on)
+      continue;
     PetscCall(VecPointwiseMult(w, d, z[k]));
     PetscCall(VecDot(w, z[k], &size));
     PetscCall(MatMult(run->operator, z[k], w));
     PetscCall(VecDot(w, z[k], &stiffness));
-    if (PetscAbsReal(stiffness) > FREE * size) continue;
-    for (int c = 0; c < 6; c++) part->motion[c] = c == k;
+    if (PetscAbsReal(stiffness) > FREE * size)
+      continue;
+    for (int c = 0; c < 6; c++)
+      part->motion[c] = c == k;
     break;
   }
   PetscCall(VecDestroy(&w));
@@ -178,8 +205,10 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       PetscReal r[3];
 
-      if (label[i] != part->label) continue;
-      for (PetscInt c = 0; c < 3; c++) r[c] = (coordinate(s, u, 3 * i + c) - part->centre[c]) / part->size;
+      if (label[i] != part->label)
+        continue;
+      for (PetscInt c = 0; c < 3; c++)
+        r[c] = (coordinate(s, u, 3 * i + c) - part->centre[c]) / part->size;
       if (k < 3)
         to[3 * i + k] = 1.;
       else {
@@ -193,12 +222,17 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));
 
-  /* n admissible motions (problem 1), by coefficients of the six in the columns of x; Z becomes Z - P Z */
-  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
-  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
-  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
+  /* n admissible motions (problem 1), by coefficients of the six in the columns of x; Z becomes Z -
+     P Z */
+  for (int j = 0; j < 6; j++)
+    PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
+  for (int k = 0; k < 6; k++)
+    PetscCall(VecAXPY(Z[k], -1., z[k]));
+  for (int j = 0; j < 6; j++)
+    PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
   PetscCall(eigen(6, x, M, value, &ok));
-  while (ok && n < 6 && value[n] <= ALLOWED) n++;
+  while (ok && n < 6 && value[n] <= ALLOWED)
+    n++;
   if (n) {
     Vec *y, w;
 
@@ -218,20 +252,23 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
       PetscCall(VecMDot(w, j + 1, y, E + 6 * j));
     }
     PetscCall(eigen(n, E, M, value, &ok));
-    while (ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE) part->nfree++;
-    PetscCall(PetscInfo(NULL,
-                        "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
-                        run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
+    while (ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE)
+      part->nfree++;
+    PetscCall(PetscInfo(
+      NULL, "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
+      run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
 
     /* coefficients of the softest one */
     for (int c = 0; c < 6 && part->nfree; c++) {
       part->motion[c] = 0.;
-      for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
+      for (PetscInt i = 0; i < n; i++)
+        part->motion[c] += E[i] * x[6 * i + c];
     }
     PetscCall(VecDestroyVecs(n, &y));
     PetscCall(VecDestroy(&w));
   }
-  if (part->nfree > 1) PetscCall(choose_axis(run, d, Z, z, part));
+  if (part->nfree > 1)
+    PetscCall(choose_axis(run, d, Z, z, part));
   if (part->nfree && along) {
     PetscCall(VecZeroEntries(along));
     PetscCall(VecMAXPY(along, 6, part->motion, z));
@@ -251,40 +288,48 @@ static void direction(const PetscReal v[3], PetscReal e[3])
     largest = PetscAbsReal(v[c]) > PetscAbsReal(v[largest]) + 1e-9 * length ? c : largest;
   for (int c = 0; c < 3; c++) {
     e[c] = (v[largest] < 0. ? -v[c] : v[c]) / length;
-    if (PetscAbsReal(e[c]) < 5e-3) e[c] = 0.;
+    if (PetscAbsReal(e[c]) < 5e-3)
+      e[c] = 0.;
   }
 }
 
-/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)"; the number of
-   other free motions, which of several parts it is, and a hint for nodes at centroids of facets. */
-static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
-                               size_t size, char text[])
+/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)"; the
+   number of other free motions, which of several parts it is, and a hint for nodes at centroids of
+   facets. */
+static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *part,
+                               PetscInt nbrother, size_t size, char text[])
 {
   const SbSpace s = run->model->space;
-  const PetscReal *t = part->motion, *w = part->motion + 3, w2 = SbDot3(w, w);
+  const PetscReal *t = part->motion;
+  const PetscReal *w = part->motion + 3;
+  const PetscReal w2 = SbDot3(w, w);
   PetscInt nfixed = 0;
   PetscReal e[3], p[3];
 
   PetscFunctionBeginUser;
   if (w2 <= 1e-10 * SbDot3(t, t)) {
     direction(t, e);
-    SbFormat(size, text, "moving along (%.2f, %.2f, %.2f)", (double)e[0], (double)e[1], (double)e[2]);
+    SbFormat(size, text, "moving along (%.2f, %.2f, %.2f)", (double)e[0], (double)e[1],
+             (double)e[2]);
   } else {
     /* point where t + w / size x (p - centre) has no component normal to w */
     direction(w, e);
     SbCross(w, t, p);
     for (int c = 0; c < 3; c++) {
       p[c] = part->centre[c] + part->size * p[c] / w2;
-      if (PetscAbsReal(p[c]) < 1e-9 * part->size) p[c] = 0.;
+      if (PetscAbsReal(p[c]) < 1e-9 * part->size)
+        p[c] = 0.;
     }
-    SbFormat(size, text, "turning about the axis along (%.2f, %.2f, %.2f) through (%.4g, %.4g, %.4g) m",
+    SbFormat(size, text,
+             "turning about the axis along (%.2f, %.2f, %.2f) through (%.4g, %.4g, %.4g) m",
              (double)e[0], (double)e[1], (double)e[2], (double)p[0], (double)p[1], (double)p[2]);
   }
   if (part->nfree > 1)
-    SbAppend(size, text, " and %" PetscInt_FMT " more motion%s", part->nfree - 1, part->nfree > 2 ? "s" : "");
+    SbAppend(size, text, " and %" PetscInt_FMT " more motion%s", part->nfree - 1,
+             part->nfree > 2 ? "s" : "");
   if (nbrother > 1)
-    SbAppend(size, text, " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
-             (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]);
+    SbAppend(size, text, " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)",
+             nbrother, (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]);
 
   /* one or two constrained facets of CR or DG leave rotations free */
   for (PetscInt k = 0; k < s->nfixed; k++)
@@ -301,7 +346,10 @@ static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *pa
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
 {
   const SbSpace s = run->model->space;
-  PetscInt *label, *own, *list, mine = 0, npart = 0, nbrother = 0;
+  PetscInt *label, *own, *list;
+  PetscInt mine = 0;
+  PetscInt npart = 0;
+  PetscInt nbrother = 0;
   PetscBool diagonal;
   Part part;
   Vec d;
@@ -309,7 +357,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscFunctionBeginUser;
   *body = -1;
   PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
-  if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
+  if (!diagonal)
+    PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
 
   /* the first part with a free motion; the labels of all parts are sorted, the same on all ranks */
   PetscCall(SbSpaceCreateVec(s, &d));
@@ -318,13 +367,15 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(label_parts(s, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
-    if (label[i] == s->gnode[i]) own[mine++] = label[i];
+    if (label[i] == s->gnode[i])
+      own[mine++] = label[i];
   PetscCall(SbAllgatherv(s->comm, MPIU_INT, mine, own, &npart, &list, NULL));
   PetscCall(PetscSortInt(npart, list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
     part.label = list[k];
     PetscCall(examine(run, label, d, &part, along));
-    if (part.nfree) *body = part.body;
+    if (part.nfree)
+      *body = part.body;
   }
 
   /* its description, with the number of parts of that body */
@@ -347,11 +398,13 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far)
 {
   const SbModel m = run->model;
-  PetscReal size = 0., most;
+  PetscReal size = 0.;
+  PetscReal most;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++)
-    for (int c = 0; c < 3; c++) size = PetscMax(size, m->body[b].bbox[3 + c] - m->body[b].bbox[c]);
+    for (int c = 0; c < 3; c++)
+      size = PetscMax(size, m->body[b].bbox[3 + c] - m->body[b].bbox[c]);
   PetscCall(VecNorm(X, NORM_INFINITY, &most));
   *far = (PetscBool)(most > FAR * size);
   PetscFunctionReturn(PETSC_SUCCESS);

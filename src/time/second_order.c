@@ -7,46 +7,52 @@
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
     Newmark: alpha_m = alpha_f = 1; with contact: below, a0 is the acceleration without contact
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
-    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0; symplectic: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
+    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0; symplectic: v1 = v0 + h a0, u1 = u0 + h v1; M a0
+    = f0
 
-  Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to be free
-  of collisions. In Newmark's method, where the mean of both ends would gain energy, it is implicit (Kane,
-  Repetto, Ortiz and Marsden 1999), with the stored a without contact:
+  Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to
+  be free of collisions. In Newmark's method, where the mean of both ends would gain energy, it is
+  implicit (Kane, Repetto, Ortiz and Marsden 1999), with the stored a without contact:
 
     u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f
     v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
 
-  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta), and damping
-  the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f over u1 - u0 is at most the decrease of B, as
-  B is convex: contact only dissipates.
+  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta),
+  and damping the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f over u1 - u0 is at most
+  the decrease of B, as B is convex: contact only dissipates.
 
-  The acceleration is part of the state (run->A), so a restart continues exactly. A step may be repeated once,
-  up to the first time of impact; the remainder is the next step (contact.c). A step whose solve fails is
-  halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for
-  TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
+  The acceleration is part of the state (run->A), so a restart continues exactly. A step may be
+  repeated once, up to the first time of impact; the remainder is the next step (contact.c). A step
+  whose solve fails is halved and repeated; after four good steps its length doubles, up to the
+  nominal one. The local error for TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991),
+  for implicit Euler h^2/2 a1.
 
-  Newmark with contact: the trapezoidal rule with implicit contact forces. With a the acceleration without
-  contact, M a = f_ext - f_int(u) - C v, and G^T lambda the contact forces at the end of the step (Kane,
-  Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180, 1999: beta = 1/4,
-  gamma = 1/2 there, 1/2 and 1 for contact)
+  Newmark with contact: the trapezoidal rule with implicit contact forces. With a the acceleration
+  without contact, M a = f_ext - f_int(u) - C v, and G^T lambda the contact forces at the end of the
+  step (Kane, Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180,
+  1999: beta = 1/4, gamma = 1/2 there, 1/2 and 1 for contact)
 
-    u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1 G^T lambda.
+    u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1
+    G^T lambda.
 
-  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: active nodes have g1 =
-  0, so an impact dissipates energy and persistent contact conserves it. But G v* is not zero: a node with g0
-  = 0 has v* = -v0, and separates in the next step or its force oscillates. Hence the velocity at the end is
+  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: active nodes
+  have g1 = 0, so an impact dissipates energy and persistent contact conserves it. But G v* is not
+  zero: a node with g0 = 0 has v* = -v0, and separates in the next step or its force oscillates.
+  Hence the velocity at the end is
 
     v1 = v* + M^-1 G^T mu  with  G v1 = w,
 
-  w the velocities of obstacles: the persistency condition of Laursen and Love (IJNME 53, 2002). As the
-  closest velocity in the mass norm it dissipates energy, too, m v^2 / 2 of each impacting node with the nodal
-  mass m: an impact of the nodes without restitution, which vanishes with the size of the cells. In the next
-  step their a0 and contact force are in balance, and forces are steady. (Deuflhard, Krause and Ertel, IJNME
-  73, 2008, project the predictor instead; their nodes keep the velocity before the impact until they part.)
+  w the velocities of obstacles: the persistency condition of Laursen and Love (IJNME 53, 2002). As
+  the closest velocity in the mass norm it dissipates energy, too, m v^2 / 2 of each impacting node
+  with the nodal mass m: an impact of the nodes without restitution, which vanishes with the size of
+  the cells. In the next step their a0 and contact force are in balance, and forces are steady.
+  (Deuflhard, Krause and Ertel, IJNME 73, 2008, project the predictor instead; their nodes keep the
+  velocity before the impact until they part.)
 
-  As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* + f_int(u1) -
-  f_ext = 2 G^T lambda: the solvers need no change. The stored acceleration is a1 + M^-1 G^T (lambda + mu /
-  h), with the mean contact force over the step, whose product with h is the change of momentum.
+  As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* +
+  f_int(u1) - f_ext = 2 G^T lambda: the solvers need no change. The stored acceleration is a1 + M^-1
+  G^T (lambda + mu / h), with the mean contact force over the step, whose product with h is the
+  change of momentum.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
@@ -62,14 +68,16 @@ typedef struct {
     struct {
       Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
       Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
-      Vec own0, own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
-      Vec work;       /* NULL with explicit methods */
+      Vec own0,
+        own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
+      Vec work; /* NULL with explicit methods */
     };
     Vec all[11]; /* the same vectors */
   };
-  Vec U, V, A;       /* where the equation is evaluated; borrowed */
-  PetscReal rest;    /* length of the remainder of a step after a time of impact, s; 0: none */
-  PetscReal whole;   /* length of the step before its division, s: the remainder ends at the original time */
+  Vec U, V, A;    /* where the equation is evaluated; borrowed */
+  PetscReal rest; /* length of the remainder of a step after a time of impact, s; 0: none */
+  PetscReal
+    whole; /* length of the step before its division, s: the remainder ends at the original time */
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
@@ -77,7 +85,9 @@ typedef struct {
 static PetscErrorCode end_state(TS ts, Vec X)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscReal h = ts->time_step, beta = so->set.beta, gamma = so->set.gamma;
+  const PetscReal h = ts->time_step;
+  const PetscReal beta = so->set.beta;
+  const PetscReal gamma = so->set.gamma;
   const Vec A0 = so->own0 ? so->own0 : so->run->A;
 
   PetscFunctionBeginUser;
@@ -88,7 +98,8 @@ static PetscErrorCode end_state(TS ts, Vec X)
     PetscCall(VecScale(so->A1, 1. / h));
   } else {
     PetscCall(VecWAXPY(so->A1, -1., so->X0, X));
-    PetscCall(VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, A0));
+    PetscCall(
+      VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, A0));
     PetscCall(VecCopy(so->V0, so->V1));
     if (so->set.separate)
       PetscCall(VecAXPBYPCZ(so->V1, 2. / h, -2. / h, -1., X, so->X0));
@@ -130,9 +141,11 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   (void)snes;
   PetscCall(stage_state(ts, X, &t));
   PetscCall(TSComputeI2Function(ts, t, so->U, so->V, so->A, F));
-  if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
+  if (so->set.alpha_f != 1.)
+    PetscCall(VecScale(F, 1. / so->set.alpha_f));
   if (so->run->model->barrier_apart)
-    PetscCall(SbModelPotentialGradient(so->run->model, X, so->run->barrier_weight, PETSC_TRUE, NULL, F));
+    PetscCall(
+      SbModelPotentialGradient(so->run->model, X, so->run->barrier_weight, PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,7 +153,9 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step;
-  PetscReal t = 0., shift_v = 1. / h, shift_a = 1. / (h * h);
+  PetscReal t = 0.;
+  PetscReal shift_v = 1. / h;
+  PetscReal shift_a = 1. / (h * h);
 
   PetscFunctionBeginUser;
   (void)snes;
@@ -153,7 +168,8 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets X1 to the initial guess, with the prescribed values of the end time; explicit: to the solution. */
+/* Sets X1 to the initial guess, with the prescribed values of the end time; explicit: to the
+   solution. */
 static PetscErrorCode predict(void *ctx)
 {
   const TS ts = (TS)ctx;
@@ -166,14 +182,17 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionBeginUser;
   if (!ts->usessnes) {
     PetscCall(VecWAXPY(so->V1, h, run->A, so->V0));
-    PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+    PetscCall(
+      VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
     PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
     PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_TRUE, so->A1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecCopy(so->X0, so->X1));
-  if (run->velocity_predictor) PetscCall(VecAXPY(so->X1, h, so->V0));
+  if (run->velocity_predictor)
+    PetscCall(VecAXPY(so->X1, h, so->V0));
   PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
+
   /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
@@ -181,7 +200,8 @@ static PetscErrorCode predict(void *ctx)
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y) PetscCall(VecAXPBY(Y, run->velocity_predictor ? 0. : -h, 0., so->V0));
+    if (Y)
+      PetscCall(VecAXPBY(Y, run->velocity_predictor ? 0. : -h, 0., so->V0));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,6 +215,7 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionBeginUser;
   PetscCall(stage_state((TS)ts, X, &t));
   PetscCall(SbModelResidual(so->run->model, t, so->U, so->V, so->A, PETSC_FALSE, R));
+
   /* Newmark multiplies the contact force at the end by two, that at the start by zero */
   PetscCall(VecScale(R, so->set.impulses ? 0.5 : 1. / so->set.alpha_f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -204,7 +225,8 @@ static SbSolvedStep solved_step(TS ts)
 {
   const SecondOrder *s = (SecondOrder *)ts->data;
 
-  return (SbSolvedStep){ts->ptime, ts->time_step, s->X0, s->V0, s->run->A, s->X1, s->V1, s->A1, ts->usessnes};
+  return (SbSolvedStep){ts->ptime, ts->time_step, s->X0, s->V0,       s->run->A,
+                        s->X1,     s->V1,         s->A1, ts->usessnes};
 }
 
 /* Computes velocity and acceleration at the end. */
@@ -217,7 +239,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscReal size;
 
   PetscFunctionBeginUser;
-  if (ts->usessnes) PetscCall(end_state(ts, so->X1));
+  if (ts->usessnes)
+    PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(ts->usessnes ? so->V1 : so->A1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (*ok && so->set.separate) {
@@ -231,7 +254,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
   }
   if (*ok && so->set.impulses) {
-    /* contact: adds its impulse to the velocity, and the mean force over the step to the acceleration */
+    /* contact: adds its impulse to the velocity, and the mean force over the step to the
+       acceleration */
     PetscCall(VecCopy(so->V1, so->work));
     if (SbSpaceIsConstrained(run->model->space))
       PetscCall(SbModelContactVelocity(run->model, ts->ptime + h, h, so->X1, so->V1));
@@ -243,7 +267,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   }
   if (!*ok && !ts->usessnes)
     PetscCall(SbRunFail(run,
-                        "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
+                        "step %" PetscInt_FMT
+                        " at t = %g s: the explicit solution is not finite; its step "
                         "of %g s is beyond the stable one (see the header)",
                         ts->steps + 1, (double)ts->ptime, (double)h));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
@@ -270,7 +295,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscBool jumps;
 
   PetscFunctionBeginUser;
-  /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other state */
+
+  /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other
+     state */
   if (!so->started && run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_TRUE, run->A));
 
@@ -290,7 +317,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   run->stage_part = so->set.alpha_f;
   for (;;) {
     const SbAttempt attempt = {solved_step(ts), predict, contact_residual, complete, ts};
-    PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE, fixed;
+    PetscBool ok = PETSC_FALSE;
+    PetscBool accept = PETSC_FALSE;
+    PetscBool fixed;
     PetscReal next, h;
 
     /* one attempt */
@@ -306,11 +335,13 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       /* return to the nominal length: double it after four steps without halving */
       PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
       h = fixed && run->good_steps >= 3 ? PetscMin(2. * ts->time_step, run->dt) : ts->time_step;
-      if (fixed && so->whole > 0.) h = so->rest > 0. ? so->rest : so->whole;
+      if (fixed && so->whole > 0.)
+        h = so->rest > 0. ? so->rest : so->whole;
       PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
       if (accept) {
         PetscCall(VecCopy(so->A1, run->A));
-        if (so->own0) PetscCall(VecCopy(so->own1, so->own0));
+        if (so->own0)
+          PetscCall(VecCopy(so->own1, so->own0));
         ts->ptime += ts->time_step;
         run->good_steps = next > ts->time_step ? 0 : run->good_steps + 1;
         ts->time_step = next;
@@ -340,6 +371,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     run->rejected_total++;
     run->good_steps = 0;
+
     // bounds the number of halvings, also when steps in between succeed
     if (explicit || run->stopped || ++cuts > run->max_halvings || next < SHORTEST * run->dt ||
         SbRunTooShort(run, next)) {
@@ -356,7 +388,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 }
 
 /* order: power of h in the error of one step. */
-static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
+static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order,
+                                                 PetscReal *wlte)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step;
@@ -385,11 +418,14 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
 static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscReal h = ts->ptime - ts->ptime_prev, s = (t - ts->ptime_prev) / h;
+  const PetscReal h = ts->ptime - ts->ptime_prev;
+  const PetscReal s = (t - ts->ptime_prev) / h;
 
   PetscFunctionBeginUser;
-  PetscCall(VecAXPBYPCZ(X, 1. - s * s * (3. - 2. * s), s * s * (3. - 2. * s), 0., so->X0, ts->vec_sol));
-  PetscCall(VecAXPBYPCZ(X, h * s * (1. - s) * (1. - s), -h * s * s * (1. - s), 1., so->V0, ts->vec_dot));
+  PetscCall(
+    VecAXPBYPCZ(X, 1. - s * s * (3. - 2. * s), s * s * (3. - 2. * s), 0., so->X0, ts->vec_sol));
+  PetscCall(
+    VecAXPBYPCZ(X, h * s * (1. - s) * (1. - s), -h * s * s * (1. - s), 1., so->V0, ts->vec_dot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -410,7 +446,8 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
 static PetscErrorCode TSReset_SecondOrder(TS ts)
 {
   PetscFunctionBeginUser;
-  for (int k = 0; k < 11; k++) PetscCall(VecDestroy(&((SecondOrder *)ts->data)->all[k]));
+  for (int k = 0; k < 11; k++)
+    PetscCall(VecDestroy(&((SecondOrder *)ts->data)->all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,15 +1,18 @@
 /*
-  Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback()) solves the
-  same system, in the same Newton iteration, and stays for the run. If the last one fails, the step is halved.
+  Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback())
+  solves the same system, in the same Newton iteration, and stays for the run. If the last one
+  fails, the step is halved.
 
-  A post-solve callback of the KSP does this. The KSP is kept, with another type, another preconditioner and,
-  if the next solver needs another matrix type, another operator, assembled at Newton's iterate.
+  A post-solve callback of the KSP does this. The KSP is kept, with another type, another
+  preconditioner and, if the next solver needs another matrix type, another operator, assembled at
+  Newton's iterate.
 
-  Not replaced: solvers chosen by -ksp_type or -pc_type; factorisations of the saddle-point system of contact;
-  solves along an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular;
-  exact tangents that Newton's method will project (newton.c).
+  Not replaced: solvers chosen by -ksp_type or -pc_type; factorisations of the saddle-point system
+  of contact; solves along an arc length; static systems with a free rigid motion (rigid_modes.c),
+  which are singular; exact tangents that Newton's method will project (newton.c).
 
-  petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not public.
+  petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not
+  public.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -21,9 +24,10 @@
 typedef struct _p_SbSolverList *SbSolverList;
 struct _p_SbSolverList {
   SbRun run;
-  PetscBool own;                                   /* the solver is one of the presets, and may be replaced */
-  uint32_t tried;                                  /* bits of the presets that failed */
-  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the previous post-solve callback; NULL: none */
+  PetscBool own;  /* the solver is one of the presets, and may be replaced */
+  uint32_t tried; /* bits of the presets that failed */
+  PetscErrorCode (*before)(KSP, Vec, Vec,
+                           void *); /* the previous post-solve callback; NULL: none */
   void *before_ctx;
   PetscBool again; /* a fallback is solving */
   char failures[384];
@@ -34,16 +38,18 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx);
 static PetscErrorCode attach(SbSolverList l, KSP ksp)
 {
   PetscFunctionBeginUser;
-  if (ksp->postsolve == after_solve) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ksp->postsolve == after_solve)
+    PetscFunctionReturn(PETSC_SUCCESS);
   l->before = ksp->postsolve;
   l->before_ctx = ksp->postctx;
   PetscCall(KSPSetPostSolve(ksp, after_solve, l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends "DIVERGED_ITS of cg after 5000 iterations, ..." to l->failures. memory: there was not enough. */
-static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
-                                       PetscBool *memory)
+/* Appends "DIVERGED_ITS of cg after 5000 iterations, ..." to l->failures. memory: there was not
+   enough. */
+static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[],
+                                       size_t size, PetscBool *memory)
 {
   const char *reason = KSPConvergedReasons[ksp->reason];
   PetscReal load, residual;
@@ -56,8 +62,9 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   *memory = (PetscBool)(failed == PC_FACTOR_OUTMEMORY);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, memory, 1, SB_MPI_BOOL, MPI_LOR, l->run->model->comm));
   if (ksp->reason == KSP_DIVERGED_PC_FAILED)
-    PetscCall(PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solver,
-                            *memory ? "not enough memory" : "its set-up met a pivot that is not positive"));
+    PetscCall(
+      PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solver,
+                    *memory ? "not enough memory" : "its set-up met a pivot that is not positive"));
   else {
     PetscCall(KSPGetOperators(ksp, &A, NULL));
     PetscCall(VecDuplicate(b, &r));
@@ -66,11 +73,12 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
     PetscCall(VecNorm(b, NORM_2, &load));
     PetscCall(VecNorm(r, NORM_2, &residual));
     PetscCall(VecDestroy(&r));
-    PetscCall(PetscSNPrintf(text, size,
-                            "%s of %s after %" PetscInt_FMT " iterations, %.2g of the residual left", reason,
-                            l->run->solver, ksp->its, (double)(residual / load)));
+    PetscCall(PetscSNPrintf(
+      text, size, "%s of %s after %" PetscInt_FMT " iterations, %.2g of the residual left", reason,
+      l->run->solver, ksp->its, (double)(residual / load)));
   }
-  if (!l->again) l->failures[0] = 0;
+  if (!l->again)
+    l->failures[0] = 0;
   SbAppend(sizeof(l->failures), l->failures, "%s%s", l->failures[0] ? ", then " : "", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -88,6 +96,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PC pc;
 
   PetscFunctionBeginUser;
+
   /* remove the options of the old solver and its settings of the KSP, except tolerances */
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
   PetscCall(SbSolverSetDefaults("", old->options, PETSC_TRUE));
@@ -105,6 +114,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   if (old->create || next->create || old->matrix != next->matrix) {
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
+
     /* the nonsymmetric operator multiplies by run->J anyway */
     if (!run->nonsymmetric.U) {
       Mat *whole = SbConstraintsSeparate(s) ? &run->whole : &run->operator;
@@ -147,6 +157,7 @@ static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(x));
+
   /* keep the relative tolerance of this Newton step (Eisenstat and Walker) */
   PetscCall(SNESKSPGetUseEW(l->run->snes, &forcing));
   PetscCall(SNESKSPSetUseEW(l->run->snes, PETSC_FALSE));
@@ -163,7 +174,9 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   SbSolverList l = (SbSolverList)ctx;
   SbRun run = l->run;
   const SbSolverPreset *next = run->solver_used;
-  PetscBool memory, simpler = PETSC_FALSE, minres, newton;
+  PetscBool memory;
+  PetscBool simpler = PETSC_FALSE;
+  PetscBool minres, newton;
   KSPConvergedReason reason;
   char text[192], motion[256];
   PetscInt body = -1;
@@ -172,19 +185,27 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   Vec X;
 
   PetscFunctionBeginUser;
+
   /* the previous callback may set the solve to failed */
-  if (l->before) PetscCall((*l->before)(ksp, b, x, l->before_ctx));
+  if (l->before)
+    PetscCall((*l->before)(ksp, b, x, l->before_ctx));
   if (ksp->reason > 0) {
-    if (!l->again) l->failures[0] = 0;
+    if (!l->again)
+      l->failures[0] = 0;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
   /* Newton's method will project the tangent and solve again */
-  if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
+  if (run->model->space->tentative)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(describe_failure(l, ksp, b, x, text, sizeof(text), &memory));
 
-  /* first a simpler form of the same preconditioner: its incomplete factorisation may have broken down */
+  /* first a simpler form of the same preconditioner: its incomplete factorisation may have broken
+     down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
-  /* MINRES reports an indefinite preconditioner as an indefinite matrix, or reaches its iteration limit */
+
+  /* MINRES reports an indefinite preconditioner as an indefinite matrix, or reaches its iteration
+     limit */
   reason = ksp->reason;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
@@ -195,19 +216,26 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* then the next solver of the list, with a warning: of a preset, in Newton's method, if b is finite */
+  /* then the next solver of the list, with a warning: of a preset, in Newton's method, if b is
+     finite */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));
   PetscCall(VecNorm(b, NORM_2, &size));
-  if (!l->own || !newton || !X || SbConstraintsFactored(run->model->space) || PetscIsInfOrNanReal(size))
+  if (!l->own || !newton || !X || SbConstraintsFactored(run->model->space) ||
+      PetscIsInfOrNanReal(size))
     PetscFunctionReturn(PETSC_SUCCESS);
+
   /* a static system with a free motion is singular for every solver */
-  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-  if (body >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->model->dynamic)
+    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (body >= 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSolverNextFallback(run->model->space, ksp->reason, memory, &l->tried, &next));
-  if (!next) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
+  if (!next)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(
+    SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
   PetscCall(PetscSNPrintf(run->solver_reason, sizeof(run->solver_reason), "after %s", text));
   PetscCall(replace(l, ksp, next));
   PetscCall(solve_again(l, ksp, b, x));
@@ -221,13 +249,14 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   KSP ksp;
 
   PetscFunctionBeginUser;
-  if (!run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->J)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&l));
   l->run = run;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &type));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &pc));
-  l->own =
-    (PetscBool)(!type && !pc && !run->arc.on); /* arc length needs the inertia from its factorisation */
+  l->own = (PetscBool)(!type && !pc &&
+                       !run->arc.on); /* arc length needs the inertia from its factorisation */
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(attach(l, ksp));
   run->solver_list = l;
@@ -241,13 +270,14 @@ PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, P
   char system[128];
 
   PetscFunctionBeginUser;
-  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsHasName(NULL, NULL, "-contact_pc_type", &apart));
   PetscCall(SbContactSystemDescribe(run->contact_choice, system, sizeof(system)));
-  PetscCall(
-    PetscSNPrintf(l->failures, sizeof(l->failures), "%s of %s after %" PetscInt_FMT " iterations%s",
-                  KSPConvergedReasons[reason], system, iterations,
-                  apart ? "; it is the one of -contact_pc_type, which is not replaced: leave it out" : ""));
+  PetscCall(PetscSNPrintf(
+    l->failures, sizeof(l->failures), "%s of %s after %" PetscInt_FMT " iterations%s",
+    KSPConvergedReasons[reason], system, iterations,
+    apart ? "; it is the one of -contact_pc_type, which is not replaced: leave it out" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,10 +288,14 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   uint32_t tried = 0;
   char causes[256] = "";
   const SbModel m = run->model;
-  PetscReal nu = 0., soft = PETSC_MAX_REAL, stiff = 0.;
-  PetscInt nsliver = 0, ntet = 0;
+  PetscReal nu = 0.;
+  PetscReal soft = PETSC_MAX_REAL;
+  PetscReal stiff = 0.;
+  PetscInt nsliver = 0;
+  PetscInt ntet = 0;
 
   PetscFunctionBeginUser;
+
   /* properties of the bodies that may cause ill-conditioning: "; nu is up to 0.4999" */
   for (PetscInt k = 0; k < m->nmaterial; k++) {
     nu = PetscMax(nu, m->material[k]->nu);
@@ -274,20 +308,25 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   }
   if (nsliver)
     SbAppend(sizeof(causes), causes,
-             "; %" PetscInt_FMT " of %" PetscInt_FMT " tets have an angle below %g degrees: repair the mesh",
+             "; %" PetscInt_FMT " of %" PetscInt_FMT
+             " tets have an angle below %g degrees: repair the mesh",
              nsliver, ntet, SB_SLIVER);
   if (stiff > RATIO * soft)
-    SbAppend(sizeof(causes), causes, "; the stiffest material has %.2g times Young's modulus of the softest",
+    SbAppend(sizeof(causes), causes,
+             "; the stiffest material has %.2g times Young's modulus of the softest",
              (double)(stiff / soft));
-  if (nu > NU_HARD) SbAppend(sizeof(causes), causes, "; nu is up to %g", (double)nu);
+  if (nu > NU_HARD)
+    SbAppend(sizeof(causes), causes, "; nu is up to %g", (double)nu);
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {
-    PetscCall(SbSolverNextFallback(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
-    PetscCall(PetscSNPrintf(text, size,
-                            "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not "
-                            "replaced: leave them out%s%s",
-                            l->failures, causes, next ? ", or take -solver " : "", next ? next->name : ""));
+    PetscCall(
+      SbSolverNextFallback(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
+    PetscCall(
+      PetscSNPrintf(text, size,
+                    "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not "
+                    "replaced: leave them out%s%s",
+                    l->failures, causes, next ? ", or take -solver " : "", next ? next->name : ""));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,18 +1,22 @@
 /*
-  Load steps of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1
-  in -static_steps equal steps, without mass, damping and TS. A step whose solve fails is halved and repeated
-  from the last equilibrium; after each successful step the length doubles again.
+  Load steps of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda
+  from 0 to 1 in -static_steps equal steps, without mass, damping and TS. A step whose solve fails
+  is halved and repeated from the last equilibrium; after each successful step the length doubles
+  again.
 
-  Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be halved forever.
-  Below -static_min_increment the run stops; the growth of displacements with the load, over its minimum of
-  all steps, tells a limit load from other failures. A shortened step without an iteration (a change of load
-  below rounding) does not double the length.
+  Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be
+  halved forever. Below -static_min_increment the run stops; the growth of displacements with the
+  load, over its minimum of all steps, tells a limit load from other failures. A shortened step
+  without an iteration (a change of load below rounding) does not double the length.
 */
 #include "time_impl.h"
 
-#define LIMIT 10.  /* growth of displacements with the load, over its minimum, that indicates a limit load */
-#define PUSH 1e-3  /* cosine of the angle between forces and a free motion above which forces drive it */
-#define EXCESS 0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
+#define LIMIT \
+  10. /* growth of displacements with the load, over its minimum, that indicates a limit load */
+#define PUSH \
+  1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
+#define EXCESS \
+  0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
 /* Data of a load step. */
 typedef struct {
@@ -43,9 +47,10 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong,
-   a body may pass far through an obstacle. While forces grow along the path, strain energy grows by at most
-   (f_0 + f_1) . du, f_0 and f_1 the internal forces at the ends of the step; linear: half of that. */
+/* Whether a solution with contact is a distant equilibrium, off the load path: while the active set
+   is wrong, a body may pass far through an obstacle. While forces grow along the path, strain
+   energy grows by at most (f_0 + f_1) . du, f_0 and f_1 the internal forces at the ends of the
+   step; linear: half of that. */
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 {
   const SbModel m = l->run->model;
@@ -55,7 +60,8 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 
   PetscFunctionBeginUser;
   *is = PETSC_FALSE;
-  if (!m->nbegin_step || m->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nbegin_step || m->linear)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(l->X, &forces));
   PetscCall(VecDuplicate(l->X, &way));
   PetscCall(VecWAXPY(way, -1., l->run->U, l->X));
@@ -63,7 +69,8 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
     PetscCall(SbModelStrainEnergy(m, k ? l->X : l->run->U, forces, &psi[k], &n));
     PetscCall(VecDot(forces, way, &work[k]));
   }
-  PetscCall(PetscInfo(l->run->snes, "strain energy %g -> %g J, work of the forces at both ends %g J\n",
+  PetscCall(PetscInfo(l->run->snes,
+                      "strain energy %g -> %g J, work of the forces at both ends %g J\n",
                       (double)psi[0], (double)psi[1], (double)(work[0] + work[1])));
   *is = (PetscBool)((1. - EXCESS) * psi[1] > psi[0] + PetscMax(0., work[0] + work[1]));
   PetscCall(VecDestroy(&way));
@@ -71,9 +78,10 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Searches for an unsupported body, before a step is solved or after it was tried; *found: run->stop_reason
-   describes it. */
-static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved, PetscBool *found)
+/* Searches for an unsupported body, before a step is solved or after it was tried; *found:
+   run->stop_reason describes it. */
+static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved,
+                                     PetscBool *found)
 {
   const SbRun run = l->run;
   PetscInt body = -1;
@@ -81,10 +89,13 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
   const char *loads = "";
 
   PetscFunctionBeginUser;
-  if (tried) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (tried)
+    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && !l->contact);
-  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as a
-     hanging weight, makes shorter steps succeed; a load that drives the motion has no equilibrium nearby */
+
+  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising
+     load, as a hanging weight, makes shorter steps succeed; a load that drives the motion has no
+     equilibrium nearby */
   if (body < 0 && !solved && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
@@ -103,33 +114,38 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
       PetscCall(VecNorm(along, NORM_2, &way));
       run->free_body = (PetscBool)(PetscAbsReal(work) > PUSH * force * way);
     }
-    if (!run->free_body) loads = " but its loads";
+    if (!run->free_body)
+      loads = " but its loads";
     PetscCall(VecDestroy(&along));
     PetscCall(VecDestroy(&F));
   }
   *found = (PetscBool)(body >= 0);
   if (*found)
-    PetscCall(SbRunFail(run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
-                        (double)l->factor, loads, run->model->body[body].name, motion,
-                        l->contact ? ", or let it come to rest in a dynamic run" : ""));
+    PetscCall(SbRunFail(
+      run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
+      (double)l->factor, loads, run->model->body[body].name, motion,
+      l->contact ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
-  PetscBool far, other = PETSC_FALSE, found = PETSC_FALSE;
+  PetscBool far;
+  PetscBool other = PETSC_FALSE;
+  PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(SbRunTooFar(l->run, l->X, &far));
-  if (reason > 0 && !far) PetscCall(jumped(l, &other));
+  if (reason > 0 && !far)
+    PetscCall(jumped(l, &other));
   *ok = (PetscBool)(reason > 0 && !far && !other);
   if (other)
-    PetscCall(SbRunFail(
-      l->run,
-      "load factor %g: contact was found at another equilibrium, with more strain energy than the loads "
-      "have done work; use more -static_steps",
-      (double)l->factor));
+    PetscCall(SbRunFail(l->run,
+                        "load factor %g: contact was found at another equilibrium, with more "
+                        "strain energy than the loads "
+                        "have done work; use more -static_steps",
+                        (double)l->factor));
 
   /* find the cause of a failed solve */
   if (!*ok && !other && !l->run->stopped) {
@@ -139,7 +155,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     if (!found) {
       char near[256];
 
-      if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
+      if (reason == SNES_DIVERGED_LINEAR_SOLVE)
+        PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
       PetscCall(SbModelPotentialNearest(l->run->model, sizeof(near), near));
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
                           SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
@@ -156,9 +173,14 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
 
 PetscErrorCode SbStaticSolve(SbRun run)
 {
-  const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
-  PetscReal factor = run->t0, length = nominal, rate, slowest = 0.;
-  PetscInt step = run->step0, cuts = 0;
+  const PetscReal nominal = 1. / (PetscReal)run->static_steps;
+  const PetscReal least = run->min_increment * nominal;
+  PetscReal factor = run->t0;
+  PetscReal length = nominal;
+  PetscReal rate;
+  PetscReal slowest = 0.;
+  PetscInt step = run->step0;
+  PetscInt cuts = 0;
   const PetscBool contact = (PetscBool)(run->model->nbegin_step || run->model->npotential);
   Vec X;
 
@@ -171,12 +193,15 @@ PetscErrorCode SbStaticSolve(SbRun run)
     LoadStep load = {run, next, next - factor, X, contact};
     const SbSolvedStep end = {factor, next - factor, run->U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
-    PetscBool ok = PETSC_FALSE, found;
+    PetscBool ok = PETSC_FALSE;
+    PetscBool found;
 
-    /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
+    /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure
+       takes long */
     if (run->nonsymmetric.U && !run->steps_total && !contact)
       PetscCall(find_free_body(&load, PETSC_FALSE, PETSC_FALSE, &found));
-    if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
+    if (!run->free_body)
+      PetscCall(SbRunAttempt(run, &attempt, &ok));
 
     /* halve a failed step, if that may help */
     if (!ok) {
@@ -186,50 +211,63 @@ PetscErrorCode SbStaticSolve(SbRun run)
       run->rejected_total++;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
-      if (run->stopped) PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
-      if (run->free_body || run->stopped) break;
+      if (run->stopped)
+        PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
+      if (run->free_body || run->stopped)
+        break;
+
       /* halving does not help in a linear problem, unless contact is active */
-      if (run->model->linear && !contact) cuts = run->max_halvings;
-      if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
+      if (run->model->linear && !contact)
+        cuts = run->max_halvings;
+      if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length))
+        continue;
 
       /* steps are too short: report the load reached, and the likely cause */
       PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
       PetscCall(SbNewtonUnstable(run->snes, &unstable));
       if (run->softening > LIMIT)
-        PetscCall(SbRunFail(run,
-                            "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                            "on: a limit load is likely, as displacements grow %.0f times as fast with the "
-                            "load as before; -static_control arc_length goes past it",
-                            (double)factor, (double)(2. * length), (double)run->softening));
+        PetscCall(
+          SbRunFail(run,
+                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                    "on: a limit load is likely, as displacements grow %.0f times as fast with the "
+                    "load as before; -static_control arc_length goes past it",
+                    (double)factor, (double)(2. * length), (double)run->softening));
       else if (factor > 0. && unstable && !contact)
-        PetscCall(SbRunFail(run,
-                            "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                            "on, where the tangent is not positive definite: a limit load is likely, or a "
-                            "bifurcation; -static_control arc_length goes past it%s%s",
-                            (double)factor, (double)(2. * length), run->rejected_inverted ? "; " : "",
-                            run->rejected_inverted ? why : ""));
+        PetscCall(
+          SbRunFail(run,
+                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                    "on, where the tangent is not positive definite: a limit load is likely, or a "
+                    "bifurcation; -static_control arc_length goes past it%s%s",
+                    (double)factor, (double)(2. * length), run->rejected_inverted ? "; " : "",
+                    run->rejected_inverted ? why : ""));
       else if (factor > 0.)
         PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
       break;
     }
     run->stop_reason[0] = 0;
 
-    /* the new equilibrium, and its growth of displacement with the load, relative to the slowest step */
+    /* the new equilibrium, and its growth of displacement with the load, relative to the slowest
+       step */
     PetscCall(VecAXPY(run->U, -1., X));
     PetscCall(VecNorm(run->U, NORM_2, &rate));
     rate /= next - factor;
-    if (slowest == 0. || (rate < slowest && run->newton_step)) slowest = rate;
-    if (slowest > 0. && run->newton_step) run->softening = rate / slowest;
+    if (slowest == 0. || (rate < slowest && run->newton_step))
+      slowest = rate;
+    if (slowest > 0. && run->newton_step)
+      run->softening = rate / slowest;
     PetscCall(VecCopy(X, run->U));
 
     /* re-meshing, effects and monitors */
     run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
-    if (next < 1.) PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
-    if (run->newton_step) cuts = 0;
+    if (next < 1.)
+      PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
+    if (run->newton_step)
+      cuts = 0;
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
-    if (run->paused || run->stopped) break;
+    if (run->paused || run->stopped)
+      break;
 
     /* lengthen the next step */
     factor = next;

@@ -1,10 +1,11 @@
 /*
   Early end of a run: reason of the failure, end of halving, requests to stop.
 
-  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the current
-  step; monitors take that step as the last one, so that a checkpoint and the last frame are written. A step
-  that takes longer than -stop_grace, or would exceed -wall_time, is abandoned between two iterations, and the
-  run ends with the step before. All ranks decide together, by a reduction after each step and iteration.
+  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the
+  current step; monitors take that step as the last one, so that a checkpoint and the last frame are
+  written. A step that takes longer than -stop_grace, or would exceed -wall_time, is abandoned
+  between two iterations, and the run ends with the step before. All ranks decide together, by a
+  reduction after each step and iteration.
 */
 #include <signal.h>
 #include <stdarg.h>
@@ -17,7 +18,7 @@
 #define RESERVE_PART 0.05   /* part of -wall_time reserved for the last files, */
 #define RESERVE_LONGEST 60. /* at most so many s; plus twice the time that files have taken */
 #define STEP_FACTOR 1.5     /* time reserved for the next step, over the longest recent one */
-#define AGAIN 0.5           /* interval within which a second SIGINT belongs to the same key press, s */
+#define AGAIN 0.5 /* interval within which a second SIGINT belongs to the same key press, s */
 
 /* State set by signal handlers, global to the process. */
 static struct {
@@ -31,8 +32,10 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   va_list args;
 
   PetscFunctionBeginUser;
+
   /* keep the reason of an abandoned step */
-  if (run->stopped && run->stop_reason[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (run->stopped && run->stop_reason[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
   va_start(args, format);
   PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
   va_end(args);
@@ -61,12 +64,14 @@ static void note_signal(int number)
     "\nsupple: a signal asks to stop: the step is being finished (a second Ctrl-C ends at once)\n";
 
   if (asked.signal) {
-    if (number == SIGINT && seconds() > asked.since + AGAIN) _exit(128 + SIGINT);
+    if (number == SIGINT && seconds() > asked.since + AGAIN)
+      _exit(128 + SIGINT);
     return;
   }
   asked.since = seconds();
   asked.signal = number;
-  if (asked.speak && write(STDERR_FILENO, text, sizeof(text) - 1) < 0) asked.speak = 0;
+  if (asked.speak && write(STDERR_FILENO, text, sizeof(text) - 1) < 0)
+    asked.speak = 0;
 }
 
 PetscErrorCode SbRunCatchSignals(SbRun run)
@@ -79,21 +84,27 @@ PetscErrorCode SbRunCatchSignals(SbRun run)
   PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
   asked.speak = !rank;
   (void)sigemptyset(&action.sa_mask);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(signals); i++) (void)sigaction(signals[i], &action, NULL);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(signals); i++)
+    (void)sigaction(signals[i], &action, NULL);
   run->stop.listens = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunReadStop(SbRun run)
 {
-  int n, day = 0, hour, minute, second, end = 0;
+  int n;
+  int day = 0;
+  int hour, minute, second;
+  int end = 0;
   char text[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   run->stop.begun = MPI_Wtime();
   PetscCall(SbOptionReal(&SbRunScope, "stop_grace", &run->stop.grace));
   PetscCall(SbOptionString(&SbRunScope, "wall_time", sizeof(text), text));
-  if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!text[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* "h:mm:ss" or "d-hh:mm:ss", as in batch systems */
   if (strchr(text, '-'))
     n = sscanf(text, "%d-%d:%2d:%2d%n", &day, &hour, &minute, &second, &end) - 1;
@@ -116,34 +127,41 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
   int reason;
 
   PetscFunctionBeginUser;
-  if (!run->stop.listens || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->stop.listens || run->stopped)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* the signal or WALL_TIME that ends the run, the same on all ranks; 0: none */
   PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
-  reason = asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
+  reason =
+    asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
   if (run->stop.wall_time > 0. && !rank) {
     const PetscReal reserve =
       PetscMin(RESERVE_LONGEST, RESERVE_PART * run->stop.wall_time) + 2. * run->stop.longest_output;
     const PetscReal next = within ? 0. : STEP_FACTOR * run->stop.longest_step;
 
-    if (MPI_Wtime() - run->stop.begun + reserve + next >= run->stop.wall_time) reason = WALL_TIME;
+    if (MPI_Wtime() - run->stop.begun + reserve + next >= run->stop.wall_time)
+      reason = WALL_TIME;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &reason, 1, MPI_INT, MPI_MAX, run->model->comm));
-  if (!reason) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!reason)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   /* no step fits into -wall_time: an error, else a requeued job would repeat this forever */
-  PetscCheck(
-    reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
-    "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a coarser mesh",
-    (double)run->stop.wall_time);
+  PetscCheck(reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
+             "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a "
+             "coarser mesh",
+             (double)run->stop.wall_time);
   run->stopped = PETSC_TRUE;
   run->paused = PETSC_FALSE;
   run->stop_reason[0] = 0;
-  PetscCall(SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
+  PetscCall(SbRunFail(run,
+                      "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
                       reason == WALL_TIME ? "the end of -wall_time is near"
                       : reason == SIGTERM ? "SIGTERM"
                       : reason == SIGINT  ? "SIGINT"
                                           : "SIGUSR1",
                       within ? ", and the next step is given up" : "", step,
-                      run->model->dynamic ? "t =" : "load factor", (double)t, run->model->dynamic ? " s" : "",
-                      step > run->step0 ? "latest" : "auto"));
+                      run->model->dynamic ? "t =" : "load factor", (double)t,
+                      run->model->dynamic ? " s" : "", step > run->step0 ? "latest" : "auto"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,14 +16,16 @@ typedef enum {
 } SbMethod;
 typedef struct {
   SbMethod method;
-  PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fractions of the new state, as in TSALPHA2 */
-  PetscBool impulses;                      /* Newmark with contact */
-  PetscBool separate;                      /* Newmark with barrier contact: the acceleration excludes it */
+  PetscReal alpha_m, alpha_f, beta,
+    gamma;            /* generalized-alpha; fractions of the new state, as in TSALPHA2 */
+  PetscBool impulses; /* Newmark with contact */
+  PetscBool separate; /* Newmark with barrier contact: the acceleration excludes it */
 } SbMethodSettings;
 
 static inline PetscBool SbRunIsExplicit(SbRun run)
 {
-  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT ||
+                     run->preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
 PetscErrorCode SbSecondOrderCreate(TS ts);
@@ -32,22 +34,27 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
 /* step.c: data and functions of a step, all borrowed. */
 typedef struct {
-  SbSolvedStep step;                    /* its vectors: as far as known */
-  PetscErrorCode (*predict)(void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
-  PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* residual without constraints, N; for contact */
+  SbSolvedStep step; /* its vectors: as far as known */
+  PetscErrorCode (*predict)(
+    void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
+  PetscErrorCode (*residual)(void *ctx, Vec U,
+                             Vec R); /* residual without constraints, N; for contact */
   /* computes the end state from U; if not ok run->stop_reason is the reason */
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, PetscBool *ok);
   void *ctx;
 } SbAttempt;
-/* Updates the penalty on jumps of CR and DG (src/fem/jump.c), then accelerations and reactions. Explicit
-   integrators, for their stable step, and alpha2 use the penalty of the rest state. Collective. */
+/* Updates the penalty on jumps of CR and DG (src/fem/jump.c), then accelerations and reactions.
+   Explicit integrators, for their stable step, and alpha2 use the penalty of the rest state.
+   Collective. */
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
 /* Attempts a step; ok: it can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
-PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
-                                 PetscBool last); /* saves history, calls monitors; also at the start */
+PetscErrorCode
+SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
+                  PetscBool last); /* saves history, calls monitors; also at the start */
 #define SB_NEWTON_ITERATIONS 100
-/* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is borrowed. */
+/* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is
+   borrowed. */
 #define SB_SNES_NEWTON "newton"
 PetscErrorCode SbNewtonCreate(SNES snes);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
@@ -57,54 +64,64 @@ PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
 /* stop.c: early end of runs. */
 /* Options -wall_time and -stop_grace. */
 PetscErrorCode SbRunReadStop(SbRun run);
-/* After a step that ended at t (within: in the next solve): sets run->stopped if it is to end. Collective. */
+/* After a step that ended at t (within: in the next solve): sets run->stopped if it is to end.
+   Collective. */
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* Whether inverted.c rejected the last step, and would reject one of length dt, s. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
-/* inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted reject. U:
-   displacements at its start and end. Not ok: it inverted tets; sets run->rejected_inverted, stop_reason. */
-PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
+/* inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted
+   reject. U: displacements at its start and end. Not ok: it inverted tets; sets
+   run->rejected_inverted, stop_reason. */
+PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
+                                   PetscBool *ok);
 
 /* callbacks.c: the model for PETSc's TS and SNES. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
-PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
-                                Mat J, Mat P, void *run);
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v,
+                                PetscReal shift_a, Mat J, Mat P, void *run);
 /* run->operator: the shell matrix of linear solves where the matrix lacks a part. Collective. */
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
-/* A = M^-1 (f_ext - C V - f_int), 0 where prescribed; without `constrain` no contact, and A is kept there. */
+/* A = M^-1 (f_ext - C V - f_int), 0 where prescribed; without `constrain` no contact, and A is kept
+   there. */
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
 
-/* solver_list.c, after SbSolverFinish(): solvers of run->snes that fail are replaced from here on. */
+/* solver_list.c, after SbSolverFinish(): solvers of run->snes that fail are replaced from here
+   on. */
 PetscErrorCode SbSolverListCreate(SbRun run);
-/* Message after a failed linear solve: solvers tried, with reasons, likely causes, advice. Collective. */
+/* Message after a failed linear solve: solvers tried, with reasons, likely causes, advice.
+   Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
-/* Stores for that message how the last solve of the barrier contact system failed. Not collective. */
+/* Stores for that message how the last solve of the barrier contact system failed. Not
+   collective. */
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: load steps */
-/* arc_length.c: equilibrium path with the load factor as an unknown. Collective. Check: after the solver is
-   set up; PETSC_ERR_USER_INPUT for contact, and solvers for definite matrices only. */
+/* arc_length.c: equilibrium path with the load factor as an unknown. Collective. Check: after the
+   solver is set up; PETSC_ERR_USER_INPUT for contact, and solvers for definite matrices only. */
 PetscErrorCode SbArcLengthCheck(SbRun run);
 PetscErrorCode SbArcLengthSolve(SbRun run);
-/* rigid_modes.c, after a static solve: a body with a free rigid motion, -1: none; motion: in words; along: as
-   displacements, not normalised (may be NULL). Collective. */
+/* rigid_modes.c, after a static solve: a body with a free rigid motion, -1: none; motion: in words;
+   along: as displacements, not normalised (may be NULL). Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
-/* Whether displacements X exceed the bodies' size by far: the matrix must have been singular. Collective. */
+/* Whether displacements X exceed the bodies' size by far: the matrix must have been singular.
+   Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 
-/* energy_balance.c: energies and balance of the step dt that ended at t; first: the start. Collective. */
+/* energy_balance.c: energies and balance of the step dt that ended at t; first: the start.
+   Collective. */
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first);
-/* R = the residual at t without constraints: reactions on prescribed unknowns; for TSALPHA2, which stores no
-   acceleration, without inertia. Contact forces between bodies are excluded. Collective. */
+/* R = the residual at t without constraints: reactions on prescribed unknowns; for TSALPHA2, which
+   stores no acceleration, without inertia. Contact forces between bodies are excluded.
+   Collective. */
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
-/* SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
-   guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does
-   not converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the
-   first solve with SNES_CONVERGED_ITERATING: to be repeated with the fraction run->time_of_impact of its
-   length. */
+/* SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change;
+   U: initial guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if
+   the active set does not converge. With run->may_end_at_impact, if nodes come into contact within
+   the step, it ends after the first solve with SNES_CONVERGED_ITERATING: to be repeated with the
+   fraction run->time_of_impact of its length. */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

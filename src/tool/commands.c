@@ -15,10 +15,12 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 
   /* message "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
   if (!tool->quiet) {
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(mesh->nvert, number)));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out,
+                          SbToolNumber(mesh->nvert, number)));
     for (int d = 3; d >= 0; d--)
       if (mesh->item[d].n || d == 3)
-        PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(mesh->item[d].n, number), what[d]));
+        PetscCall(
+          PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(mesh->item[d].n, number), what[d]));
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -27,7 +29,8 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
 {
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < tool->levels; k++) SB_TOOL_PHASE(tool, "refining", SbMeshFileRefine(mesh));
+  for (PetscInt k = 0; k < tool->levels; k++)
+    SB_TOOL_PHASE(tool, "refining", SbMeshFileRefine(mesh));
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -40,37 +43,43 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
   const struct {
     const PetscInt *n;
     const char *what;
-  } done[] = {{&r.nwelded, welded},
-              {&r.ncollapsed, "tets that used a vertex twice, dropped"},
-              {&r.nduplicate, "tets given again, dropped"},
-              {&r.nflat, "flat tets dropped"},
-              {&r.nslit, "  of these inside the body, each left a slit without width there"},
-              {&r.nturned, "inverted tets turned"},
-              {&r.nunused, "unused vertices dropped"},
-              {&r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"}};
+  } done[] = {
+    {&r.nwelded, welded},
+    {&r.ncollapsed, "tets that used a vertex twice, dropped"},
+    {&r.nduplicate, "tets given again, dropped"},
+    {&r.nflat, "flat tets dropped"},
+    {&r.nslit, "  of these inside the body, each left a slit without width there"},
+    {&r.nturned, "inverted tets turned"},
+    {&r.nunused, "unused vertices dropped"},
+    {&r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"}};
 
   PetscFunctionBeginUser;
   SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->body.tet.merge_tolerance, &r));
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(done) && !tool->quiet; i++) {
-    if (!*done[i].n) continue;
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", done[i].what, SbToolNumber(*done[i].n, number)));
+    if (!*done[i].n)
+      continue;
+    PetscCall(
+      PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", done[i].what, SbToolNumber(*done[i].n, number)));
     any = PETSC_TRUE;
   }
-  if (!any && !tool->quiet) PetscCall(PetscPrintf(PETSC_COMM_SELF, "nothing to repair\n"));
+  if (!any && !tool->quiet)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "nothing to repair\n"));
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 const SbToolCommand SbToolCommands[] = {
-  {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1, SbToolInfo},
+  {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1,
+   SbToolInfo},
   {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, write_mesh},
   {"tet", "SURFACE OUT",
-   "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2, write_mesh},
+   "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2,
+   write_mesh},
   {"repair", "FILE OUT",
-   "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did", 2,
-   repair},
+   "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did",
+   2, repair},
   {"refine", "FILE OUT", "divides every tet into eight; groups are kept", 2, refine},
   {NULL, NULL, NULL, 0, NULL},
 };
@@ -81,11 +90,13 @@ PetscErrorCode SbToolRun(SbTool *tool)
   char phase[PETSC_MAX_PATH_LEN + 16];
 
   PetscFunctionBeginUser;
-  PetscCheck(strcmp(tool->command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF,
-             PETSC_ERR_USER,
-             "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
-             ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
-             tool->in);
+  PetscCheck(
+    strcmp(tool->command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF,
+    PETSC_ERR_USER,
+    "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
+    ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
+    tool->in);
+
   // read the mesh, with a progress message
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
@@ -93,7 +104,8 @@ PetscErrorCode SbToolRun(SbTool *tool)
   if (tool->command->run != SbToolInfo && !tool->quiet && mesh.note[0])
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, mesh.note));
   PetscCall(tool->command->run(tool, &mesh));
-  if (tool->view[0]) PetscCall(SbToolView(tool, &mesh));
+  if (tool->view[0])
+    PetscCall(SbToolView(tool, &mesh));
   PetscCall(SbImportDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

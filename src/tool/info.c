@@ -1,25 +1,29 @@
 /*
-  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, its memory in a run.
+  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, its memory in
+  a run.
 
-  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet
-  (dg), vertices and edges (p2). A row of the matrix has a block of 3 x 3 numbers for its node and for each
-  node coupled with it; total number of blocks:
+  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in
+  every tet (dg), vertices and edges (p2). A row of the matrix has a block of 3 x 3 numbers for its
+  node and for each node coupled with it; total number of blocks:
 
     p1  N + 2 edges
-    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term
+    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose
+    jump term
         couples the three other faces of one side with those of the other
     dg  16 per tet + 32 per interior face
-    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other
+    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with
+    each other
         and each with the opposite corner; a tet has three pairs of opposite edges)
 
   The other constants were measured, see below. docs/reference/meshes.md gives the accuracy.
 */
 #include "tool.h"
 
-#define PROCESS 43e6   /* memory of a run with a very small mesh, bytes */
-#define TET 600.       /* memory of a tet in mesh and geometry, with vertices and boundary, bytes */
-#define FACTOR 4096.   /* memory of a factorisation per unknown, bytes */
-#define FACTORED 60000 /* largest number of unknowns that -solver auto factorises in a dynamic run */
+#define PROCESS 43e6 /* memory of a run with a very small mesh, bytes */
+#define TET 600.     /* memory of a tet in mesh and geometry, with vertices and boundary, bytes */
+#define FACTOR 4096. /* memory of a factorisation per unknown, bytes */
+#define FACTORED \
+  60000 /* largest number of unknowns that -solver auto factorises in a dynamic run */
 
 static PetscErrorCode groups(const SbImport *mesh)
 {
@@ -37,14 +41,19 @@ static PetscErrorCode groups(const SbImport *mesh)
       PetscReal size;
       PetscInt n;
 
-      if (group->dim != d) continue;
+      if (group->dim != d)
+        continue;
       PetscCall(SbMeshFileGroup(mesh, g, &n, &size));
-      if (!titled) (void)printf("%s\n", title[d]);
+      if (!titled)
+        (void)printf("%s\n", title[d]);
       titled = PETSC_TRUE;
       (void)printf("  %-26s %12s %s", group->name, SbToolNumber(n, number), item[d]);
-      if (d) (void)printf(", %.6g %s", (double)size, unit[d]);
+      if (d)
+        (void)printf(", %.6g %s", (double)size, unit[d]);
+
       /* formats with names only have no group numbers */
-      if (group->tag > 0 && group->tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group->tag);
+      if (group->tag > 0 && group->tag <= INT32_MAX)
+        (void)printf(" (number %lld)", (long long)group->tag);
       (void)printf("\n");
     }
   }
@@ -58,16 +67,19 @@ static void bars(int nbin, const char label[][32], const PetscInt64 n[])
   PetscInt64 most = 1;
   char number[32];
 
-  for (int i = 0; i < nbin; i++) most = PetscMax(most, n[i]);
+  for (int i = 0; i < nbin; i++)
+    most = PetscMax(most, n[i]);
   for (int i = 0; i < nbin; i++)
     (void)printf("  %-14s %14s %.*s\n", label[i], SbToolNumber(n[i], number),
                  n[i] ? (int)PetscMax(1, 40 * n[i] / most) : 0, signs);
 }
 
 /* Memory in bytes of a run of one step on one rank, by element. */
-static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
+static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt *unknowns,
+                        PetscReal *matrix)
 {
-  const PetscReal inner = f->nface - f->body.nfacet, ncell = f->body.ncell;
+  const PetscReal inner = f->nface - f->body.nfacet;
+  const PetscReal ncell = f->body.ncell;
   PetscReal nodes = f->body.nvert, blocks = nodes + 2. * f->nedge,
             times = 1.9; /* matrix, assembly plan, preconditioner */
 
@@ -94,7 +106,8 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   char number[32], label[SB_ANGLE_BINS][32]; /* of both histograms */
   const PetscReal *b = facts.body.bbox;
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
-  static const char *const what[4] = {"points of groups", "lines of groups", "triangles of groups", "tets"};
+  static const char *const what[4] = {"points of groups", "lines of groups", "triangles of groups",
+                                      "tets"};
 
   PetscFunctionBeginUser;
   (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(mesh->nvert, number));
@@ -104,10 +117,11 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));
+
   // dimensions and counts
   (void)printf("size (coordinates in m)\n");
-  (void)printf("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1], (double)b[2],
-               (double)b[3], (double)b[4], (double)b[5]);
+  (void)printf("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1],
+               (double)b[2], (double)b[3], (double)b[4], (double)b[5]);
   (void)printf("  %-26s %12.6g m^3\n", "volume", (double)facts.body.volume);
   (void)printf("  %-26s %12.6g m^2, %s facets\n", "surface", (double)facts.area,
                SbToolNumber(facts.body.nfacet, number));
@@ -116,7 +130,9 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
                SbToolNumber(facts.nedge, number), (double)facts.edge[0], (double)facts.edge[1],
                (double)facts.edge[2]);
   (void)printf("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number));
-  if (facts.body.note[0]) (void)printf("  to know: %s\n", facts.body.note);
+  if (facts.body.note[0])
+    (void)printf("  to know: %s\n", facts.body.note);
+
   // shape quality of the tets
   (void)printf("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
                (double)facts.body.min_dihedral, (double)facts.max_dihedral);
@@ -127,12 +143,14 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   (void)printf("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
                (double)facts.body.max_radius_ratio);
   for (int i = 0; i < SB_RATIO_BINS; i++)
-    (void)snprintf(label[i], sizeof(label[i]), i + 1 < SB_RATIO_BINS ? "%4.4g to %.4g" : "%4.4g and more",
-                   (double)SbRatioBinEdges[i], (double)SbRatioBinEdges[PetscMin(i + 1, SB_RATIO_BINS - 1)]);
+    (void)snprintf(
+      label[i], sizeof(label[i]), i + 1 < SB_RATIO_BINS ? "%4.4g to %.4g" : "%4.4g and more",
+      (double)SbRatioBinEdges[i], (double)SbRatioBinEdges[PetscMin(i + 1, SB_RATIO_BINS - 1)]);
   bars(SB_RATIO_BINS, (const char(*)[32])label, facts.ratio);
+
   // memory of a run
-  (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
-               "matrix MiB", "memory MiB");
+  (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element",
+               "unknowns", "matrix MiB", "memory MiB");
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     PetscInt unknowns;
     PetscReal matrix;

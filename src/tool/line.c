@@ -1,8 +1,8 @@
 /*
   line.c - command line of supple-mesh: a command, one or two files, options in any order.
 
-  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that
-  the command does not read is an error, as is a misspelt one.
+  Options are rows of a table as in supple itself; each row lists the commands that read it. An
+  option that the command does not read is an error, as is a misspelt one.
 */
 #include <strings.h>
 #include "tool.h"
@@ -11,25 +11,32 @@ static const SbOption rows[] = {
   {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
    "edge length of the tets; default: the mean edge of the surface's triangles"},
   {"surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
-   "keep the triangles of the surface, or remesh it: auto keeps them when their mean edge is within a factor "
+   "keep the triangles of the surface, or remesh it: auto keeps them when their mean edge is "
+   "within a factor "
    "of 1.5 of the size"},
   {"angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
-   "feature angle: edges where the normals of the surface differ by more are kept when it is remeshed"},
+   "feature angle: edges where the normals of the surface differ by more are kept when it is "
+   "remeshed"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
    "program that fills a surface with tets: auto tries gmsh, then tetgen"},
   {"seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time limit of gmsh, and then of tetgen"},
   {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "largest displacement of vertices that removes small self-intersections of a surface; default: half its "
+   "largest displacement of vertices that removes small self-intersections of a surface; default: "
+   "half its "
    "mean edge"},
   {"merge_tolerance", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "vertices closer than this are merged; 0: none; default: 1e-9 of the diagonal of the mesh (tet: 1e-7)"},
-  {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]", "number of refinements, each into 8 times as many tets"},
+   "vertices closer than this are merged; 0: none; default: 1e-9 of the diagonal of the mesh (tet: "
+   "1e-7)"},
+  {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]",
+   "number of refinements, each into 8 times as many tets"},
   {"format", SB_OPTION_CHOICE, 1, "", "auto", "auto|msh41|msh41_binary|msh22|msh22_binary|h5",
    "output format; auto: .msh is msh41 (text), .h5 is h5"},
   {"step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
-   "when FILE is the output of a run (fields.h5): number of the frame whose positions are taken; 0: "
+   "when FILE is the output of a run (fields.h5): number of the frame whose positions are taken; "
+   "0: "
    "reference configuration, -1: the last"},
-  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the coordinates; 0.001 for a file in mm"},
+  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
+   "factor on the coordinates; 0.001 for a file in mm"},
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, after scaling"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "translation, after rotation"},
@@ -47,9 +54,11 @@ PetscErrorCode SbToolHelp(void)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "supple-mesh %s - examines, converts and repairs meshes for supple\n\n", SB_VERSION));
+                        "supple-mesh %s - examines, converts and repairs meshes for supple\n\n",
+                        SB_VERSION));
   for (const SbToolCommand *c = SbToolCommands; c->name; c++)
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
+    PetscCall(
+      PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
                         "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
@@ -58,8 +67,8 @@ PetscErrorCode SbToolHelp(void)
 
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  -%s%s%s%s%s%s%s%s%s\n      %s\n", r->key,
                           r->range[0] ? ": in " : "", r->range, r->unit[0] ? " " : "", r->unit,
-                          r->preset[0] ? ", default " : "", r->preset, readers[i][0] ? "; for " : "",
-                          readers[i], r->help));
+                          r->preset[0] ? ", default " : "", r->preset,
+                          readers[i][0] ? "; for " : "", readers[i], r->help));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -67,7 +76,8 @@ PetscErrorCode SbToolHelp(void)
 static const SbOption *find_row(const char *key)
 {
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
-    if (!strcasecmp(rows[i].key, key)) return &rows[i];
+    if (!strcasecmp(rows[i].key, key))
+      return &rows[i];
   return NULL;
 }
 
@@ -76,7 +86,8 @@ static PetscBool is_truth(const char *word)
   static const char *const words[] = {"true", "false", "yes", "no", "on", "off", "0", "1"};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(words); i++)
-    if (!strcasecmp(word, words[i])) return PETSC_TRUE;
+    if (!strcasecmp(word, words[i]))
+      return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
@@ -99,12 +110,14 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 
       // the word after an option is its value, for a switch only if it is a truth value
       argv[kept++] = argv[i];
-      if (!argv[i + 1]) break;
+      if (!argv[i + 1])
+        break;
       PetscCall(PetscOptionsValidKey(argv[i + 1], &is_option));
       if (!is_option && (!row || row->kind != SB_OPTION_BOOL || is_truth(argv[i + 1])))
         argv[kept++] = argv[++i];
     } else {
-      if (line->nword < 4) line->word[line->nword] = argv[i];
+      if (line->nword < 4)
+        line->word[line->nword] = argv[i];
       line->nword++;
     }
   }
@@ -124,24 +137,30 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
+
   // one process, a command, and the number of files that it takes
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
-             (int)size);
-  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
+  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER,
+             "runs on one process, not on %d; leave out mpirun", (int)size);
+  PetscCheck(
+    line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
   for (command = SbToolCommands; command->name && strcmp(command->name, line->word[0]); command++)
     list[n++] = command->name;
-  if (!command->name) SbSuggestName(line->word[0], n, list, sizeof(all), all);
-  PetscCheck(command->name, PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s",
-             line->word[0], all);
+  if (!command->name)
+    SbSuggestName(line->word[0], n, list, sizeof(all), all);
+  PetscCheck(command->name, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "'%s' is no command; the commands are %s", line->word[0], all);
   PetscCheck(line->nword - 1 == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
              command->nfile > 1 ? "s" : "", line->nword - 1, command->name, command->files);
+
   // options: of this command, or of PETSc
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
+    list[i] = rows[i].key;
   for (int i = 1; i < argc; i++) {
-    const char *name = argv[i] + 1, *reader;
+    const char *name = argv[i] + 1;
+    const char *reader;
     const SbOption *row = find_row(name);
     PetscBool is_option;
 
@@ -150,9 +169,11 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
         (!row && SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap "
                                    "no_signal_handler start_in_debugger skip_petscrc citations")))
       continue;
-    if (!row) SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(all), all);
-    PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
-               all[0] ? "; did you mean -" : "; supple-mesh -help lists them", all, all[0] ? "?" : "");
+    if (!row)
+      SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(all), all);
+    PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s",
+               name, all[0] ? "; did you mean -" : "; supple-mesh -help lists them", all,
+               all[0] ? "?" : "");
     reader = readers[row - rows];
     PetscCheck(!reader[0] || strstr(reader, command->name), PETSC_COMM_SELF, PETSC_ERR_USER,
                "-%s does nothing in supple-mesh %s; it is for %s", name, command->name, reader);

@@ -13,19 +13,21 @@ typedef struct {
 
 typedef struct _SbTool {
   const struct _SbToolCommand *command;
-  const char *in, *out;          /* out: NULL if the command writes no mesh */
-  SbBody body;                   /* body of the file `in`: name, step, scale, rotate, translate, tet */
-  PetscInt levels;               /* option -levels */
-  SbMeshFormat format;           /* option -format */
+  const char *in, *out; /* out: NULL if the command writes no mesh */
+  SbBody body;          /* body of the file `in`: name, step, scale, rotate, translate, tet */
+  PetscInt levels;      /* option -levels */
+  SbMeshFormat format;  /* option -format */
   char view[PETSC_MAX_PATH_LEN]; /* option -view; "": no picture */
   PetscBool quiet;
-  PetscLogDouble start, last; /* wall time of the beginning of the phase and of the last report, s */
-  PetscBool terminal, open;   /* standard error is a terminal; the line there is to be overwritten */
-  const char *phase;          /* description of the phase: "reading liver.msh" */
+  PetscLogDouble start,
+    last;                   /* wall time of the beginning of the phase and of the last report, s */
+  PetscBool terminal, open; /* standard error is a terminal; the line there is to be overwritten */
+  const char *phase;        /* description of the phase: "reading liver.msh" */
 } SbTool;
 
 /* line.c */
-/* Removes the words that are not options, -help and -version from argc, argv. Before PetscInitialize(). */
+/* Removes the words that are not options, -help and -version from argc, argv. Before
+   PetscInitialize(). */
 PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line);
 /* Checks command, number of files and options, and reads the options. */
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool);

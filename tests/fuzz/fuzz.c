@@ -1,8 +1,9 @@
 /*
-  fuzz.c - runs a reader with clang's libFuzzer: SB_FUZZ_READER=tetgen build-fuzz/tests/fuzz/fuzz FOLDER (called by scripts/fuzz).
+  fuzz.c - runs a reader with clang's libFuzzer: SB_FUZZ_READER=tetgen build-fuzz/tests/fuzz/fuzz
+  FOLDER (called by scripts/fuzz).
 
-  In addition to sanitizer errors, it stops at memory leaks of a reader, and at errors that violate the guarantees of readers.h.
-  Memory is counted by functions below PetscMalloc().
+  In addition to sanitizer errors, it stops at memory leaks of a reader, and at errors that violate
+  the guarantees of readers.h. Memory is counted by functions below PetscMalloc().
 */
 #include <stdlib.h>
 #include "readers.h"
@@ -52,7 +53,8 @@ static void leave(void)
   char command[96];
 
   (void)snprintf(command, sizeof(command), "rm -rf %s", folder);
-  if (system(command)) fprintf(stderr, "%s stays\n", folder);
+  if (system(command))
+    fprintf(stderr, "%s stays\n", folder);
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
@@ -62,19 +64,23 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 
   (void)argc;
   for (int i = 0; name && i < NFUZZ; i++)
-    if (!strcmp(name, fuzz_readers[i].name)) reader = i;
+    if (!strcmp(name, fuzz_readers[i].name))
+      reader = i;
   if (reader < 0) {
     fprintf(stderr, "fuzz: set SB_FUZZ_READER to one of:");
-    for (int i = 0; i < NFUZZ; i++) fprintf(stderr, " %s", fuzz_readers[i].name);
+    for (int i = 0; i < NFUZZ; i++)
+      fprintf(stderr, " %s", fuzz_readers[i].name);
     fprintf(stderr, "\n");
     exit(2);
   }
   (void)PetscMallocSet(count_malloc, count_free, count_realloc);
-  if (PetscInitialize(&none, argv, NULL, NULL)) exit(2);
+  if (PetscInitialize(&none, argv, NULL, NULL))
+    exit(2);
   (void)PetscPopSignalHandler(); /* crashes are the fuzzer's */
   (void)snprintf(folder, sizeof(folder), "%s/supple-fuzz-XXXXXX",
                  access("/dev/shm", W_OK) ? "/tmp" : "/dev/shm");
-  if (!mkdtemp(folder)) exit(2);
+  if (!mkdtemp(folder))
+    exit(2);
   (void)atexit(leave);
   return 0;
 }
@@ -86,9 +92,11 @@ int LLVMFuzzerTestOneInput(const unsigned char *data, size_t size)
   const PetscErrorCode ierr = fuzz_read(reader, folder, (const char *)data, size, text);
   const char *broken = fuzz_broken_promise(ierr, text);
 
-  if (broken) fprintf(stderr, "fuzz: %s: %s (code %d)\n", broken, text, (int)ierr);
+  if (broken)
+    fprintf(stderr, "fuzz: %s: %s (code %d)\n", broken, text, (int)ierr);
   if (blocks != before)
     fprintf(stderr, "fuzz: %ld blocks of memory were not given back; %s\n", blocks - before, text);
-  if (broken || blocks != before) abort();
+  if (broken || blocks != before)
+    abort();
   return 0;
 }

@@ -1,8 +1,10 @@
 /*
-  readers.h - one input through one reader, used by make fuzz millions of times and by the unit test once for each file of tests/fuzz.
+  readers.h - one input through one reader, used by make fuzz millions of times and by the unit test
+  once for each file of tests/fuzz.
 
-  The input is written to a file with the extension of its format. TetGen's mesh has four files: in the input they follow each other, separated
-  by lines of %%. For a mesh in HDF5 the input describes the contents of the file (h5.h).
+  The input is written to a file with the extension of its format. TetGen's mesh has four files: in
+  the input they follow each other, separated by lines of %%. For a mesh in HDF5 the input describes
+  the contents of the file (h5.h).
 */
 #pragma once
 #include <sys/stat.h>
@@ -12,7 +14,8 @@
 #include "../../src/surface/surface_impl.h"
 #include "sbtet.h"
 
-/* A surface for a body: read, repaired, checked and cut into regions; it is not filled with tets. */
+/* A surface for a body: read, repaired, checked and cut into regions; it is not filled with
+   tets. */
 static inline PetscErrorCode fuzz_surface(const char *path, SbImport *im)
 {
   SbSurface body_surface;
@@ -50,15 +53,18 @@ static const struct {
   {"smesh", ".smesh", fuzz_surface},
   {"surface", ".off", fuzz_surface},
 };
-enum { NFUZZ = (int)PETSC_STATIC_ARRAY_LENGTH(fuzz_readers) };
+enum {
+  NFUZZ = (int)PETSC_STATIC_ARRAY_LENGTH(fuzz_readers)
+};
 
 /* Keeps the text of an error. */
-static inline PetscErrorCode fuzz_keep_error(MPI_Comm comm, int line, const char *function, const char *file,
-                                             PetscErrorCode code, PetscErrorType kind, const char *text,
-                                             void *ctx)
+static inline PetscErrorCode fuzz_keep_error(MPI_Comm comm, int line, const char *function,
+                                             const char *file, PetscErrorCode code,
+                                             PetscErrorType kind, const char *text, void *ctx)
 {
   (void)comm, (void)line, (void)function, (void)file;
-  if (kind == PETSC_ERROR_INITIAL) (void)snprintf((char *)ctx, 1024, "%s", text ? text : "");
+  if (kind == PETSC_ERROR_INITIAL)
+    (void)snprintf((char *)ctx, 1024, "%s", text ? text : "");
   return code;
 }
 
@@ -66,7 +72,8 @@ static inline void fuzz_write(const char *path, const char *data, size_t n)
 {
   FILE *file = fopen(path, "wb");
 
-  if (!file) return;
+  if (!file)
+    return;
   (void)fwrite(data, 1, n, file);
   (void)fclose(file);
 }
@@ -83,7 +90,8 @@ static inline void fuzz_split(const char *folder, const char *data, size_t n)
 
     (void)snprintf(path, sizeof(path), "%s/in%s", folder, endings[i]);
     (void)unlink(path);
-    if (part || i < 2) fuzz_write(path, data, part);
+    if (part || i < 2)
+      fuzz_write(path, data, part);
     n -= mark ? part + 3 : n;
     data += mark ? part + 3 : part;
   }
@@ -117,27 +125,33 @@ static inline PetscErrorCode fuzz_read(int reader, const char *folder, const cha
     (void)snprintf(im.where, sizeof(im.where), "%s", path);
     im.step = step;
     ierr = SbImportTagSet(&im, 0, NULL, &none);
-    if (!ierr) ierr = (*fuzz_readers[reader].read)(path, &im);
-    if (!ierr && fuzz_readers[reader].read != fuzz_surface) ierr = SbImportCheck(&im, &faces);
+    if (!ierr)
+      ierr = (*fuzz_readers[reader].read)(path, &im);
+    if (!ierr && fuzz_readers[reader].read != fuzz_surface)
+      ierr = SbImportCheck(&im, &faces);
     (void)SbFacesDestroy(&faces);
     (void)SbImportDestroy(&im);
   } else {
     SbTriangles t;
 
     ierr = SbTrianglesRead(PETSC_COMM_SELF, "fuzz", path, 1, origin, &t);
-    if (!ierr) (void)SbTrianglesDestroy(&t);
+    if (!ierr)
+      (void)SbTrianglesDestroy(&t);
   }
   (void)PetscPopErrorHandler();
   return ierr;
 }
 
-/* What every error of a reader promises: it is the user's, says where, and stands on one line. NULL when it is kept. */
+/* What every error of a reader promises: it is the user's, says where, and stands on one line. NULL
+   when it is kept. */
 static inline const char *fuzz_broken_promise(PetscErrorCode code, const char *text)
 {
-  if (!code) return NULL;
+  if (!code)
+    return NULL;
   if (code != PETSC_ERR_USER_INPUT && code != PETSC_ERR_FILE_OPEN && code != PETSC_ERR_FILE_READ &&
       code != PETSC_ERR_FILE_UNEXPECTED)
     return "the error is no error of the input";
-  if (!strstr(text, "/in.")) return "the error names no file";
+  if (!strstr(text, "/in."))
+    return "the error names no file";
   return strchr(text, '\n') ? "the error has more than one line" : NULL;
 }

@@ -1,55 +1,59 @@
 /*
-  cases_recovery.c - bodies with unphysical initial positions, which have to return to their rest shape.
+  cases_recovery.c - bodies with unphysical initial positions, which have to return to their rest
+  shape.
 
-  A free cube of 0.1 m without damping except by implicit Euler: it may return at any position and orientation, which HARD_SHAPE
-  ignores. Steps of a tenth of the slowest period (0.06 s) keep enough motion to overcome folds: with longer ones the body decreases its energy slowly, and may
-  end in an equilibrium in which tets wind twice around an edge, all of them with J > 0.
+  A free cube of 0.1 m without damping except by implicit Euler: it may return at any position and
+  orientation, which HARD_SHAPE ignores. Steps of a tenth of the slowest period (0.06 s) keep enough
+  motion to overcome folds: with longer ones the body decreases its energy slowly, and may end in an
+  equilibrium in which tets wind twice around an edge, all of them with J > 0.
 */
 #include "hard.h"
 
-#define CUBE \
-  "-bodies a -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -ts_dt 0.005 -ts_max_time 2 "
+#define CUBE                                                                           \
+  "-bodies a -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -ts_dt 0.005 " \
+  "-ts_max_time 2 "
 
-#define RECOVERY(NAME, WHAT, START, ELEMENT, LAW, CELLS, QUICK)                                        \
-  {                                                                                                    \
-    .name = NAME "." ELEMENT "." LAW, .what = WHAT ", " ELEMENT ", " LAW,                              \
-    .options =                                                                                         \
-      CUBE "-body_a_mesh box:0.1,0.1,0.1:" CELLS " -body_a_element " ELEMENT " -body_a_material " LAW, \
-    .start = START, .jitter = 1e-3, .quick = QUICK, .limits = {                                        \
-      {HARD_EXCESS, '<', 1e-5},                                                                        \
-      {HARD_MIN_J, '>', 0.99},                                                                         \
-      {HARD_MAX_J, '<', 1.01},                                                                         \
-      {HARD_SHAPE, '<', 0.01},                                                                         \
-      {HARD_NEWTON, '<', 2500}                                                                         \
-    }                                                                                                  \
+#define RECOVERY(NAME, WHAT, START, ELEMENT, LAW, CELLS, QUICK)                       \
+  {                                                                                   \
+    .name = NAME "." ELEMENT "." LAW, .what = WHAT ", " ELEMENT ", " LAW,             \
+    .options = CUBE "-body_a_mesh box:0.1,0.1,0.1:" CELLS " -body_a_element " ELEMENT \
+                    " -body_a_material " LAW,                                         \
+    .start = START, .jitter = 1e-3, .quick = QUICK, .limits = {                       \
+      {HARD_EXCESS, '<', 1e-5},                                                       \
+      {HARD_MIN_J, '>', 0.99},                                                        \
+      {HARD_MAX_J, '<', 1.01},                                                        \
+      {HARD_SHAPE, '<', 0.01},                                                        \
+      {HARD_NEWTON, '<', 2500}                                                        \
+    }                                                                                 \
   }
 
 /* Equilibria with inverted or flat tets: there is no motion, and the tets are counted. */
-#define STAYS(NAME, WHAT, START, LAW)                                                                        \
-  {                                                                                                          \
-    .name = NAME ".p1." LAW,                                                                                 \
-    .what = WHAT ", p1, " LAW ": an equilibrium of this law, in which inverted tets are counted",            \
-    .options = CUBE "-body_a_mesh box:0.1,0.1,0.1:3 -ts_max_time 0.1 -body_a_material " LAW, .start = START, \
-    .quick = 1, .limits = {                                                                                  \
-      {HARD_EXCESS, '<', 1e-5},                                                                              \
-      {HARD_INVERTED, '>', 0.5},                                                                             \
-      {HARD_SPEED, '<', 1e-9}                                                                                \
-    }                                                                                                        \
+#define STAYS(NAME, WHAT, START, LAW)                                                             \
+  {                                                                                               \
+    .name = NAME ".p1." LAW,                                                                      \
+    .what = WHAT ", p1, " LAW ": an equilibrium of this law, in which inverted tets are counted", \
+    .options = CUBE "-body_a_mesh box:0.1,0.1,0.1:3 -ts_max_time 0.1 -body_a_material " LAW,      \
+    .start = START, .quick = 1, .limits = {                                                       \
+      {HARD_EXCESS, '<', 1e-5},                                                                   \
+      {HARD_INVERTED, '>', 0.5},                                                                  \
+      {HARD_SPEED, '<', 1e-9}                                                                     \
+    }                                                                                             \
   }
 
-/* Guarantee for CR and DG from this state: no inverted cells at the end, and decreasing energy. The shape may differ. */
-#define UNFOLDS(NAME, WHAT, START, ELEMENT, LAW, CELLS, QUICK)                                         \
-  {                                                                                                    \
-    .name = NAME "." ELEMENT "." LAW, .what = WHAT ", " ELEMENT ", " LAW,                              \
-    .options =                                                                                         \
-      CUBE "-body_a_mesh box:0.1,0.1,0.1:" CELLS " -body_a_element " ELEMENT " -body_a_material " LAW, \
-    .start = START, .jitter = 1e-3, .runs = 3, .quick = QUICK, .limits = {                             \
-      {HARD_EXCESS, '<', 1e-5},                                                                        \
-      {HARD_LEFT, '<', 0.2},                                                                           \
-      {HARD_MIN_J, '>', 0.1},                                                                          \
-                                                                                                       \
-      {HARD_NEWTON, '<', 2500}                                                                         \
-    }                                                                                                  \
+/* Guarantee for CR and DG from this state: no inverted cells at the end, and decreasing energy. The
+   shape may differ. */
+#define UNFOLDS(NAME, WHAT, START, ELEMENT, LAW, CELLS, QUICK)                        \
+  {                                                                                   \
+    .name = NAME "." ELEMENT "." LAW, .what = WHAT ", " ELEMENT ", " LAW,             \
+    .options = CUBE "-body_a_mesh box:0.1,0.1,0.1:" CELLS " -body_a_element " ELEMENT \
+                    " -body_a_material " LAW,                                         \
+    .start = START, .jitter = 1e-3, .runs = 3, .quick = QUICK, .limits = {            \
+      {HARD_EXCESS, '<', 1e-5},                                                       \
+      {HARD_LEFT, '<', 0.2},                                                          \
+      {HARD_MIN_J, '>', 0.1},                                                         \
+                                                                                      \
+      {HARD_NEWTON, '<', 2500}                                                        \
+    }                                                                                 \
   }
 
 #define RANDOM "every vertex anywhere in the box"

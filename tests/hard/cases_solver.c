@@ -1,13 +1,16 @@
 /*
   cases_solver.c - failing solvers: forced to fail, or without a solution.
 
-  A forced failure counts calls of a convergence test: `ctx` is the number of calls until it reports divergence.
+  A forced failure counts calls of a convergence test: `ctx` is the number of calls until it reports
+  divergence.
 */
 #include "hard.h"
 
-#define BEAM                                                                                             \
-  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -body_a_material corotated "    \
+#define BEAM                                                                                \
+  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 "         \
+  "-body_a_density 1000 "                                                                   \
+  "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -body_a_material " \
+  "corotated "                                                                              \
   "-ts_dt 0.02 -ts_max_time 0.4 "
 
 /* Number of calls until the next failure, and of remaining failures. */
@@ -17,7 +20,8 @@ typedef struct {
 
 static PetscBool now(Saboteur *s)
 {
-  if (!s->failures || s->until-- > 0) return PETSC_FALSE;
+  if (!s->failures || s->until-- > 0)
+    return PETSC_FALSE;
   s->failures--;
   s->until = 0;
   return PETSC_TRUE;
@@ -110,25 +114,29 @@ static PetscErrorCode newton_fails_often(HardRun *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define FREE(ELEMENT, LAW, QUICK)                                                                            \
-  {                                                                                                          \
-    .name = "free." ELEMENT "." LAW, .what = "static under its weight without a support, " ELEMENT ", " LAW, \
-    .options =                                                                                               \
-      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-      "-effects gravity -time static -ksp_max_it 300 -body_a_element " ELEMENT " -body_a_material " LAW,     \
-    .stops = "nothing holds the body a against", .quick = QUICK                                              \
+#define FREE(ELEMENT, LAW, QUICK)                                                                \
+  {                                                                                              \
+    .name = "free." ELEMENT "." LAW,                                                             \
+    .what = "static under its weight without a support, " ELEMENT ", " LAW,                      \
+    .options = "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 " \
+               "-body_a_density 1000 "                                                           \
+               "-effects gravity -time static -ksp_max_it 300 -body_a_element " ELEMENT          \
+               " -body_a_material " LAW,                                                         \
+    .stops = "nothing holds the body a against", .quick = QUICK                                  \
   }
 
-#define PULLED(ELEMENT, LAW, QUICK)                                                                          \
-  {                                                                                                          \
-    .name = "pulled." ELEMENT "." LAW,                                                                       \
-    .what = "static, pulled at both ends without a support, " ELEMENT ", " LAW,                              \
-    .options =                                                                                               \
-      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-      "-effects left,right -effect_left_type traction -effect_left_on xmin -effect_left_vector -1000;0;0 "   \
-      "-effect_right_type traction -effect_right_on xmax -effect_right_vector 1000;0;0 -time static "        \
-      "-body_a_element " ELEMENT " -body_a_material " LAW,                                                   \
-    .stops = "nothing holds the body a against", .quick = QUICK                                              \
+#define PULLED(ELEMENT, LAW, QUICK)                                                               \
+  {                                                                                               \
+    .name = "pulled." ELEMENT "." LAW,                                                            \
+    .what = "static, pulled at both ends without a support, " ELEMENT ", " LAW,                   \
+    .options = "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 "  \
+               "-body_a_density 1000 "                                                            \
+               "-effects left,right -effect_left_type traction -effect_left_on xmin "             \
+               "-effect_left_vector -1000;0;0 "                                                   \
+               "-effect_right_type traction -effect_right_on xmax -effect_right_vector 1000;0;0 " \
+               "-time static "                                                                    \
+               "-body_a_element " ELEMENT " -body_a_material " LAW,                               \
+    .stops = "nothing holds the body a against", .quick = QUICK                                   \
   }
 
 const HardCase HardCasesSolver[] = {
@@ -161,7 +169,8 @@ const HardCase HardCasesSolver[] = {
    .stops = "linear solver: DIVERGED_ITS",
    .limits = {{HARD_REJECTED, '<', 11.5}}},
   {.name = "step.thrice",
-   .what = "Newton's method made to fail in three attempts: the step is cut to an eighth, and grows again",
+   .what = "Newton's method made to fail in three attempts: the step is cut to an eighth, and "
+           "grows again",
    .options = BEAM,
    .start = newton_fails_often,
    .quick = 1,

@@ -1,8 +1,9 @@
 /*
   Runs hard cases (hard.h): hard -case NAME [-runs N] [-verbose] [-more "OPTIONS"], or -list.
 
-  -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each rank, difficulty, separated by tabs. A case prints one
-  line per limit, which tests/run and scripts/stability read:
+  -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each
+  rank, difficulty, separated by tabs. A case prints one line per limit, which tests/run and
+  scripts/stability read:
     limit|case|ranks|runs|quantity|measured|relation|bound|unit
     work|case|run|steps|rejected|Newton|linear iterations|CPU s of rank 0
 */
@@ -12,8 +13,9 @@
 
 extern const HardCase HardCasesContact[], HardCasesMaterial[], HardCasesMesh[], HardCasesMotion[],
   HardCasesRecovery[], HardCasesSolver[], HardCasesTime[], HardCasesTouch[];
-static const HardCase *const tables[] = {HardCasesContact,  HardCasesMaterial, HardCasesMesh, HardCasesMotion,
-                                         HardCasesRecovery, HardCasesSolver,   HardCasesTime, HardCasesTouch};
+static const HardCase *const tables[] = {HardCasesContact, HardCasesMaterial, HardCasesMesh,
+                                         HardCasesMotion,  HardCasesRecovery, HardCasesSolver,
+                                         HardCasesTime,    HardCasesTouch};
 
 /* ------------------------------------------------------------------ the table */
 
@@ -32,8 +34,10 @@ static void list_cases(void)
         printf("%s\t1,2,3", c->name);
       else
         printf("%s\t%d", c->name, n[0]);
-      for (int k = 1; k < 3 && n[k]; k++) printf(",%d", n[k]);
-      printf("\t%d\t%d\t%s\n", PetscMin(c->quick, case_runs(c)), c->seconds ? c->seconds : 300, c->what);
+      for (int k = 1; k < 3 && n[k]; k++)
+        printf(",%d", n[k]);
+      printf("\t%d\t%d\t%s\n", PetscMin(c->quick, case_runs(c)), c->seconds ? c->seconds : 300,
+             c->what);
     }
   }
 }
@@ -44,12 +48,14 @@ static PetscErrorCode find_case(const char *name, const HardCase **found)
   *found = NULL;
   for (size_t t = 0; t < PETSC_STATIC_ARRAY_LENGTH(tables); t++) {
     for (const HardCase *c = tables[t]; c->name; c++) {
-      if (strcmp(c->name, name)) continue;
+      if (strcmp(c->name, name))
+        continue;
       PetscCheck(!*found, PETSC_COMM_WORLD, PETSC_ERR_PLIB, "Two cases are called '%s'", name);
       *found = c;
     }
   }
-  PetscCheck(*found, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "No case '%s': -list names them", name);
+  PetscCheck(*found, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "No case '%s': -list names them",
+             name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,27 +70,31 @@ static PetscErrorCode prepare(HardRun *r, PetscInt k)
   PetscCall(PetscRandomSetSeed(r->random, 20250101 + (unsigned long)k));
   PetscCall(PetscRandomSeed(r->random));
   PetscCall(HardMeasureBegin(r));
-  if (k && c->jitter > 0.) PetscCall(HardNoise(r, c->jitter * r->size, r->run->U));
-  if (k && c->jitter_speed > 0.) PetscCall(HardNoise(r, c->jitter_speed, r->run->V));
-  if (c->start) PetscCall((*c->start)(r));
+  if (k && c->jitter > 0.)
+    PetscCall(HardNoise(r, c->jitter * r->size, r->run->U));
+  if (k && c->jitter_speed > 0.)
+    PetscCall(HardNoise(r, c->jitter_speed, r->run->V));
+  if (c->start)
+    PetscCall((*c->start)(r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Checks that a run ended as the case requires. */
 static void check_end(const HardRun *r)
 {
-  const char *reason = r->run->stop_reason, *stops = r->c->stops;
+  const char *reason = r->run->stop_reason;
+  const char *stops = r->c->stops;
 
   if (!stops)
     SB_CHECK(!reason[0], "%s, run %d: %s", r->c->name, (int)r->k, reason);
   else
-    SB_CHECK(strstr(reason, stops), "%s, run %d: should end with '%s', not '%s'", r->c->name, (int)r->k,
-             stops, reason);
+    SB_CHECK(strstr(reason, stops), "%s, run %d: should end with '%s', not '%s'", r->c->name,
+             (int)r->k, stops, reason);
   SB_CHECK(!r->wild, "%s, run %d: something is not finite", r->c->name, (int)r->k);
 }
 
-static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt k, PetscBool verbose,
-                               PetscReal value[])
+static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt k,
+                               PetscBool verbose, PetscReal value[])
 {
   HardRun r = {.c = c, .k = k, .verbose = verbose};
   const clock_t began = clock();
@@ -100,8 +110,9 @@ static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt 
   else
     PetscCall(SbRunSolve(r.run));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "work|%s|%d|%d|%d|%d|%d|%.2f\n", c->name, (int)k,
-                        (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
-                        (int)t.run->linear_total, (double)(clock() - began) / CLOCKS_PER_SEC));
+                        (int)t.run->steps_total, (int)t.run->rejected_total,
+                        (int)t.run->newton_total, (int)t.run->linear_total,
+                        (double)(clock() - began) / CLOCKS_PER_SEC));
   PetscCall(HardMeasureEnd(&r));
   check_end(&r);
   PetscCall(PetscArraycpy(value, r.value, HARD_QUANTITIES));
@@ -123,21 +134,25 @@ static PetscErrorCode report(const HardCase *c, int runs, const PetscReal worst[
     const PetscReal measured = worst[l - c->limits];
     const char *name = l->name ? l->name : HardQuantityName(l->quantity);
 
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "limit|%s|%d|%d|%s|%.4g|%c|%g|%s\n", c->name, (int)size, runs,
-                          name, (double)measured, l->relation, (double)l->bound, l->unit ? l->unit : ""));
-    SB_CHECK(l->relation == '<' ? measured < l->bound : measured > l->bound, "%s: %s is %g, not %c %g",
-             c->name, name, (double)measured, l->relation, (double)l->bound);
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "limit|%s|%d|%d|%s|%.4g|%c|%g|%s\n", c->name, (int)size,
+                          runs, name, (double)measured, l->relation, (double)l->bound,
+                          l->unit ? l->unit : ""));
+    SB_CHECK(l->relation == '<' ? measured < l->bound : measured > l->bound,
+             "%s: %s is %g, not %c %g", c->name, name, (double)measured, l->relation,
+             (double)l->bound);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, PetscBool verbose)
 {
-  char options[HARD_TEXT], path[512] = "";
+  char options[HARD_TEXT];
+  char path[512] = "";
   PetscReal worst[HARD_LIMITS];
 
   PetscFunctionBeginUser;
-  if (c->mesh) PetscCall((*c->mesh)(path));
+  if (c->mesh)
+    PetscCall((*c->mesh)(path));
   (void)snprintf(options, sizeof(options), c->options, path);
   PetscCall(PetscStrlcat(options, " ", sizeof(options)));
   PetscCall(PetscStrlcat(options, more, sizeof(options)));
@@ -148,7 +163,8 @@ static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, Pe
 
     PetscCall(run_once(c, options, k, verbose, value));
     for (const HardLimit *l = c->limits; l->relation; l++) {
-      const PetscReal now = value[l->quantity], before = worst[l - c->limits];
+      const PetscReal now = value[l->quantity];
+      const PetscReal before = worst[l - c->limits];
       const PetscBool holds = (PetscBool)(l->relation == '<' ? now < l->bound : now > l->bound);
       const PetscBool worse = (PetscBool)(l->relation == '<' ? !(now <= before) : !(now >= before));
 
@@ -164,7 +180,8 @@ static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, Pe
 
 int main(int argc, char **argv)
 {
-  char name[128], more[HARD_TEXT] = "";
+  char name[128];
+  char more[HARD_TEXT] = "";
   PetscBool named, list, verbose;
   PetscInt runs = 0;
   const HardCase *c;
@@ -173,9 +190,11 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-list", &list));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-verbose", &verbose));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-case", name, sizeof(name), &named));
+
   /* options after -more must not be parsed by PETSc */
   for (int i = 1; i + 1 < argc; i++)
-    if (!strcmp(argv[i], "-more")) PetscCall(PetscStrncpy(more, argv[i + 1], sizeof(more)));
+    if (!strcmp(argv[i], "-more"))
+      PetscCall(PetscStrncpy(more, argv[i + 1], sizeof(more)));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-runs", &runs, NULL));
   if (list) {
     list_cases();

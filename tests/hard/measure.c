@@ -1,5 +1,6 @@
 /*
-  measure.c - measures the limited quantities of hard cases, after each step and at the end of a run.
+  measure.c - measures the limited quantities of hard cases, after each step and at the end of a
+  run.
 */
 #include "hard.h"
 #include "../verify/contact.h"
@@ -63,7 +64,8 @@ PetscErrorCode HardMeasureBegin(HardRun *r)
     }
     r->rest += body->volume;
   }
-  for (int k = 0; k < 3; k++) r->size = PetscMax(r->size, high[k] - low[k]);
+  for (int k = 0; k < 3; k++)
+    r->size = PetscMax(r->size, high[k] - low[k]);
   r->value[HARD_MIN_J_EVER] = PETSC_MAX_REAL;
   r->run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(r->run, HardMeasureStep, r));
@@ -72,13 +74,18 @@ PetscErrorCode HardMeasureBegin(HardRun *r)
 
 static PetscErrorCode look_finite(HardRun *r, const SbStep *step)
 {
-  PetscReal u, v = 0., a = 0.;
+  PetscReal u;
+  PetscReal v = 0.;
+  PetscReal a = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(VecNorm(step->U, NORM_INFINITY, &u));
-  if (step->V) PetscCall(VecNorm(step->V, NORM_INFINITY, &v));
-  if (step->A) PetscCall(VecNorm(step->A, NORM_INFINITY, &a));
-  if (PetscIsInfOrNanReal(u) || PetscIsInfOrNanReal(v) || PetscIsInfOrNanReal(a)) r->wild = PETSC_TRUE;
+  if (step->V)
+    PetscCall(VecNorm(step->V, NORM_INFINITY, &v));
+  if (step->A)
+    PetscCall(VecNorm(step->A, NORM_INFINITY, &a));
+  if (PetscIsInfOrNanReal(u) || PetscIsInfOrNanReal(v) || PetscIsInfOrNanReal(a))
+    r->wild = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -89,7 +96,8 @@ static PetscErrorCode look_depth(HardRun *r, const SbStep *step)
   for (PetscInt i = 0; step->step && i < r->model->nbegin_step; i++) {
     PetscReal depth;
 
-    PetscCall(contact_column(r->run, step->t, r->model->begin_step[i]->name, "penetration", &depth));
+    PetscCall(
+      contact_column(r->run, step->t, r->model->begin_step[i]->name, "penetration", &depth));
     r->value[HARD_DEPTH] = PetscMax(r->value[HARD_DEPTH], depth / r->size);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,13 +113,15 @@ static void look_energies(HardRun *r, const SbStep *step)
     r->start = *e;
     r->last = now;
   }
+
   /* energy that is missing in the balance may be regained later */
   r->most = PetscMax(r->most, PetscMax(now, r->run->energy_start + PetscAbsReal(e->load_work) +
                                               PetscAbsReal(e->prescribed_work)));
   r->gain = PetscMax(r->gain, -e->integrator_loss);
   value[HARD_ACCOUNT] = PetscMax(value[HARD_ACCOUNT], PetscAbsReal(e->integrator_loss));
   value[HARD_RISE] = PetscMax(value[HARD_RISE], now - r->last);
-  value[HARD_DRIFT] = PetscMax(value[HARD_DRIFT], PetscAbsReal(now - r->start.kinetic - r->start.strain));
+  value[HARD_DRIFT] =
+    PetscMax(value[HARD_DRIFT], PetscAbsReal(now - r->start.kinetic - r->start.strain));
   value[HARD_LEFT] = now;
   value[HARD_MOMENTUM] = PetscMax(value[HARD_MOMENTUM], distance(e->momentum, r->start.momentum));
   value[HARD_ANGULAR] = PetscMax(value[HARD_ANGULAR], distance(e->angular, r->start.angular));
@@ -141,14 +151,17 @@ PetscErrorCode HardMeasureStep(SbRun run, const SbStep *step, void *ctx)
   r->value[HARD_LINEAR] = PetscMax(r->value[HARD_LINEAR], (PetscReal)step->linear);
   r->value[HARD_STEPS] = (PetscReal)step->step;
   if (r->verbose)
-    PetscCall(PetscPrintf(
-      PETSC_COMM_WORLD,
-      "    %" PetscInt_FMT " t %g kinetic %.4g strain %.4g missing %.3g min J %.4g inverted %" PetscInt_FMT
-      " displacement %.3g newton %" PetscInt_FMT " linear %" PetscInt_FMT " rejected %" PetscInt_FMT "\n",
-      step->step, (double)step->t, (double)e->kinetic, (double)e->strain, (double)e->integrator_loss,
-      (double)e->min_J, e->ninverted, (double)e->max_displacement, step->newton, step->linear,
-      step->rejected));
-  if (r->c->look) PetscCall((*r->c->look)(r, step));
+    PetscCall(
+      PetscPrintf(PETSC_COMM_WORLD,
+                  "    %" PetscInt_FMT
+                  " t %g kinetic %.4g strain %.4g missing %.3g min J %.4g inverted %" PetscInt_FMT
+                  " displacement %.3g newton %" PetscInt_FMT " linear %" PetscInt_FMT
+                  " rejected %" PetscInt_FMT "\n",
+                  step->step, (double)step->t, (double)e->kinetic, (double)e->strain,
+                  (double)e->integrator_loss, (double)e->min_J, e->ninverted,
+                  (double)e->max_displacement, step->newton, step->linear, step->rejected));
+  if (r->c->look)
+    PetscCall((*r->c->look)(r, step));
   (void)run;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -165,15 +178,17 @@ static PetscErrorCode measure_shape(HardRun *r)
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
     for (int i = 0; i < 4; i++) {
       for (int j = 0; j < i; j++) {
-        const PetscInt a = s->cell_node[4 * c + i], b = s->cell_node[4 * c + j];
+        const PetscInt a = s->cell_node[4 * c + i];
+        const PetscInt b = s->cell_node[4 * c + j];
         PetscReal x[3], y[3];
 
         for (int k = 0; k < 3; k++) {
           x[k] = s->node_x[3 * a + k] + u[3 * a + k];
           y[k] = s->node_x[3 * b + k] + u[3 * b + k];
         }
-        worst =
-          PetscMax(worst, PetscAbsReal(distance(x, y) / distance(s->node_x + 3 * a, s->node_x + 3 * b) - 1.));
+        worst = PetscMax(
+          worst,
+          PetscAbsReal(distance(x, y) / distance(s->node_x + 3 * a, s->node_x + 3 * b) - 1.));
       }
     }
   }
@@ -186,14 +201,16 @@ static PetscErrorCode measure_max_J(HardRun *r)
 {
   const SbSpace s = r->model->space;
   const PetscReal *u;
-  PetscReal *J, most = PETSC_MIN_REAL;
+  PetscReal *J;
+  PetscReal most = PETSC_MIN_REAL;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(s->mesh->ncell_owned, &J));
   PetscCall(SbSpaceGetLocalRead(s, r->run->U, &u));
   SbSpaceCellState(s, u, NULL, J, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, r->run->U, &u));
-  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) most = PetscMax(most, J[c]);
+  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
+    most = PetscMax(most, J[c]);
   PetscCall(PetscFree(J));
   PetscCallMPI(MPI_Allreduce(&most, &r->value[HARD_MAX_J], 1, MPIU_REAL, MPI_MAX, r->model->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

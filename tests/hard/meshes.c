@@ -1,8 +1,8 @@
 /*
   meshes.c - meshes of very poor quality, of the unit cube.
 
-  Slivers: two layers of cubes, whose diagonals do not match between the layers. The vertices there are moved alternately up and
-  down, and a tet fills each gap between four nearly coplanar vertices.
+  Slivers: two layers of cubes, whose diagonals do not match between the layers. The vertices there
+  are moved alternately up and down, and a tet fills each gap between four nearly coplanar vertices.
 */
 #include "hard.h"
 #include "../verify/verify.h"
@@ -28,14 +28,16 @@ PetscErrorCode HardMeshNeedle(char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Grading by cubic shells around the corner at the origin, with sizes in geometric progression: x times r(s) / s, s = max x. */
+/* Grading by cubic shells around the corner at the origin, with sizes in geometric progression: x
+   times r(s) / s, s = max x. */
 static void graded(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal s = PetscMax(x[0], PetscMax(x[1], x[2]));
-  const PetscReal inner =
-    (1. - s) * (PetscReal)place->n[0] / (PetscReal)(place->n[0] - 1); /* 0 outside, 1 at the smallest shell */
+  const PetscReal inner = (1. - s) * (PetscReal)place->n[0] /
+                          (PetscReal)(place->n[0] - 1); /* 0 outside, 1 at the smallest shell */
 
-  for (int k = 0; k < 3 && s > 0.; k++) x[k] *= PetscPowReal(GRADED_RATIO, -inner) / s;
+  for (int k = 0; k < 3 && s > 0.; k++)
+    x[k] *= PetscPowReal(GRADED_RATIO, -inner) / s;
 }
 
 PetscErrorCode HardMeshGraded(char path[512])
@@ -58,7 +60,8 @@ static void write_tet(FILE *f, PetscInt *count, const PetscInt v[4])
   fprintf(f, "%d 4 2 0 1 %d %d %d %d\n", (int)++*count, (int)v[0], (int)v[1], (int)v[2], (int)v[3]);
 }
 
-/* Six tets of a cube of layer z around the diagonal from corner `from`; the mesh check orients them. */
+/* Six tets of a cube of layer z around the diagonal from corner `from`; the mesh check orients
+   them. */
 static void write_cube(FILE *f, PetscInt *count, PetscInt i, PetscInt j, PetscInt z, int from)
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 3, 7}, {0, 1, 5, 7},
@@ -99,7 +102,8 @@ static void write_slivers(FILE *f)
                                   sliver_vertex(i, j + 1, 1), sliver_vertex(i + 1, j + 1, 1)};
       const int odd = (int)((i & 1) | (j & 1) << 1);
 
-      /* below, the diagonal of the face between joins the vertices that went down; above, those that went up */
+      /* below, the diagonal of the face between joins the vertices that went down; above, those
+         that went up */
       write_cube(f, &count, i, j, 0, odd ^ 1);
       write_cube(f, &count, i, j, 1, odd);
       write_tet(f, &count, corner);
@@ -114,7 +118,8 @@ PetscErrorCode HardMeshSliver(char path[512])
 
   PetscFunctionBeginUser;
   PetscCall(test_file_open(".msh", path, &f));
-  if (f) write_slivers(f);
+  if (f)
+    write_slivers(f);
   PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,15 +1,17 @@
 /*
   start.c - initial states of hard cases: perturbations, and bodies far from their rest shape.
 
-  Random numbers are generated from the original node number (SbSpace.node_orig), so that a run is the same on any
-  number of ranks.
+  Random numbers are generated from the original node number (SbSpace.node_orig), so that a run is
+  the same on any number of ranks.
 */
 #include "hard.h"
 #include "../verify/verify.h"
 
-#define POINT 1e-4 /* over the size; exactly one point is an equilibrium of the neo-Hookean material */
+#define POINT \
+  1e-4 /* over the size; exactly one point is an equilibrium of the neo-Hookean material */
 
-/* Random numbers in [-1, 1] for each original node number, [verify_numbers()][3]; the caller frees them. */
+/* Random numbers in [-1, 1] for each original node number, [verify_numbers()][3]; the caller frees
+   them. */
 static PetscErrorCode draw(HardRun *r, PetscReal **value)
 {
   const PetscInt n = 3 * verify_numbers(r->model);
@@ -34,14 +36,16 @@ PetscErrorCode HardNoise(HardRun *r, PetscReal amplitude, Vec X)
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int k = 0; k < 3; k++)
-      if (!(s->fixed[i] & (1 << k))) x[3 * i + k] += amplitude * noise[3 * s->node_orig[i] + k];
+      if (!(s->fixed[i] & (1 << k)))
+        x[3 * i + k] += amplitude * noise[3 * s->node_orig[i] + k];
   }
   PetscCall(VecRestoreArray(X, &x));
   PetscCall(PetscFree(noise));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HardPlace(HardRun *r, void (*place)(const HardRun *r, const PetscReal x[3], PetscReal to[3]))
+PetscErrorCode HardPlace(HardRun *r,
+                         void (*place)(const HardRun *r, const PetscReal x[3], PetscReal to[3]))
 {
   const SbSpace s = r->model->space;
   PetscScalar *u;
@@ -54,7 +58,8 @@ PetscErrorCode HardPlace(HardRun *r, void (*place)(const HardRun *r, const Petsc
 
     place(r, x, to);
     for (int k = 0; k < 3; k++)
-      if (!(s->fixed[i] & (1 << k))) u[3 * i + k] += to[k] - x[k];
+      if (!(s->fixed[i] & (1 << k)))
+        u[3 * i + k] += to[k] - x[k];
   }
   PetscCall(VecRestoreArray(r->run->U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,19 +1,23 @@
 /*
-  Microseconds per tet: residual and tangent, compared with the element kernel alone, MatSetValuesBlockedLocal() and
-  DMPlexMatSetClosure(); then MatMult() compared with the memory bandwidth of the machine.
+  Microseconds per tet: residual and tangent, compared with the element kernel alone,
+  MatSetValuesBlockedLocal() and DMPlexMatSetClosure(); then MatMult() compared with the memory
+  bandwidth of the machine.
 
     assembly -mesh box:0.4,0.1,0.1:8 -rounds 5
 
-  The kernel alone does the work of the tangent for each batch (gather, F, polar rotation, ten blocks) and writes the blocks repeatedly to the same
-  small buffer. The alternatives get their blocks from the same kernel; they insert the owned cells and
-  then communicate, as programs without overlap do. DMPlexMatSetClosure() visits the cells in the DM's own
-  order and adds to a matrix in the DM's own numbering; the values do not matter for its speed.
+  The kernel alone does the work of the tangent for each batch (gather, F, polar rotation, ten
+  blocks) and writes the blocks repeatedly to the same small buffer. The alternatives get their
+  blocks from the same kernel; they insert the owned cells and then communicate, as programs without
+  overlap do. DMPlexMatSetClosure() visits the cells in the DM's own order and adds to a matrix in
+  the DM's own numbering; the values do not matter for its speed.
 
   The displacement bends and twists the bar, with small and large rotations.
 */
 #include "perf.h"
 
-enum { TRIAD = 8 << 20 }; /* numbers in each of the three arrays: 192 MB, beyond any cache */
+enum {
+  TRIAD = 8 << 20
+}; /* numbers in each of the three arrays: 192 MB, beyond any cache */
 
 typedef struct {
   TestScene scene;
@@ -47,11 +51,13 @@ static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9]
 
   for (int a = 0; a < 4; a++) {
     for (int l = 0; l < SB_BATCH; l++)
-      for (int i = 0; i < 3; i++) u[3 * a + i][l] = w->u[3 * node[a * SB_BATCH + l] + i];
+      for (int i = 0; i < 3; i++)
+        u[3 * a + i][l] = w->u[3 * node[a * SB_BATCH + l] + i];
   }
   SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.frame(m, (const SbPack *)F, R);
-  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->lambda, m->mu, (const SbPack *)R, K);
+  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->lambda, m->mu,
+                        (const SbPack *)R, K);
 }
 
 static PetscErrorCode bare_kernel(Bench *w)
@@ -62,7 +68,8 @@ static PetscErrorCode bare_kernel(Bench *w)
   for (PetscInt r = 0; r < w->s->nregion; r++) {
     const SbRegion *region = &w->s->region[r];
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) blocks(w, region, b, K);
+    for (PetscInt b = region->bstart; b < region->bend; b++)
+      blocks(w, region, b, K);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -71,7 +78,8 @@ static PetscErrorCode bare_kernel(Bench *w)
 static void whole_matrix(SbPack K[10][9], int l, PetscReal Ke[144])
 {
   for (int p = 0; p < 10; p++) {
-    const int a = SbPairA[p], b = SbPairB[p];
+    const int a = SbPairA[p];
+    const int b = SbPairB[p];
 
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
@@ -95,7 +103,8 @@ static PetscErrorCode insert(Bench *w, DM dm, Mat A)
 
       blocks(w, region, b, K);
       for (int l = 0; l < w->s->batch_n[b]; l++) {
-        const PetscInt cell = w->s->batch_cell[b] + l, *node = w->s->cell_node + 4 * cell;
+        const PetscInt cell = w->s->batch_cell[b] + l;
+        const PetscInt *node = w->s->cell_node + 4 * cell;
         PetscReal Ke[144];
 
         whole_matrix(K, l, Ke);
@@ -145,7 +154,8 @@ static PetscErrorCode create_closure(Bench *w)
   PetscCall(DMPlexGetDepthStratum(w->dm, 0, &vStart, &vEnd));
   PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, &section));
   PetscCall(PetscSectionSetChart(section, pStart, pEnd));
-  for (PetscInt v = vStart; v < vEnd; v++) PetscCall(PetscSectionSetDof(section, v, 3));
+  for (PetscInt v = vStart; v < vEnd; v++)
+    PetscCall(PetscSectionSetDof(section, v, 3));
   PetscCall(PetscSectionSetUp(section));
   PetscCall(DMSetLocalSection(w->dm, section));
   PetscCall(PetscSectionDestroy(&section));
@@ -159,8 +169,8 @@ static PetscErrorCode create_matrices(Bench *w)
   ISLocalToGlobalMapping map;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    ISLocalToGlobalMappingCreate(PETSC_COMM_WORLD, 3, w->s->nnode, w->s->gnode, PETSC_COPY_VALUES, &map));
+  PetscCall(ISLocalToGlobalMappingCreate(PETSC_COMM_WORLD, 3, w->s->nnode, w->s->gnode,
+                                         PETSC_COPY_VALUES, &map));
   for (int k = 0; k < 2; k++) {
     PetscCall(SbSpaceCreateMatrix(w->s, k ? SB_MATRIX_AIJ : SB_MATRIX_BAIJ, &w->set[k]));
     PetscCall(MatSetLocalToGlobalMapping(w->set[k], map, map));
@@ -168,7 +178,8 @@ static PetscErrorCode create_matrices(Bench *w)
   PetscCall(ISLocalToGlobalMappingDestroy(&map));
   PetscCall(SbSpaceCreateMatrix(w->s, SB_MATRIX_AIJ, &w->A[SB_MATRIX_AIJ]));
   PetscCall(SbSpaceCreateMatrix(w->s, SB_MATRIX_BAIJ, &w->A[SB_MATRIX_BAIJ]));
-  if (w->size == 1) PetscCall(SbSpaceCreateMatrix(w->s, SB_MATRIX_SBAIJ, &w->A[SB_MATRIX_SBAIJ]));
+  if (w->size == 1)
+    PetscCall(SbSpaceCreateMatrix(w->s, SB_MATRIX_SBAIJ, &w->A[SB_MATRIX_SBAIJ]));
   PetscCall(create_closure(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -197,8 +208,10 @@ static PetscErrorCode bench_destroy(Bench *w)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSpaceRestoreLocalRead(w->s, w->U, &w->u));
-  for (int k = 0; k < 3; k++) PetscCall(MatDestroy(&w->A[k]));
-  for (int k = 0; k < 2; k++) PetscCall(MatDestroy(&w->set[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(MatDestroy(&w->A[k]));
+  for (int k = 0; k < 2; k++)
+    PetscCall(MatDestroy(&w->set[k]));
   PetscCall(MatDestroy(&w->closure));
   PetscCall(DMDestroy(&w->dm));
   PetscCall(VecDestroy(&w->U));
@@ -221,7 +234,8 @@ static PetscErrorCode assembly_round(Bench *w)
   PetscFunctionBeginUser;
   TIME_PER_TET(w, "kernel", bare_kernel(w));
   TIME_PER_TET(w, "residual", residual(w));
-  if (w->A[SB_MATRIX_SBAIJ]) TIME_PER_TET(w, "tangent_sbaij", tangent(w, w->A[SB_MATRIX_SBAIJ]));
+  if (w->A[SB_MATRIX_SBAIJ])
+    TIME_PER_TET(w, "tangent_sbaij", tangent(w, w->A[SB_MATRIX_SBAIJ]));
   TIME_PER_TET(w, "tangent_baij", tangent(w, w->A[SB_MATRIX_BAIJ]));
   TIME_PER_TET(w, "tangent_aij", tangent(w, w->A[SB_MATRIX_AIJ]));
   TIME_PER_TET(w, "setvalues_baij", insert(w, NULL, w->set[0]));
@@ -236,7 +250,8 @@ static PetscErrorCode compare(Bench *w)
   PetscReal difference, size;
 
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < w->s->nfixed; k++) w->s->fixed[w->s->fixed_node[k]] = 0;
+  for (PetscInt k = 0; k < w->s->nfixed; k++)
+    w->s->fixed[w->s->fixed_node[k]] = 0;
   PetscCall(SbSpaceAssembleTangent(w->s, &w->stage, w->A[SB_MATRIX_AIJ]));
   PetscCall(MatAssemblyBegin(w->A[SB_MATRIX_AIJ], MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(w->A[SB_MATRIX_AIJ], MAT_FINAL_ASSEMBLY));
@@ -244,8 +259,8 @@ static PetscErrorCode compare(Bench *w)
   PetscCall(MatNorm(w->set[1], NORM_FROBENIUS, &size));
   PetscCall(MatAXPY(w->set[1], -1., w->A[SB_MATRIX_AIJ], SAME_NONZERO_PATTERN));
   PetscCall(MatNorm(w->set[1], NORM_FROBENIUS, &difference));
-  PetscCheck(difference < 1e-13 * size, PETSC_COMM_WORLD, PETSC_ERR_PLIB, "The matrices differ by %g of %g",
-             (double)difference, (double)size);
+  PetscCheck(difference < 1e-13 * size, PETSC_COMM_WORLD, PETSC_ERR_PLIB,
+             "The matrices differ by %g of %g", (double)difference, (double)size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,17 +281,19 @@ static PetscErrorCode triad_rounds(PetscInt rounds)
   for (PetscInt r = 0; r < rounds; r++) {
     const PerfClock start = perf_start();
 
-    for (PetscInt i = 0; i < TRIAD; i++) a[i] = b[i] + 3. * c[i];
+    for (PetscInt i = 0; i < TRIAD; i++)
+      a[i] = b[i] + 3. * c[i];
     PetscCall(perf_sample("triad", "GB/s", 24e-9 * TRIAD * size / perf_stop(start).cpu));
-    PetscCheck(a[rounds] == 1. + 3. * (PetscReal)rounds, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Wrong sum");
+    PetscCheck(a[rounds] == 1. + 3. * (PetscReal)rounds, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Wrong sum");
   }
   PetscCall(PetscFree3(a, b, c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Bytes that one product must move: values, column numbers, the two vectors once. Of BAIJ the blocks below the diagonal stay
-  where they are.
+  Bytes that one product must move: values, column numbers, the two vectors once. Of BAIJ the blocks
+  below the diagonal stay where they are.
 */
 static PetscErrorCode matmult_bytes(Mat A, PetscInt kind, double *bytes)
 {
@@ -288,8 +305,10 @@ static PetscErrorCode matmult_bytes(Mat A, PetscInt kind, double *bytes)
   PetscCall(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
   PetscCall(MatGetSize(A, &n, NULL));
   blocks = info.nz_used / 9.;
-  if (kind == SB_MATRIX_BAIJ) blocks = 0.5 * (blocks + (double)n / 3.);
-  *bytes = blocks * (72. + (kind == SB_MATRIX_AIJ ? 9. : 1.) * (double)sizeof(PetscInt)) + 16. * (double)n;
+  if (kind == SB_MATRIX_BAIJ)
+    blocks = 0.5 * (blocks + (double)n / 3.);
+  *bytes =
+    blocks * (72. + (kind == SB_MATRIX_AIJ ? 9. : 1.) * (double)sizeof(PetscInt)) + 16. * (double)n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,13 +320,16 @@ static PetscErrorCode matmult_round(Bench *w)
   for (int k = 0; k < 3; k++) {
     const PetscInt times = 1 + (PetscInt)(4e6 / (double)w->scene.model->mesh->Ncell);
     PerfClock start;
-    double bytes = 0., seconds;
+    double bytes = 0.;
+    double seconds;
     char name[64];
 
-    if (!w->A[k]) continue;
+    if (!w->A[k])
+      continue;
     PetscCall(matmult_bytes(w->A[k], k, &bytes));
     start = perf_start();
-    for (PetscInt i = 0; i < times; i++) PetscCall(MatMult(w->A[k], w->U, w->F));
+    for (PetscInt i = 0; i < times; i++)
+      PetscCall(MatMult(w->A[k], w->U, w->F));
     seconds = perf_stop(start).cpu / (double)times;
     PetscCall(PetscSNPrintf(name, sizeof(name), "%s_time", names[k]));
     PetscCall(perf_sample(name, "ns/tet", 1e3 * w->per_tet * seconds));
@@ -329,9 +351,11 @@ int main(int argc, char **argv)
   PetscCall(bench_create(mesh, &w));
   PetscCall(perf_fact("tets", (double)w.scene.model->mesh->Ncell));
   PetscCall(perf_fact("nodes", (double)w.s->Nnode));
-  for (PetscInt r = 0; r < rounds; r++) PetscCall(assembly_round(&w));
+  for (PetscInt r = 0; r < rounds; r++)
+    PetscCall(assembly_round(&w));
   PetscCall(triad_rounds(rounds));
-  for (PetscInt r = 0; r < rounds; r++) PetscCall(matmult_round(&w));
+  for (PetscInt r = 0; r < rounds; r++)
+    PetscCall(matmult_round(&w));
   PetscCall(compare(&w));
   PetscCall(bench_destroy(&w));
   PetscCall(PetscFinalize());

@@ -1,13 +1,16 @@
 /*
-  A complete static run of a clamped bar under its weight: the cost of -solver auto and of single solvers, for docs/reports/solver_choice.md.
+  A complete static run of a clamped bar under its weight: the cost of -solver auto and of single
+  solvers, for docs/reports/solver_choice.md.
 
     choice -cells 30,7,8 -slivers 0.01 -element cr -nu 0.4999 -with " -solver auto"
 
-  -slivers: fraction of the tets with a smallest dihedral angle of -degrees 0.1 (slivers.h). -with: further options; they must begin with
-  a blank, or PETSc takes them for another option. -write PATH: writes the mesh and solves nothing.
+  -slivers: fraction of the tets with a smallest dihedral angle of -degrees 0.1 (slivers.h). -with:
+  further options; they must begin with a blank, or PETSc takes them for another option. -write
+  PATH: writes the mesh and solves nothing.
 
-  Prints the solver and the reason if the run stopped, then `fact NAME VALUE`: tets, slivers, unknowns, newton, linear, rejected, cpu (seconds of set-up and solve on the
-  slower rank, which sleeps while it waits), memory (MB of the larger rank).
+  Prints the solver and the reason if the run stopped, then `fact NAME VALUE`: tets, slivers,
+  unknowns, newton, linear, rejected, cpu (seconds of set-up and solve on the slower rank, which
+  sleeps while it waits), memory (MB of the larger rank).
 */
 #include <sys/resource.h>
 #include "perf.h"
@@ -32,7 +35,8 @@ static PetscErrorCode report(const TestScene *scene, PetscInt made, double secon
   (void)getrusage(RUSAGE_SELF, &use);
   mb = (double)use.ru_maxrss / 1024.;
   PetscCallMPI(MPI_Allreduce(&mb, &most, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "solver %s: %s\n", scene->run->solver, scene->run->solver_reason));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "solver %s: %s\n", scene->run->solver,
+                        scene->run->solver_reason));
   if (scene->run->stop_reason[0])
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "stopped: %s\n", scene->run->stop_reason));
   PetscCall(perf_fact("tets", (double)scene->model->mesh->Ncell));
@@ -49,8 +53,13 @@ static PetscErrorCode report(const TestScene *scene, PetscInt made, double secon
 int main(int argc, char **argv)
 {
   Slivers s = {.n = {30, 7, 8}, .size = {0.4, 0.1, 0.1}, .degrees = 0.1};
-  char path[512], element[64] = "cr", with[1024] = "", keep[512] = "", text[PERF_TEXT];
-  PetscInt three = 3, made = 0;
+  char path[512];
+  char element[64] = "cr";
+  char with[1024] = "";
+  char keep[512] = "";
+  char text[PERF_TEXT];
+  PetscInt three = 3;
+  PetscInt made = 0;
   PetscReal nu = 0.4999;
   TestScene scene;
   PerfClock start;
@@ -74,8 +83,10 @@ int main(int argc, char **argv)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young 1e6 "
-    "-body_a_poisson %.17g -body_a_density 1000 -sets held -set_held_at plane:1,0,0,0 -effects gravity,clamp "
-    "-effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on held -time static %s",
+    "-body_a_poisson %.17g -body_a_density 1000 -sets held -set_held_at plane:1,0,0,0 -effects "
+    "gravity,clamp "
+    "-effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on held -time static "
+    "%s",
     path, element, (double)nu, with));
   PetscCall(perf_read(text, &scene));
   PetscCall(SbModelSetUp(scene.model));

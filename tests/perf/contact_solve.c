@@ -1,8 +1,10 @@
 /*
-  Time of a linear solve with contact: contact_solve -cells 10 [-element p1] [-step 0.01] [-rtol 1e-3] [-rounds 3]
+  Time of a linear solve with contact: contact_solve -cells 10 [-element p1] [-step 0.01] [-rtol
+  1e-3] [-rounds 3]
 
-  Two blocks in barrier contact, whose stiffness is 1, 1e2, 1e4, 1e6 times the diagonal of K + M / step^2. For each, alternately:
-  CPU ms of a two-level solve with new values, and with a new sparsity pattern too, its iterations, and the same of the factorisation.
+  Two blocks in barrier contact, whose stiffness is 1, 1e2, 1e4, 1e6 times the diagonal of K + M /
+  step^2. For each, alternately: CPU ms of a two-level solve with new values, and with a new
+  sparsity pattern too, its iterations, and the same of the factorisation.
 */
 #include "../contact_problem.h"
 #include "perf.h"
@@ -10,8 +12,11 @@
 int main(int argc, char **argv)
 {
   static const char *const ways[] = {"", "direct", "iterative"};
-  char element[16] = "p1", rtol[32] = "1e-3", name[64], set[64];
-  PetscInt cells = 10, rounds = 3;
+  char element[16] = "p1";
+  char rtol[32] = "1e-3";
+  char name[64], set[64];
+  PetscInt cells = 10;
+  PetscInt rounds = 3;
   PetscReal step = 0.01;
 
   PetscFunctionBeginUser;
@@ -43,12 +48,13 @@ int main(int argc, char **argv)
           const PerfClock from = perf_start();
           PerfClock took;
 
-          PetscCall(SbContactSystemSolve(system, p.K, &p.blocks, PETSC_TRUE, p.F, p.Y, &reason, &its));
+          PetscCall(
+            SbContactSystemSolve(system, p.K, &p.blocks, PETSC_TRUE, p.F, p.Y, &reason, &its));
           took = perf_stop(from);
           PetscCheck(reason > 0, PETSC_COMM_WORLD, PETSC_ERR_PLIB, "ratio 1e%d: %s", power,
                      KSPConvergedReasons[reason]);
-          PetscCall(
-            PetscSNPrintf(name, sizeof(name), "%s/1e%d/%s", ways[way], power, again ? "values" : "pattern"));
+          PetscCall(PetscSNPrintf(name, sizeof(name), "%s/1e%d/%s", ways[way], power,
+                                  again ? "values" : "pattern"));
           PetscCall(perf_sample(name, "ms", 1e3 * took.cpu));
         }
         PetscCall(PetscSNPrintf(name, sizeof(name), "%s/1e%d/iterations", ways[way], power));

@@ -1,10 +1,12 @@
 /*
-  Cost of each effect, element, material, integrator, field and other output on one scene, by alternate runs with and without it.
+  Cost of each effect, element, material, integrator, field and other output on one scene, by
+  alternate runs with and without it.
 
     effect_cost -mesh box:0.4,0.1,0.1:8 -rounds 3 -folder DIR [-family effect]
 
-  Output goes to DIR. The scene and the options of each part are in tests/parts.h, which lists them from the registries. Every run has eight
-  steps; the first one, with the set-up of the solver, is excluded. Per round and part:
+  Output goes to DIR. The scene and the options of each part are in tests/parts.h, which lists them
+  from the registries. Every run has eight steps; the first one, with the set-up of the solver, is
+  excluded. Per round and part:
 
     FAMILY/NAME/without   ms of CPU time per step without it
     FAMILY/NAME/with      the same with it
@@ -12,7 +14,8 @@
     FAMILY/NAME/setup     additional bytes in use at the end of the set-up
     FAMILY/NAME/step      additional bytes allocated per step, most of them freed when it ends
 
-  A run without serves up to three parts of the same scene that follow it. Memory of MUMPS, METIS and HDF5 is not included.
+  A run without serves up to three parts of the same scene that follow it. Memory of MUMPS, METIS
+  and HDF5 is not included.
 */
 #include "../parts.h"
 #include "perf.h"
@@ -41,8 +44,10 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
   PetscFunctionBeginUser;
   (void)run;
-  if (cost->event) PetscCall(part_event(cost->event, &count, &seconds));
-  if (step->step > 1 && cost->n < 64) cost->ms[cost->n++] = 1e3 * (now - cost->before);
+  if (cost->event)
+    PetscCall(part_event(cost->event, &count, &seconds));
+  if (step->step > 1 && cost->n < 64)
+    cost->ms[cost->n++] = 1e3 * (now - cost->before);
   if (step->step == 1) {
     cost->bytes = part_allocated.bytes;
     cost->seconds_own = seconds;
@@ -57,7 +62,8 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
 static int ascending(const void *a, const void *b)
 {
-  const double x = *(const double *)a, y = *(const double *)b;
+  const double x = *(const double *)a;
+  const double y = *(const double *)b;
 
   return (x > y) - (x < y);
 }
@@ -81,19 +87,21 @@ static PetscErrorCode run(const char *mesh, const Part *part, PetscBool named, C
     cost->event++;
   else if (named && part->events[0])
     cost->event = part->events;
-  if (!strcmp(part->name, "fields")) cost->event = "SbOut_fields";
+  if (!strcmp(part->name, "fields"))
+    cost->event = "SbOut_fields";
   PetscCall(part_text(mesh, part->scene, named ? part->options : "", text));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(PetscMallocGetCurrentUsage(&before));
   PetscCall(test_scene_open_in(folder, text, &t));
-  if (!tets) tets = t.model->mesh->Ncell;
+  if (!tets)
+    tets = t.model->mesh->Ncell;
   PetscCall(SbRunAddMonitor(t.run, watch, cost));
   PetscCall(PetscMallocGetCurrentUsage(&after));
   cost->setup = after - before;
   PetscCall(SbRunSolve(t.run));
-  PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_PLIB, "%s %s: %s", part->family, part->name,
-             t.run->stop_reason);
+  PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_PLIB, "%s %s: %s", part->family,
+             part->name, t.run->stop_reason);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,8 +121,10 @@ static PetscErrorCode price(const char *mesh, const char *family)
 {
   static char names[PART_NAMES][SB_NAME_MAX];
   char scene[PART_TEXT] = "";
-  PetscInt n, shared = SHARE;
-  Cost without = {.n = 0}, with;
+  PetscInt n;
+  PetscInt shared = SHARE;
+  Cost without = {.n = 0};
+  Cost with;
 
   PetscFunctionBeginUser;
   PetscCall(part_names(family, &n, names));
@@ -136,17 +146,20 @@ static PetscErrorCode price(const char *mesh, const char *family)
     PetscCall(sample(&part, "step", "B", with.step - without.step));
     PetscCall(sample(&part, "without", "ms", median(&without)));
     PetscCall(sample(&part, "with", "ms", median(&with)));
-    if (with.event) PetscCall(sample(&part, "own", "ms", with.own));
+    if (with.event)
+      PetscCall(sample(&part, "own", "ms", with.own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", only[64] = "";
+  char mesh[512] = "box:0.4,0.1,0.1:8";
+  char only[64] = "";
   PetscInt rounds = 3;
 
   PetscFunctionBeginUser;
+
   /* the count of bytes wants PETSc's own malloc; the base scene allocates nothing in its steps */
   (void)setenv("PETSC_OPTIONS", "-malloc_debug", 1);
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
@@ -165,13 +178,18 @@ int main(int argc, char **argv)
 
     /* parts of PETSc are set up by the first run that needs them */
     PetscCall(part_find("element", "p1", &base, &found));
-    if (found) PetscCall(run(mesh, &base, PETSC_FALSE, &first));
+    if (found)
+      PetscCall(run(mesh, &base, PETSC_FALSE, &first));
   }
   for (PetscInt round = 0; round < rounds; round++) {
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++) {
-      if (only[0] && strcmp(only, part_families[k].name)) continue;
-      /* a step of theirs takes longer than those of all others together, and differs by more than rounds do */
-      if (!only[0] && round > 0 && !strcmp(part_families[k].name, "element")) continue;
+      if (only[0] && strcmp(only, part_families[k].name))
+        continue;
+
+      /* a step of theirs takes longer than those of all others together, and differs by more than
+         rounds do */
+      if (!only[0] && round > 0 && !strcmp(part_families[k].name, "element"))
+        continue;
       PetscCall(price(mesh, part_families[k].name));
     }
   }

@@ -1,11 +1,13 @@
 /*
-  Cost of the elements on the same mesh: microseconds per tet of residual and tangent, seconds per million
-  tets to plan and create the matrix, bytes and unknowns per tet.
+  Cost of the elements on the same mesh: microseconds per tet of residual and tangent, seconds per
+  million tets to plan and create the matrix, bytes and unknowns per tet.
 
     elements -element cr -mesh box:0.4,0.1,0.1:8 -rounds 5
 
-  Matrix: symmetric on one rank, blocks on several. The displacement bends and twists the bar. For p2 also the kernel alone: gradients, material and blocks of P1 at
-  the four points, and the 55 blocks of each tet from them, written repeatedly to the same small buffer; without the mean volume.
+  Matrix: symmetric on one rank, blocks on several. The displacement bends and twists the bar. For
+  p2 also the kernel alone: gradients, material and blocks of P1 at the four points, and the 55
+  blocks of each tet from them, written repeatedly to the same small buffer; without the mean
+  volume.
 */
 #include "perf.h"
 
@@ -52,7 +54,8 @@ static void bare_kernel(Case *c, const PetscReal u[])
     for (int k = 0; k < 30 * SB_BATCH; k++)
       U[k / SB_BATCH][k % SB_BATCH] =
         u[3 * node[k / (3 * SB_BATCH) * SB_BATCH + k % SB_BATCH] + k / SB_BATCH % 3];
-    for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
+    for (int l = 0; l < SB_BATCH; l++)
+      W[l] = 0.25 * s->batch_V[b][l];
     for (int q = 0; q < 4; q++) {
       SbPack at[12], F[9], R[9];
 
@@ -73,7 +76,8 @@ static PetscErrorCode measure(Case *c, PetscInt rounds)
   for (PetscInt k = 0; k < rounds; k++) {
     PerfClock start = perf_start();
 
-    for (int i = 0; i < 3; i++) PetscCall(residual(c));
+    for (int i = 0; i < 3; i++)
+      PetscCall(residual(c));
     PetscCall(perf_sample("residual", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
     start = perf_start();
     for (int i = 0; i < 3; i++) {
@@ -81,9 +85,11 @@ static PetscErrorCode measure(Case *c, PetscInt rounds)
       PetscCall(SbSpaceFinishTangent(c->s, c->A));
     }
     PetscCall(perf_sample("tangent", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
-    if (!c->s->edge_node) continue;
+    if (!c->s->edge_node)
+      continue;
     start = perf_start();
-    for (int i = 0; i < 3; i++) bare_kernel(c, c->stage.u);
+    for (int i = 0; i < 3; i++)
+      bare_kernel(c, c->stage.u);
     PetscCall(perf_sample("kernel", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -91,7 +97,9 @@ static PetscErrorCode measure(Case *c, PetscInt rounds)
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", element[64] = "p1", more[256], text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:8";
+  char element[64] = "p1";
+  char more[256], text[PERF_TEXT];
   PetscInt rounds = 5;
   PetscMPIInt size;
   PerfClock start;
@@ -123,10 +131,12 @@ int main(int argc, char **argv)
                         1e6 * perf_stop(start).cpu / (double)c.scene.model->mesh->Ncell));
   PetscCall(measure(&c, rounds));
   PetscCall(MatGetInfo(c.A, MAT_GLOBAL_SUM, &info));
+
   /* a number and, for each block of nine, its column */
+  PetscCall(perf_sample("matrix", "B/tet",
+                        info.nz_used * (8. + 4. / 9.) / (double)c.scene.model->mesh->Ncell));
   PetscCall(
-    perf_sample("matrix", "B/tet", info.nz_used * (8. + 4. / 9.) / (double)c.scene.model->mesh->Ncell));
-  PetscCall(perf_sample("unknowns", "1/tet", 3. * (double)c.s->Nnode / (double)c.scene.model->mesh->Ncell));
+    perf_sample("unknowns", "1/tet", 3. * (double)c.s->Nnode / (double)c.scene.model->mesh->Ncell));
   PetscCall(MatDestroy(&c.A));
   PetscCall(SbSpaceRestoreLocalRead(c.s, c.U, &c.stage.u));
   PetscCall(VecDestroy(&c.U));

@@ -3,8 +3,9 @@
 
     locking -problem cube -n 8 -nu 0.4999 -with " -body_a_element cr -solver cholmod"
 
-  problem: cube, bar, cook, shell, beam, swing, twist, hang, modes. `n` cells across, or a file as -mesh (cook, shell, cube).
-  beam: -mu, Pa. The text after -with must begin with a blank, or PETSc takes it for another option. Prints `fact NAME VALUE`.
+  problem: cube, bar, cook, shell, beam, swing, twist, hang, modes. `n` cells across, or a file as
+  -mesh (cook, shell, cube). beam: -mu, Pa. The text after -with must begin with a blank, or PETSc
+  takes it for another option. Prints `fact NAME VALUE`.
 */
 #include "perf.h"
 #include "../verify/locking.h"
@@ -16,16 +17,21 @@ static PetscErrorCode print(const char *const names, const PetscReal value[])
 
   PetscFunctionBeginUser;
   PetscCall(PetscStrToArray(names, ' ', &n, &name));
-  for (int k = 0; k < n; k++) PetscCall(perf_fact(name[k], (double)value[k]));
+  for (int k = 0; k < n; k++)
+    PetscCall(perf_fact(name[k], (double)value[k]));
   PetscCall(PetscStrToArrayDestroy(n, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  char problem[64] = "cube", mesh[512] = "", with[2048] = "";
+  char problem[64] = "cube";
+  char mesh[512] = "";
+  char with[2048] = "";
   PetscInt n = 4;
-  PetscReal nu = 0.3, mu = 0.5e6, value[12];
+  PetscReal nu = 0.3;
+  PetscReal mu = 0.5e6;
+  PetscReal value[12];
   LockingCost cost = {0};
 
   PetscFunctionBeginUser;
@@ -50,8 +56,9 @@ int main(int argc, char **argv)
 
     PetscCall(PetscMemzero(&e, sizeof(e)));
     PetscCall(locking_shell(mesh, nu, with, &e, &cost));
-    PetscCall(print("u radial hoop wall_radial wall_hoop at_wall",
-                    (const PetscReal[]){e.u, e.stress[0], e.stress[1], e.wall[0], e.wall[1], e.at_wall}));
+    PetscCall(
+      print("u radial hoop wall_radial wall_hoop at_wall",
+            (const PetscReal[]){e.u, e.stress[0], e.stress[1], e.wall[0], e.wall[1], e.at_wall}));
   } else if (!strcmp(problem, "beam")) {
     PetscCall(locking_beam(n, mu, with, value, &cost));
     PetscCall(print("x y", value));
@@ -70,10 +77,12 @@ int main(int argc, char **argv)
   } else {
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER, "-problem %s: there is none of that name", problem);
   }
-  PetscCheck(!sb_test_failed, PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "The run did not reach its end");
-  PetscCall(print("cells unknowns newton linear seconds",
-                  (const PetscReal[]){(PetscReal)cost.cells, (PetscReal)cost.unknowns, (PetscReal)cost.newton,
-                                      (PetscReal)cost.linear, cost.seconds}));
+  PetscCheck(!sb_test_failed, PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED,
+             "The run did not reach its end");
+  PetscCall(
+    print("cells unknowns newton linear seconds",
+          (const PetscReal[]){(PetscReal)cost.cells, (PetscReal)cost.unknowns,
+                              (PetscReal)cost.newton, (PetscReal)cost.linear, cost.seconds}));
   PetscCall(PetscFinalize());
   return 0;
 }

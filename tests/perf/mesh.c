@@ -4,11 +4,13 @@
     mesh -mesh big.msh
     mesh -mesh big.h5 -slabs      (all ranks read)
 
-  Seconds are wall time, and as NAME_cpu the largest CPU time of a rank (including waiting for messages).
+  Seconds are wall time, and as NAME_cpu the largest CPU time of a rank (including waiting for
+  messages).
 
-  read: the file to arrays on rank 0; read_and_check: with the checks of a run, all bodies in the merged mesh; distribute: partition and
-  migration; number: local numbering. Memory is the largest resident size within a phase (VmHWM, reset before it), of rank 0
-  and of the largest other rank, less that of the process at its start. One run per process: freed pages may remain.
+  read: the file to arrays on rank 0; read_and_check: with the checks of a run, all bodies in the
+  merged mesh; distribute: partition and migration; number: local numbering. Memory is the largest
+  resident size within a phase (VmHWM, reset before it), of rank 0 and of the largest other rank,
+  less that of the process at its start. One run per process: freed pages may remain.
 */
 #include "perf.h"
 #include <sbsurface.h>
@@ -22,8 +24,10 @@ static double status(const char *name)
   double kib = 0.;
 
   while (file && fgets(line, sizeof(line), file))
-    if (!strncmp(line, name, strlen(name))) kib = strtod(line + strlen(name) + 1, NULL);
-  if (file) (void)fclose(file);
+    if (!strncmp(line, name, strlen(name)))
+      kib = strtod(line + strlen(name) + 1, NULL);
+  if (file)
+    (void)fclose(file);
   return kib / 1024;
 }
 
@@ -32,7 +36,8 @@ static void forget_peak(void)
 {
   FILE *file = fopen("/proc/self/clear_refs", "w");
 
-  if (!file) return;
+  if (!file)
+    return;
   (void)fputs("5", file);
   (void)fclose(file);
 }
@@ -51,7 +56,8 @@ static void phase_begin(Phase *p)
 static PetscErrorCode phase_end(Phase *p, const char *name)
 {
   const PerfClock taken = perf_stop(p->start);
-  double mine[2] = {0., 0.}, all[2];
+  double mine[2] = {0., 0.};
+  double all[2];
   char label[64];
   PetscMPIInt rank, size;
 
@@ -60,14 +66,16 @@ static PetscErrorCode phase_end(Phase *p, const char *name)
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   mine[rank > 0] = status("VmHWM:") - p->base;
   PetscCallMPI(MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
-  for (int k = 0; k < 2; k++) p->most[k] = PetscMax(p->most[k], all[k]);
+  for (int k = 0; k < 2; k++)
+    p->most[k] = PetscMax(p->most[k], all[k]);
   PetscCall(perf_sample(name, "s", taken.wall));
   (void)snprintf(label, sizeof(label), "%s_cpu", name);
   PetscCall(perf_sample(label, "s", taken.cpu));
   (void)snprintf(label, sizeof(label), "%s_rank0", name);
   PetscCall(perf_sample(label, "MiB", all[0]));
   (void)snprintf(label, sizeof(label), "%s_others", name);
-  if (size > 1) PetscCall(perf_sample(label, "MiB", all[1]));
+  if (size > 1)
+    PetscCall(perf_sample(label, "MiB", all[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,7 +86,8 @@ static PetscErrorCode read_only(const SbBody *body)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCall(SbImportRead(body, &im));
+  if (!rank)
+    PetscCall(SbImportRead(body, &im));
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,13 @@
 /*
-  Set-up seconds per million tets, by phase: reading (or generating) and checking the mesh, distributing and numbering it, the
-  space, the assembly plan, the matrices; compared with DMCreateMatrix() on a DMPlex of the same tets.
+  Set-up seconds per million tets, by phase: reading (or generating) and checking the mesh,
+  distributing and numbering it, the space, the assembly plan, the matrices; compared with
+  DMCreateMatrix() on a DMPlex of the same tets.
 
     setup -mesh box:0.4,0.1,0.1:8 -rounds 3
 
-  The phases of the mesh are timed by PETSc's log events; the matrices are timed here. The plan is made with the
-  first matrix of a space: the difference to a second one of the same kind (SBAIJ, on several ranks BAIJ) is its time.
+  The phases of the mesh are timed by PETSc's log events; the matrices are timed here. The plan is
+  made with the first matrix of a space: the difference to a second one of the same kind (SBAIJ, on
+  several ranks BAIJ) is its time.
 */
 #include "perf.h"
 #include <sblog.h>
@@ -15,7 +17,8 @@ static double event_seconds(SbEvent e)
 {
   PetscEventPerfInfo info;
 
-  if (PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[e], &info)) return 0.;
+  if (PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[e], &info))
+    return 0.;
   return info.time;
 }
 
@@ -34,7 +37,8 @@ static PetscErrorCode dm_matrix(SbMesh mesh, PerfClock *seconds)
   PetscCall(DMPlexGetDepthStratum(dm, 0, &vStart, &vEnd));
   PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, &section));
   PetscCall(PetscSectionSetChart(section, pStart, pEnd));
-  for (PetscInt v = vStart; v < vEnd; v++) PetscCall(PetscSectionSetDof(section, v, 3));
+  for (PetscInt v = vStart; v < vEnd; v++)
+    PetscCall(PetscSectionSetDof(section, v, 3));
   PetscCall(PetscSectionSetUp(section));
   PetscCall(DMSetLocalSection(dm, section));
   PetscCall(PetscSectionDestroy(&section));
@@ -63,23 +67,30 @@ static PetscErrorCode own_matrix(SbSpace s, SbMatrixKind kind, PerfClock *second
 /* Mesh and space of the scene, by events. */
 static PetscErrorCode make_model(SbModel m, double *per_million)
 {
-  static const SbEvent events[3] = {SB_EVENT_MESH_READ, SB_EVENT_MESH_DISTRIBUTE, SB_EVENT_SPACE_SETUP};
+  static const SbEvent events[3] = {SB_EVENT_MESH_READ, SB_EVENT_MESH_DISTRIBUTE,
+                                    SB_EVENT_SPACE_SETUP};
   static const char *const names[3] = {"read", "distribute", "space"};
   double seconds[3];
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) seconds[k] = event_seconds(events[k]);
+  for (int k = 0; k < 3; k++)
+    seconds[k] = event_seconds(events[k]);
   PetscCall(SbModelSetUp(m));
   *per_million = 1e6 / (double)m->mesh->Ncell;
-  for (int k = 0; k < 3; k++) seconds[k] = event_seconds(events[k]) - seconds[k];
+  for (int k = 0; k < 3; k++)
+    seconds[k] = event_seconds(events[k]) - seconds[k];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, seconds, 3, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
-  for (int k = 0; k < 3; k++) PetscCall(perf_sample(names[k], "s/Mtet", *per_million * seconds[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(perf_sample(names[k], "s/Mtet", *per_million * seconds[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode matrices(SbModel m, double per_million)
 {
-  PerfClock first = {0., 0.}, second = first, aij = first, dm = first;
+  PerfClock first = {0., 0.};
+  PerfClock second = first;
+  PerfClock aij = first;
+  PerfClock dm = first;
   SbMatrixKind kind;
   PetscMPIInt size;
 
@@ -99,7 +110,8 @@ static PetscErrorCode matrices(SbModel m, double per_million)
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:8";
+  char text[PERF_TEXT];
   PetscInt rounds = 3;
   double per_million = 0.;
 
@@ -115,8 +127,10 @@ int main(int argc, char **argv)
     PetscCall(perf_read(text, &t));
     PetscCall(make_model(t.model, &per_million));
     PetscCall(matrices(t.model, per_million));
-    if (!r) PetscCall(perf_fact("tets", 1e6 / per_million));
-    if (!r) PetscCall(perf_fact("nodes", (double)t.model->space->Nnode));
+    if (!r)
+      PetscCall(perf_fact("tets", 1e6 / per_million));
+    if (!r)
+      PetscCall(perf_fact("nodes", (double)t.model->space->Nnode));
     PetscCall(test_scene_close(&t));
   }
   PetscCall(PetscFinalize());

@@ -1,6 +1,7 @@
 /*
-  Time of a static solve: the bar of 200,000 tets (perf.h) under gravity, linear material, relative residual 1e-8: the residual,
-  the tangent, the set-up of the preconditioner and the iterations, on the ranks of the program.
+  Time of a static solve: the bar of 200,000 tets (perf.h) under gravity, linear material, relative
+  residual 1e-8: the residual, the tangent, the set-up of the preconditioner and the iterations, on
+  the ranks of the program.
 
     solve -mesh box:0.4,0.1,0.1:20 -solver auto -rounds 3
 */
@@ -8,7 +9,9 @@
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:20", solver[64] = "auto", text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:20";
+  char solver[64] = "auto";
+  char text[PERF_TEXT];
   PetscInt rounds = 3;
 
   PetscFunctionBeginUser;
@@ -22,7 +25,8 @@ int main(int argc, char **argv)
 
     PetscCall(PetscSNPrintf(
       text, sizeof(text),
-      "-bodies bar -body_bar_mesh %s -body_bar_material linear -body_bar_young 5e5 -body_bar_poisson 0.3 "
+      "-bodies bar -body_bar_mesh %s -body_bar_material linear -body_bar_young 5e5 "
+      "-body_bar_poisson 0.3 "
       "-sets end -set_end_at plane:1,0,0,0 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
       "-effect_clamp_type fixed -effect_clamp_on end -time static -ksp_rtol 1e-8 -solver %s",
       mesh, solver));
@@ -30,12 +34,16 @@ int main(int argc, char **argv)
     start = perf_start();
     PetscCall(SbRunSolve(t.run));
     used = perf_stop(start);
-    PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s", t.run->stop_reason);
+    PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s",
+               t.run->stop_reason);
     PetscCall(perf_sample("solve_wall", "s", used.wall));
     PetscCall(perf_sample("solve_cpu", "s", used.cpu));
     PetscCall(perf_sample("solve_iterations", "1", (double)t.run->linear_total));
-    if (!r) PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
-    if (!r) PetscCall(PetscPrintf(PETSC_COMM_WORLD, "note %s: %s\n", t.run->solver, t.run->solver_reason));
+    if (!r)
+      PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
+    if (!r)
+      PetscCall(
+        PetscPrintf(PETSC_COMM_WORLD, "note %s: %s\n", t.run->solver, t.run->solver_reason));
     PetscCall(test_scene_close(&t));
   }
   PetscCall(PetscFinalize());

@@ -1,19 +1,24 @@
 /*
-  One linear solve of a nearly incompressible body, for scripts/solvers: cost and convergence of a solver.
+  One linear solve of a nearly incompressible body, for scripts/solvers: cost and convergence of a
+  solver.
 
-    solvers -mesh box:0.4,0.1,0.1:6 -hold plane:1,0,0,0 -element cr -nu 0.4999 -with " -solver pressure"
+    solvers -mesh box:0.4,0.1,0.1:6 -hold plane:1,0,0,0 -element cr -nu 0.4999 -with " -solver
+    pressure"
 
-  A body under its weight, clamped at the set -hold, small strains, relative residual 1e-8. -with: further options, which must begin with
-  a blank, or PETSc takes them for another option. -plain: algebraic multigrid without the rigid-body modes.
-  -star: on the matrix of -solver cg_gamg, additive Schwarz with one block per vertex, all nodes of the faces at
-  the vertex, and P1 as a coarse space, both solved exactly. P1 is the Galerkin product: a CR or DG function that is P1 has on a
-  face the mean of its three vertices. Schoeberl (1999), Multigrid methods for a parameter dependent problem in primal variables:
-  such blocks contain the local divergence-free functions, which a smoother needs for nu near 1/2.
+  A body under its weight, clamped at the set -hold, small strains, relative residual 1e-8. -with:
+  further options, which must begin with a blank, or PETSc takes them for another option. -plain:
+  algebraic multigrid without the rigid-body modes. -star: on the matrix of -solver cg_gamg,
+  additive Schwarz with one block per vertex, all nodes of the faces at the vertex, and P1 as a
+  coarse space, both solved exactly. P1 is the Galerkin product: a CR or DG function that is P1 has
+  on a face the mean of its three vertices. Schoeberl (1999), Multigrid methods for a parameter
+  dependent problem in primal variables: such blocks contain the local divergence-free functions,
+  which a smoother needs for nu near 1/2.
 
-  Prints `fact NAME VALUE`: tets, unknowns, iterations, reason (PETSc's KSPConvergedReason, negative: failure),
-  residual (|b - K x| / |b|, recomputed), simpler (1: the fine level of cg_two_level is the diagonal), setup and
-  solve (CPU seconds of the slower rank), memory (MB of the larger rank). Set-up: plan, matrices, tangent, preconditioner. A rank that
-  waits for another one sleeps, so that its CPU time does not include waiting on a busy machine. After -limit CPU seconds
+  Prints `fact NAME VALUE`: tets, unknowns, iterations, reason (PETSc's KSPConvergedReason,
+  negative: failure), residual (|b - K x| / |b|, recomputed), simpler (1: the fine level of
+  cg_two_level is the diagonal), setup and solve (CPU seconds of the slower rank), memory (MB of the
+  larger rank). Set-up: plan, matrices, tangent, preconditioner. A rank that waits for another one
+  sleeps, so that its CPU time does not include waiting on a busy machine. After -limit CPU seconds
   of a rank it prints `fact late` and exits with a non-zero code.
 */
 #ifdef __linux__
@@ -39,7 +44,8 @@ int sched_yield(void)
 
 static int by_number(const void *a, const void *b)
 {
-  const PetscInt x = *(const PetscInt *)a, y = *(const PetscInt *)b;
+  const PetscInt x = *(const PetscInt *)a;
+  const PetscInt y = *(const PetscInt *)b;
 
   return (x > y) - (x < y);
 }
@@ -51,15 +57,18 @@ static PetscInt sort_unique(PetscInt n, PetscInt x[])
 
   qsort(x, (size_t)n, sizeof(*x), by_number);
   for (PetscInt k = 0; k < n; k++)
-    if (!k || x[k] != x[k - 1]) x[left++] = x[k];
+    if (!k || x[k] != x[k - 1])
+      x[left++] = x[k];
   return left;
 }
 
-/* Global nodes of the faces that contain each owned vertex: from start[v] to start[v + 1], some twice; PetscFree() both. */
+/* Global nodes of the faces that contain each owned vertex: from start[v] to start[v + 1], some
+   twice; PetscFree() both. */
 static PetscErrorCode list_stars(SbSpace s, PetscInt **start, PetscInt **node)
 {
   const SbMesh mesh = s->mesh;
-  PetscInt *at, *list, sum = 0;
+  PetscInt *at, *list;
+  PetscInt sum = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(mesh->nvert_owned + 1, &at));
@@ -74,18 +83,23 @@ static PetscErrorCode list_stars(SbSpace s, PetscInt **start, PetscInt **node)
   }
   PetscCall(PetscMalloc1(sum, &list));
   for (PetscInt k = 0; k < 4 * mesh->ncell; k++) {
-    const PetscInt v = mesh->cell[k], a = k % 4;
+    const PetscInt v = mesh->cell[k];
+    const PetscInt a = k % 4;
 
-    if (v >= mesh->nvert_owned) continue;
+    if (v >= mesh->nvert_owned)
+      continue;
     for (PetscInt f = 0; f < 4; f++) {
-      const PetscInt slot = k - a + f, support = s->dirichlet_node ? s->dirichlet_node[slot] : -1;
+      const PetscInt slot = k - a + f;
+      const PetscInt support = s->dirichlet_node ? s->dirichlet_node[slot] : -1;
 
-      if (f == a) continue;
+      if (f == a)
+        continue;
       list[at[v]++] = s->gnode[s->cell_node[slot]];
       list[at[v]++] = s->gnode[support < 0 ? s->cell_node[slot] : support];
     }
   }
-  for (PetscInt v = mesh->nvert_owned; v > 0; v--) at[v] = at[v - 1];
+  for (PetscInt v = mesh->nvert_owned; v > 0; v--)
+    at[v] = at[v - 1];
   at[0] = 0;
   *start = at;
   *node = list;
@@ -105,10 +119,13 @@ typedef struct {
 /* Replaces global nodes by their places among all that occur; these, as unknowns. */
 static PetscErrorCode number_stars(Stars *t, IS *all)
 {
-  PetscInt *list, n = 0, total = 0;
+  PetscInt *list;
+  PetscInt n = 0;
+  PetscInt total = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt v = 0; v < t->n; v++) total += t->length[v];
+  for (PetscInt v = 0; v < t->n; v++)
+    total += t->length[v];
   PetscCall(PetscMalloc1(total, &list));
   for (PetscInt v = 0; v < t->n; v++) {
     PetscCall(PetscArraycpy(list + n, t->node + t->start[v], t->length[v]));
@@ -125,10 +142,12 @@ static PetscErrorCode number_stars(Stars *t, IS *all)
 
 static PetscErrorCode factor_stars(Stars *t, Mat A)
 {
-  PetscInt most = 0, *row;
+  PetscInt most = 0;
+  PetscInt *row;
 
   PetscFunctionBeginUser;
-  for (PetscInt v = 0; v < t->n; v++) most = PetscMax(most, 3 * t->length[v]);
+  for (PetscInt v = 0; v < t->n; v++)
+    most = PetscMax(most, 3 * t->length[v]);
   PetscCall(PetscMalloc1(most, &t->work));
   PetscCall(PetscMalloc1(most, &row));
   PetscCall(PetscMalloc1(t->n, &t->factor));
@@ -136,7 +155,8 @@ static PetscErrorCode factor_stars(Stars *t, Mat A)
     const PetscInt n = 3 * t->length[v];
     PetscBLASInt size, info;
 
-    for (PetscInt k = 0; k < n; k++) row[k] = 3 * t->node[t->start[v] + k / 3] + k % 3;
+    for (PetscInt k = 0; k < n; k++)
+      row[k] = 3 * t->node[t->start[v] + k / 3] + k % 3;
     PetscCall(PetscMalloc1((size_t)n * (size_t)n, &t->factor[v]));
     PetscCall(MatGetValues(A, n, row, n, row, t->factor[v]));
     PetscCall(PetscBLASIntCast(n, &size));
@@ -168,9 +188,11 @@ static PetscErrorCode PCApply_Stars(PC pc, Vec r, Vec z)
     const PetscBLASInt n = (PetscBLASInt)(3 * t->length[v]);
     PetscBLASInt info;
 
-    for (PetscInt k = 0; k < n; k++) t->work[k] = x[3 * node[k / 3] + k % 3];
+    for (PetscInt k = 0; k < n; k++)
+      t->work[k] = x[3 * node[k / 3] + k % 3];
     LAPACKpotrs_("L", &n, &one, t->factor[v], &n, t->work, &n, &info);
-    for (PetscInt k = 0; k < n; k++) y[3 * node[k / 3] + k % 3] += t->work[k];
+    for (PetscInt k = 0; k < n; k++)
+      y[3 * node[k / 3] + k % 3] += t->work[k];
   }
   PetscCall(VecRestoreArray(sum, &y));
   PetscCall(VecRestoreArrayRead(t->local, &x));
@@ -187,7 +209,8 @@ static PetscErrorCode PCDestroy_Stars(PC pc)
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &t));
-  for (PetscInt v = 0; v < t->n; v++) PetscCall(PetscFree(t->factor[v]));
+  for (PetscInt v = 0; v < t->n; v++)
+    PetscCall(PetscFree(t->factor[v]));
   PetscCall(PetscFree(t->factor));
   PetscCall(PetscFree(t->work));
   PetscCall(PetscFree(t->start));
@@ -199,7 +222,8 @@ static PetscErrorCode PCDestroy_Stars(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PCASM with as many blocks takes the matrix apart in hundreds of rounds of messages; here it is one. */
+/* PCASM with as many blocks takes the matrix apart in hundreds of rounds of messages; here it is
+   one. */
 static PetscErrorCode set_stars(SbSpace s, Mat K, PC pc)
 {
   Mat *around;
@@ -239,14 +263,19 @@ static PetscErrorCode create_interpolation(SbSpace s, Mat *P)
                          PETSC_DETERMINE, 3, NULL, 3, NULL, P));
   PetscCall(MatSetBlockSizes(*P, 3, 3));
   for (PetscInt slot = 0; slot < 4 * mesh->ncell; slot++) {
-    const PetscInt i = s->cell_node[slot], *vertex = mesh->cell + slot - slot % 4;
+    const PetscInt i = s->cell_node[slot];
+    const PetscInt *vertex = mesh->cell + slot - slot % 4;
 
-    if (i >= s->nnode_owned) continue;
+    if (i >= s->nnode_owned)
+      continue;
     for (PetscInt k = 0; k < 9; k++) {
-      const PetscInt v = vertex[(slot + 1 + k / 3) % 4], c = k % 3;
+      const PetscInt v = vertex[(slot + 1 + k / 3) % 4];
+      const PetscInt c = k % 3;
 
-      if (s->fixed[i] & (1 << c)) continue;
-      PetscCall(MatSetValue(*P, 3 * s->gnode[i] + c, 3 * mesh->gvert[v] + c, 1. / 3., INSERT_VALUES));
+      if (s->fixed[i] & (1 << c))
+        continue;
+      PetscCall(
+        MatSetValue(*P, 3 * s->gnode[i] + c, 3 * mesh->gvert[v] + c, 1. / 3., INSERT_VALUES));
     }
   }
   PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
@@ -315,13 +344,16 @@ static PetscErrorCode set_up(Case *c, KSP *ksp)
   PetscCall(SNESComputeFunction(run->snes, U, c->b));
   PetscCall(VecScale(c->b, -1.));
   PetscCall(SNESComputeJacobian(run->snes, U, run->J, run->J));
-  if (c->plain) PetscCall(MatSetNearNullSpace(run->J, NULL));
+  if (c->plain)
+    PetscCall(MatSetNearNullSpace(run->J, NULL));
   PetscCall(KSPSetOperators(*ksp, run->J, run->J));
   PetscCall(KSPGetPC(*ksp, &pc));
-  if (c->star) PetscCall(set_star_preconditioner(c->scene.model->space, run->J, pc));
+  if (c->star)
+    PetscCall(set_star_preconditioner(c->scene.model->space, run->J, pc));
   PetscCall(KSPSetUp(*ksp));
   PetscCall(KSPSetUpOnBlocks(*ksp));
-  if (c->star) PetscCall(PCApply(pc, c->b, c->x)); /* PCCOMPOSITE sets its parts up when they are needed */
+  if (c->star)
+    PetscCall(PCApply(pc, c->b, c->x)); /* PCCOMPOSITE sets its parts up when they are needed */
   PetscCall(VecZeroEntries(c->x));
   PetscCall(VecDestroy(&U));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -369,12 +401,15 @@ static PetscErrorCode report(Case *c, KSP ksp)
 /* Ends the program after *ctx CPU seconds of some rank. */
 static PetscErrorCode watch(KSP ksp, PetscInt it, PetscReal norm, void *ctx)
 {
-  double used = perf_seconds(CLOCK_PROCESS_CPUTIME_ID), most;
+  double used = perf_seconds(CLOCK_PROCESS_CPUTIME_ID);
+  double most;
 
   PetscFunctionBeginUser;
   (void)norm;
-  if (it % 10) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Allreduce(&used, &most, 1, MPI_DOUBLE, MPI_MAX, PetscObjectComm((PetscObject)ksp)));
+  if (it % 10)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(
+    MPI_Allreduce(&used, &most, 1, MPI_DOUBLE, MPI_MAX, PetscObjectComm((PetscObject)ksp)));
   if (most > *(PetscReal *)ctx) {
     PetscCall(perf_fact("late", most));
     (void)fflush(stdout);
@@ -386,9 +421,13 @@ static PetscErrorCode watch(KSP ksp, PetscInt it, PetscReal norm, void *ctx)
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:6", hold[256] = "plane:1,0,0,0", element[64] = "cr", with[1024] = "",
-       text[PERF_TEXT];
-  PetscReal nu = 0.4999, limit = 1e9;
+  char mesh[512] = "box:0.4,0.1,0.1:6";
+  char hold[256] = "plane:1,0,0,0";
+  char element[64] = "cr";
+  char with[1024] = "";
+  char text[PERF_TEXT];
+  PetscReal nu = 0.4999;
+  PetscReal limit = 1e9;
   PerfClock start;
   Case c = {0};
   KSP ksp;
@@ -406,12 +445,13 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-limit", &limit, NULL));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-star", &c.star));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-plain", &c.plain));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear "
-                          "-body_a_young 1e6 -body_a_poisson %.17g -body_a_density 1000 -sets held "
-                          "-set_held_at %s -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
-                          "-effect_clamp_type fixed -effect_clamp_on held -time static -ksp_rtol 1e-8 %s",
-                          mesh, element, (double)nu, hold, with));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear "
+                  "-body_a_young 1e6 -body_a_poisson %.17g -body_a_density 1000 -sets held "
+                  "-set_held_at %s -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+                  "-effect_clamp_type fixed -effect_clamp_on held -time static -ksp_rtol 1e-8 %s",
+                  mesh, element, (double)nu, hold, with));
   PetscCall(perf_read(text, &c.scene));
   PetscCall(SbModelSetUp(c.scene.model));
   start = perf_start();

@@ -1,10 +1,12 @@
 /*
-  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output; -mesh and -hold select another body.
+  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output; -mesh
+  and -hold select another body.
 
     swing -mesh box:0.4,0.1,0.1:8 -solver realtime -element p1 -steps 120 -seconds 10
 
-  The bar is released at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after -seconds. The first
-  step is reported separately: it includes the set-up of the solver. Iterations are those of CG.
+  The bar is released at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after
+  -seconds. The first step is reported separately: it includes the set-up of the solver. Iterations
+  are those of CG.
 */
 #include "sbsolver.h"
 #include "perf.h"
@@ -20,7 +22,8 @@ static PetscErrorCode tell_work(SNES snes)
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(test_pc_number(pc, "interface of ", &nface));
-  if (nface < 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  if (nface < 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(test_pc_number(pc, "at most ", &most));
   PetscCall(test_pc_number(pc, "reads ", &all));
   PetscCall(perf_fact("interface_nodes", nface));
@@ -39,21 +42,27 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   double wall = step->wall;
 
   PetscFunctionBeginUser;
+
   /* all ranks must agree on the end */
   PetscCallMPI(MPI_Bcast(&wall, 1, MPI_DOUBLE, 0, PETSC_COMM_WORLD));
   if (step->step > 0) {
     PetscCall(perf_sample(step->step == 1 ? "first_step" : "step", "ms", 1e3 * (wall - w->before)));
-    if (step->step > 1) PetscCall(perf_sample("iterations", "1", (double)step->linear));
+    if (step->step > 1)
+      PetscCall(perf_sample("iterations", "1", (double)step->linear));
   }
-  if (wall > w->limit) PetscCall(TSSetConvergedReason(run->ts, TS_CONVERGED_USER));
+  if (wall > w->limit)
+    PetscCall(TSSetConvergedReason(run->ts, TS_CONVERGED_USER));
   w->before = wall;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", element[64] = "p1",
-       hold[256] = "plane:1,0,0,0", more[512], text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:8";
+  char solver[64] = "cg_icc";
+  char element[64] = "p1";
+  char hold[256] = "plane:1,0,0,0";
+  char more[512], text[PERF_TEXT];
   PetscInt steps = 120;
   PetscReal seconds = 10.;
   Watch w = {0., 0.};
@@ -80,8 +89,8 @@ int main(int argc, char **argv)
   PetscCall(SbRunAddMonitor(t.run, watch, &w));
   start = perf_start();
   PetscCall(SbRunSolve(t.run));
-  PetscCall(
-    perf_fact("cpu_per_step_ms", 1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->steps_total, 1)));
+  PetscCall(perf_fact("cpu_per_step_ms",
+                      1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->steps_total, 1)));
   PetscCall(TSGetSNES(t.run->ts, &snes));
   PetscCall(tell_work(snes));
   if (t.run->stop_reason[0])

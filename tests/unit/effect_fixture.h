@@ -1,12 +1,13 @@
 /*
-  effect_fixture.h - a small scene for the tests of effects: boxes, sets, the space; and comparison functions.
+  effect_fixture.h - a small scene for the tests of effects: boxes, sets, the space; and comparison
+  functions.
 
   The unit box "block" is box:1,1,1:2, or a mesh given by the test. Materials come from the options
-  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on PETSC_COMM_SELF
-  next to the parallel one: their fields are compared by original node number.
+  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on
+  PETSC_COMM_SELF next to the parallel one: their fields are compared by original node number.
 
-  fixture_use() sets the element of the next scenes, and whether their first set is constrained: then DG faces
-  in it have supports.
+  fixture_use() sets the element of the next scenes, and whether their first set is constrained:
+  then DG faces in it have supports.
 */
 #pragma once
 #include "test.h"
@@ -58,9 +59,10 @@ static inline PetscErrorCode fixture_register(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scene of bodies "block" and "other" (at a distance of 3 m along x), and the sets given as "name shape" texts. */
-static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const char *mesh, PetscInt nset,
-                                            const char *const sets[][2], Fixture *x)
+/* Scene of bodies "block" and "other" (at a distance of 3 m along x), and the sets given as "name
+   shape" texts. */
+static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const char *mesh,
+                                            PetscInt nset, const char *const sets[][2], Fixture *x)
 {
   static const char *const names[] = {"block", "other"};
 
@@ -84,8 +86,8 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
     body->translate[0] = 3 * (PetscReal)b;
     body->density = DENSITY;
     PetscCall(PetscSNPrintf(options, sizeof(options),
-                            "-body_%s_young 1e5 -body_%s_poisson 0.3 -body_%s_density %g", names[b], names[b],
-                            names[b], DENSITY));
+                            "-body_%s_young 1e5 -body_%s_poisson 0.3 -body_%s_density %g", names[b],
+                            names[b], names[b], DENSITY));
     PetscCall(PetscOptionsInsertString(NULL, options));
     SbScopeSet(&scope, "body", "linear", names[b]);
     PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
@@ -121,12 +123,14 @@ static inline PetscErrorCode fixture_destroy(Fixture *x)
 }
 
 /* Creates an effect from options and sets it up. */
-static inline PetscErrorCode effect_create(Fixture *x, const char *name, const char *options, SbEffect *e)
+static inline PetscErrorCode effect_create(Fixture *x, const char *name, const char *options,
+                                           SbEffect *e)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbEffectCreate(name, e));
-  if ((*e)->ops.setup) PetscCall((*(*e)->ops.setup)(*e, x->space));
+  if ((*e)->ops.setup)
+    PetscCall((*(*e)->ops.setup)(*e, x->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,14 +145,17 @@ static inline PetscErrorCode effect_force(Fixture *x, SbEffect e, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Total force F, N, and moment M about the origin at the current positions, N m: owned nodes of all ranks. */
+/* Total force F, N, and moment M about the origin at the current positions, N m: owned nodes of all
+   ranks. */
 static inline PetscErrorCode resultant(const Fixture *x, PetscReal F[3], PetscReal M[3])
 {
   PetscReal sum[6] = {0};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
-    const PetscReal *X = &x->space->node_x[3 * i], *u = &x->u[3 * i], *f = &x->f[3 * i];
+    const PetscReal *X = &x->space->node_x[3 * i];
+    const PetscReal *u = &x->u[3 * i];
+    const PetscReal *f = &x->f[3 * i];
     const PetscReal p[3] = {X[0] + u[0], X[1] + u[1], X[2] + u[2]};
 
     for (int c = 0; c < 3; c++) {
@@ -161,9 +168,11 @@ static inline PetscErrorCode resultant(const Fixture *x, PetscReal F[3], PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks force and moment against exact values; `scale` is the size of the single contributions, N. */
-static inline PetscErrorCode check_resultant(const Fixture *x, const PetscReal F[3], const PetscReal M[3],
-                                             PetscReal scale, const char *what)
+/* Checks force and moment against exact values; `scale` is the size of the single contributions,
+   N. */
+static inline PetscErrorCode check_resultant(const Fixture *x, const PetscReal F[3],
+                                             const PetscReal M[3], PetscReal scale,
+                                             const char *what)
 {
   PetscReal sum[3], moment[3];
 
@@ -177,15 +186,17 @@ static inline PetscErrorCode check_resultant(const Fixture *x, const PetscReal F
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned part of `parallel` (f of a scene on all ranks) equals that of the same scene on one rank. */
-static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture *serial, PetscReal scale,
-                                          const char *what)
+/* The owned part of `parallel` (f of a scene on all ranks) equals that of the same scene on one
+   rank. */
+static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture *serial,
+                                          PetscReal scale, const char *what)
 {
   PetscInt *where;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(serial->mesh->Nvert + 14 * serial->mesh->Ncell, &where));
-  for (PetscInt i = 0; i < serial->space->nnode; i++) where[serial->space->node_orig[i]] = i;
+  for (PetscInt i = 0; i < serial->space->nnode; i++)
+    where[serial->space->node_orig[i]] = i;
   for (PetscInt i = 0; i < parallel->space->nnode_owned; i++) {
     const PetscInt j = where[parallel->space->node_orig[i]];
 
@@ -196,7 +207,8 @@ static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A smooth displacement that bends, twists and stretches, m; amplitude 1 gives strains of about a half. */
+/* A smooth displacement that bends, twists and stretches, m; amplitude 1 gives strains of about a
+   half. */
 static inline void deform(Fixture *x, PetscReal amplitude)
 {
   for (PetscInt i = 0; i < x->space->nnode; i++) {
@@ -213,8 +225,8 @@ typedef struct {
   Fixture all, alone;
 } FixturePair;
 
-static inline PetscErrorCode fixture_pair_create(PetscInt nbody, PetscInt nset, const char *const sets[][2],
-                                                 FixturePair *p)
+static inline PetscErrorCode fixture_pair_create(PetscInt nbody, PetscInt nset,
+                                                 const char *const sets[][2], FixturePair *p)
 {
   PetscFunctionBeginUser;
   PetscCall(fixture_create(PETSC_COMM_WORLD, nbody, "box:1,1,1:2", nset, sets, &p->all));
@@ -239,7 +251,8 @@ typedef struct {
   PetscReal amplitude; /* of the displacement at which it acts: a dead load does not follow it */
 } LoadCase;
 
-/* Dead loads: linear, steady or not, their force and moment, the same at each node on any number of ranks; also after other times. */
+/* Dead loads: linear, steady or not, their force and moment, the same at each node on any number of
+   ranks; also after other times. */
 static inline PetscErrorCode check_loads(FixturePair *p, size_t n, const LoadCase cases[])
 {
   PetscFunctionBeginUser;
@@ -248,8 +261,8 @@ static inline PetscErrorCode check_loads(FixturePair *p, size_t n, const LoadCas
 
     PetscCall(effect_create(&p->all, c->name, c->options, &e));
     PetscCall(effect_create(&p->alone, c->name, "", &alone));
-    SB_CHECK(e->linear && e->steady == c->steady && !e->ops.tangent, "%s: linear %d, steady %d", c->options,
-             e->linear, e->steady);
+    SB_CHECK(e->linear && e->steady == c->steady && !e->ops.tangent, "%s: linear %d, steady %d",
+             c->options, e->linear, e->steady);
     PetscCall(effect_force(&p->all, e, c->t + 0.25));
     PetscCall(effect_force(&p->all, e, c->t));
     PetscCall(effect_force(&p->alone, alone, c->t));

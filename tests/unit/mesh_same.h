@@ -1,5 +1,6 @@
 /*
-  mesh_same.h - comparison of two meshes in memory: vertices, simplices of every dimension, and their groups.
+  mesh_same.h - comparison of two meshes in memory: vertices, simplices of every dimension, and
+  their groups.
 */
 #pragma once
 #include "../file.h"
@@ -11,7 +12,8 @@ static char test_folder[512];
 static inline PetscErrorCode test_path_of_all(const char *name, char path[512])
 {
   PetscFunctionBeginUser;
-  if (!test_folder[0]) PetscCall(test_file_folder(test_folder));
+  if (!test_folder[0])
+    PetscCall(test_file_folder(test_folder));
   PetscCall(PetscSNPrintf(path, 512, "%s/%s", test_folder, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -44,7 +46,8 @@ static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport
   body.mesh_step = step;
   PetscCall(PetscNew(im));
   ierr = SbImportRead(&body, *im);
-  if (ierr) PetscCall(test_free(im));
+  if (ierr)
+    PetscCall(test_free(im));
   PetscFunctionReturn(ierr);
 }
 
@@ -65,13 +68,15 @@ static inline PetscErrorCode test_round(const SbImport *im, const char *name, Sb
 static inline void test_groups_of(const SbImport *im, int dim, PetscInt i, size_t size, char text[])
 {
   const PetscInt tags = im->item[dim].tags[i];
-  PetscInt group[32], n = 0;
+  PetscInt group[32];
+  PetscInt n = 0;
 
   text[0] = 0;
   for (PetscInt k = im->tags_start[tags]; k < im->tags_start[tags + 1] && n < 32; k++) {
     PetscInt at = n++;
 
-    for (; at > 0 && strcmp(im->group[group[at - 1]].name, im->group[im->tags_group[k]].name) > 0; at--)
+    for (; at > 0 && strcmp(im->group[group[at - 1]].name, im->group[im->tags_group[k]].name) > 0;
+         at--)
       group[at] = group[at - 1];
     group[at] = im->tags_group[k];
   }
@@ -79,14 +84,15 @@ static inline void test_groups_of(const SbImport *im, int dim, PetscInt i, size_
     const SbGroup *g = &im->group[group[k]];
     const size_t used = strlen(text);
 
-    (void)snprintf(text + used, size - used, "%s%d %lld %s", k ? ", " : "", (int)g->dim, (long long)g->tag,
-                   g->name);
+    (void)snprintf(text + used, size - used, "%s%d %lld %s", k ? ", " : "", (int)g->dim,
+                   (long long)g->tag, g->name);
   }
 }
 
 static inline void test_same_items(const SbImport *a, const SbImport *b, int dim, const char *what)
 {
-  const SbItems *p = &a->item[dim], *q = &b->item[dim];
+  const SbItems *p = &a->item[dim];
+  const SbItems *q = &b->item[dim];
 
   SB_CHECK(p->n == q->n, "%s: %d and %d items of dimension %d", what, (int)p->n, (int)q->n, dim);
   for (PetscInt i = 0; i < PetscMin(p->n, q->n); i++) {
@@ -95,10 +101,12 @@ static inline void test_same_items(const SbImport *a, const SbImport *b, int dim
     test_groups_of(a, dim, i, sizeof(of_a), of_a);
     test_groups_of(b, dim, i, sizeof(of_b), of_b);
     if (strcmp(of_a, of_b)) {
-      SB_CHECK(0, "%s: item %d of dimension %d is in '%s' and in '%s'", what, (int)i, dim, of_a, of_b);
+      SB_CHECK(0, "%s: item %d of dimension %d is in '%s' and in '%s'", what, (int)i, dim, of_a,
+               of_b);
       return;
     }
-    if (memcmp(p->vert + (dim + 1) * i, q->vert + (dim + 1) * i, (size_t)(dim + 1) * sizeof(PetscInt))) {
+    if (memcmp(p->vert + (dim + 1) * i, q->vert + (dim + 1) * i,
+               (size_t)(dim + 1) * sizeof(PetscInt))) {
       SB_CHECK(0, "%s: item %d of dimension %d has other vertices", what, (int)i, dim);
       return;
     }
@@ -111,14 +119,17 @@ static inline void test_same(const SbImport *a, const SbImport *b, const char *w
   SB_CHECK(a->nvert == b->nvert, "%s: %d and %d vertices", what, (int)a->nvert, (int)b->nvert);
   SB_CHECK(a->nvert == b->nvert && !memcmp(a->x, b->x, 3 * (size_t)a->nvert * sizeof(PetscReal)),
            "%s: other coordinates", what);
-  for (int d = 0; d < 4; d++) test_same_items(a, b, d, what);
+  for (int d = 0; d < 4; d++)
+    test_same_items(a, b, d, what);
   SB_CHECK(a->nmiddle.n == b->nmiddle.n, "%s: %d and %d curved edges", what, (int)a->nmiddle.n,
            (int)b->nmiddle.n);
   for (PetscInt i = 0; i < PetscMin(a->nmiddle.n, b->nmiddle.n); i++) {
-    const SbMiddle *p = &a->middle[i], *q = &b->middle[i];
+    const SbMiddle *p = &a->middle[i];
+    const SbMiddle *q = &b->middle[i];
     PetscBool same = (PetscBool)(p->end[0] == q->end[0] && p->end[1] == q->end[1]);
 
-    for (int k = 0; k < 3; k++) same = (PetscBool)(same && PetscAbsReal(p->off[k] - q->off[k]) < 1e-15);
+    for (int k = 0; k < 3; k++)
+      same = (PetscBool)(same && PetscAbsReal(p->off[k] - q->off[k]) < 1e-15);
     if (!same) {
       SB_CHECK(0, "%s: another curved edge %d", what, (int)i);
       return;

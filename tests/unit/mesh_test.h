@@ -1,6 +1,6 @@
 /*
-  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and
-  checked as in a run.
+  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes
+  read and checked as in a run.
 */
 #pragma once
 #include <sbmeshfile.h>
@@ -62,18 +62,22 @@ static inline PetscErrorCode test_curve(SbImport *im)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 6 * im->item[3].n; i++) {
-    const PetscInt a = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][0]],
-                   b = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][1]];
-    const PetscReal *x = im->x + 3 * a, *y = im->x + 3 * b;
+    const PetscInt a = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][0]];
+    const PetscInt b = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][1]];
+    const PetscReal *x = im->x + 3 * a;
+    const PetscReal *y = im->x + 3 * b;
     SbMiddle m = {.end = {PetscMin(a, b), PetscMax(a, b)}, .node = -1};
 
     for (int k = 0; k < 3; k++) {
-      const int p = (k + 1) % 3, q = (k + 2) % 3;
+      const int p = (k + 1) % 3;
+      const int q = (k + 2) % 3;
 
-      m.off[k] = 0.05 * (PetscSinReal(x[p] + y[p] + 1.5 * (x[q] + y[q])) -
-                         0.5 * (PetscSinReal(2 * x[p] + 3 * x[q]) + PetscSinReal(2 * y[p] + 3 * y[q])));
+      m.off[k] =
+        0.05 * (PetscSinReal(x[p] + y[p] + 1.5 * (x[q] + y[q])) -
+                0.5 * (PetscSinReal(2 * x[p] + 3 * x[q]) + PetscSinReal(2 * y[p] + 3 * y[q])));
     }
-    if (x[0] + y[0] < 1) continue;
+    if (x[0] + y[0] < 1)
+      continue;
     PetscCall(SbReserve(++im->nmiddle.n, sizeof(m), &im->nmiddle.capacity, &im->middle));
     im->middle[im->nmiddle.n - 1] = m;
   }
@@ -85,7 +89,8 @@ static inline PetscErrorCode test_curve(SbImport *im)
 static inline PetscBool test_in_group(const SbImport *im, PetscInt tags, const char *name)
 {
   for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
-    if (!strcmp(im->group[im->tags_group[t]].name, name)) return PETSC_TRUE;
+    if (!strcmp(im->group[im->tags_group[t]].name, name))
+      return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
@@ -93,7 +98,8 @@ static inline PetscInt test_count(const SbImport *im, int dim, const char *name)
 {
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < im->item[dim].n; i++) n += test_in_group(im, im->item[dim].tags[i], name);
+  for (PetscInt i = 0; i < im->item[dim].n; i++)
+    n += test_in_group(im, im->item[dim].tags[i], name);
   return n;
 }
 

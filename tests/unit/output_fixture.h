@@ -1,8 +1,9 @@
 /*
-  output_fixture.h - a scene with prescribed motion, for the tests of the output: no solve, exact numbers.
+  output_fixture.h - a scene with prescribed motion, for the tests of the output: no solve, exact
+  numbers.
 
-  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the
-  order of the time loop. Output goes to a temporary folder.
+  The vectors of the run are set by formulas of rest position and time, and the monitors are called
+  in the order of the time loop. Output goes to a temporary folder.
 */
 #pragma once
 #include <fcntl.h>
@@ -13,18 +14,21 @@
 #include "../scene.h"
 #include "../../src/output/output_impl.h"
 
-#define MATERIAL " -body_a_material linear -body_a_young 1000 -body_a_poisson 0.25 -body_a_density 10"
+#define MATERIAL \
+  " -body_a_material linear -body_a_young 1000 -body_a_poisson 0.25 -body_a_density 10"
 #define BOX "-bodies a -body_a_mesh box:0.4,0.1,0.2:4,1,2" MATERIAL
-#define HELD \
-  BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed -effect_hold_on left"
+#define HELD                                                                          \
+  BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed " \
+      "-effect_hold_on left"
 #define EULER " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -quiet "
 
-/* The motion: u = t G x with a constant gradient, so that stresses are known; v = G x; a another affine function,
-   so that CR and DG hold it exactly, too. */
+/* The motion: u = t G x with a constant gradient, so that stresses are known; v = G x; a another
+   affine function, so that CR and DG hold it exactly, too. */
 #define G00 0.01
 #define G11 -0.02
 #define G02 0.03
-static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], PetscReal v[3], PetscReal a[3])
+static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], PetscReal v[3],
+                          PetscReal a[3])
 {
   v[0] = G00 * x[0] + G02 * x[2];
   v[1] = G11 * x[1];
@@ -48,8 +52,10 @@ static inline PetscErrorCode fixture_fields(const char *dir, SbH5 *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the time loop does at a step: state, then monitors. Energies are numbers that tell their column. */
-static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscReal dt, PetscBool last)
+/* What the time loop does at a step: state, then monitors. Energies are numbers that tell their
+   column. */
+static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscReal dt,
+                                          PetscBool last)
 {
   SbRun run = scene->run;
   const SbSpace space = scene->model->space;
@@ -73,8 +79,10 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   step.U = run->U;
   step.V = run->V;
   step.A = run->A;
-  if (run->want_residual && !run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
-  if (run->want_residual) PetscCall(VecSet(run->reaction, 0.5));
+  if (run->want_residual && !run->reaction)
+    PetscCall(VecDuplicate(run->U, &run->reaction));
+  if (run->want_residual)
+    PetscCall(VecSet(run->reaction, 0.5));
   step.R = run->reaction;
   step.energies = (SbEnergies){.kinetic = 100. + k,
                                .strain = 200. + k,
@@ -88,7 +96,8 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   step.linear = 30;
   step.wall = 0.01 * (PetscReal)k;
   run->steps_total = k;
-  for (PetscInt m = 0; m < run->nmonitor; m++) PetscCall(run->monitor[m].fn(run, &step, run->monitor[m].ctx));
+  for (PetscInt m = 0; m < run->nmonitor; m++)
+    PetscCall(run->monitor[m].fn(run, &step, run->monitor[m].ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,7 +110,8 @@ static inline PetscErrorCode fixture_read_file(const char *path, char **text, si
   PetscFunctionBeginUser;
   *text = NULL;
   *size = 0;
-  if (!file) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!file)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (!fseek(file, 0, SEEK_END) && (end = ftell(file)) >= 0 && !fseek(file, 0, SEEK_SET)) {
     PetscCall(PetscMalloc1((size_t)end + 1, text));
     *size = fread(*text, 1, (size_t)end, file);
@@ -121,7 +131,8 @@ static inline PetscErrorCode fixture_read(const char *dir, const char *name, cha
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   SbFormat(sizeof(path), path, "%s/%s", dir, name);
   PetscCall(fixture_read_file(path, text, &size));
-  if (!*text) PetscCall(PetscCalloc1(1, text));
+  if (!*text)
+    PetscCall(PetscCalloc1(1, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,6 +1,6 @@
 /*
-  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all features, in
-  extended precision; random pairs.
+  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all
+  features, in extended precision; random pairs.
 */
 #pragma once
 #include <sbgeometry.h>
@@ -30,9 +30,11 @@ static inline int pair_solve(int n, long double A[3][3], long double b[3], long 
   int column[3] = {0, 1, 2};
   long double size = 0;
 
-  for (int i = 0; i < n; i++) size = fmaxl(size, A[i][i]);
+  for (int i = 0; i < n; i++)
+    size = fmaxl(size, A[i][i]);
   for (int k = 0; k < n; k++) {
-    int p = k, q = k;
+    int p = k;
+    int q = k;
     long double keep;
 
     for (int i = k; i < n; i++) {
@@ -43,7 +45,8 @@ static inline int pair_solve(int n, long double A[3][3], long double b[3], long 
         }
       }
     }
-    if (!(fabsl(A[p][q]) > 1e-17L * size)) return 0;
+    if (!(fabsl(A[p][q]) > 1e-17L * size))
+      return 0;
     for (int j = 0; j < n; j++) {
       keep = A[k][j];
       A[k][j] = A[p][j];
@@ -63,33 +66,45 @@ static inline int pair_solve(int n, long double A[3][3], long double b[3], long 
     for (int i = k + 1; i < n; i++) {
       const long double f = A[i][k] / A[k][k];
 
-      for (int j = k; j < n; j++) A[i][j] -= f * A[k][j];
+      for (int j = k; j < n; j++)
+        A[i][j] -= f * A[k][j];
       b[i] -= f * b[k];
     }
   }
   for (int k = n - 1; k >= 0; k--) {
     long double sum = b[k];
 
-    for (int j = k + 1; j < n; j++) sum -= A[k][j] * z[column[j]];
+    for (int j = k + 1; j < n; j++)
+      sum -= A[k][j] * z[column[j]];
     z[column[k]] = sum / A[k][k];
   }
   return 1;
 }
 
-/* The least distance over all features of both sides whose closest points are inside them; x[4][3]. */
+/* The least distance over all features of both sides whose closest points are inside them;
+   x[4][3]. */
 static inline long double pair_distance(SbPairKind kind, const long double x[])
 {
-  const int n = pair_vertices(kind), first = pair_first(kind);
+  const int n = pair_vertices(kind);
+  const int first = pair_first(kind);
   long double least = HUGE_VALL;
 
   for (int mask = 1; mask < 1 << n; mask++) {
-    int base[2] = {-1, -1}, from[3], to[3], m = 0, inside = 1;
-    long double A[3][3], b[3], z[3] = {0, 0, 0}, w[4] = {0, 0, 0, 0}, d2 = 0, r[3];
+    int base[2] = {-1, -1};
+    int from[3], to[3];
+    int m = 0;
+    int inside = 1;
+    long double A[3][3], b[3];
+    long double z[3] = {0, 0, 0};
+    long double w[4] = {0, 0, 0, 0};
+    long double d2 = 0;
+    long double r[3];
 
     for (int a = 0; a < n; a++) {
       const int side = a >= first;
 
-      if (!(mask >> a & 1)) continue;
+      if (!(mask >> a & 1))
+        continue;
       if (base[side] < 0)
         base[side] = a;
       else if (m < 3) {
@@ -97,13 +112,16 @@ static inline long double pair_distance(SbPairKind kind, const long double x[])
         to[m++] = a;
       }
     }
-    if (base[0] < 0 || base[1] < 0) continue;
-    for (int k = 0; k < 3; k++) r[k] = x[3 * base[0] + k] - x[3 * base[1] + k];
+    if (base[0] < 0 || base[1] < 0)
+      continue;
+    for (int k = 0; k < 3; k++)
+      r[k] = x[3 * base[0] + k] - x[3 * base[1] + k];
     for (int i = 0; i < m; i++) {
       const int sign = to[i] < first ? 1 : -1;
 
       b[i] = 0;
-      for (int k = 0; k < 3; k++) b[i] -= sign * (x[3 * to[i] + k] - x[3 * from[i] + k]) * r[k];
+      for (int k = 0; k < 3; k++)
+        b[i] -= sign * (x[3 * to[i] + k] - x[3 * from[i] + k]) * r[k];
       for (int j = 0; j < m; j++) {
         A[i][j] = 0;
         for (int k = 0; k < 3; k++)
@@ -111,14 +129,17 @@ static inline long double pair_distance(SbPairKind kind, const long double x[])
                      (x[3 * to[j] + k] - x[3 * from[j] + k]);
       }
     }
-    if (!pair_solve(m, A, b, z)) continue;
+    if (!pair_solve(m, A, b, z))
+      continue;
     w[base[0]] = w[base[1]] = 1;
     for (int i = 0; i < m; i++) {
       w[to[i]] = z[i];
       w[from[i]] -= z[i];
     }
-    for (int a = 0; a < n; a++) inside = inside && w[a] >= 0;
-    if (!inside) continue;
+    for (int a = 0; a < n; a++)
+      inside = inside && w[a] >= 0;
+    if (!inside)
+      continue;
     for (int k = 0; k < 3; k++) {
       long double c = r[k];
 

@@ -23,11 +23,13 @@ static inline void test_surface_grow(TestSurface *s, PetscInt nvert, PetscInt nt
   s->tri = (PetscInt(*)[3])realloc(s->tri, (size_t)(s->ntri + ntri) * sizeof(*s->tri));
 }
 
-/* Corners of the sides of a box, counter-clockwise seen from outside; bit k of a number: the high end along axis k. */
+/* Corners of the sides of a box, counter-clockwise seen from outside; bit k of a number: the high
+   end along axis k. */
 static const int test_box_side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                         {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-/* The box between two corners, two triangles a side; inwards: seen from outside its triangles are clockwise. */
+/* The box between two corners, two triangles a side; inwards: seen from outside its triangles are
+   clockwise. */
 static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3], PetscBool inwards,
                                     TestSurface *s)
 {
@@ -35,7 +37,8 @@ static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3]
 
   test_surface_grow(s, 8, 12);
   for (int v = 0; v < 8; v++) {
-    for (int k = 0; k < 3; k++) s->x[s->nvert][k] = v >> k & 1 ? hi[k] : lo[k];
+    for (int k = 0; k < 3; k++)
+      s->x[s->nvert][k] = v >> k & 1 ? hi[k] : lo[k];
     s->nvert++;
   }
   for (int f = 0; f < 12; f++) {
@@ -48,7 +51,8 @@ static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3]
   }
 }
 
-/* A torus around z: R to the middle of the tube, r its radius, n[0] and n[1] corners around axis and tube. */
+/* A torus around z: R to the middle of the tube, r its radius, n[0] and n[1] corners around axis
+   and tube. */
 static inline void test_surface_torus(PetscReal R, PetscReal r, const PetscInt n[2], TestSurface *s)
 {
   test_surface_grow(s, n[0] * n[1], 2 * n[0] * n[1]);
@@ -56,10 +60,13 @@ static inline void test_surface_torus(PetscReal R, PetscReal r, const PetscInt n
     const PetscReal a = 2 * PETSC_PI * (PetscReal)i / (PetscReal)n[0];
 
     for (PetscInt j = 0; j < n[1]; j++) {
-      const PetscReal b = 2 * PETSC_PI * (PetscReal)j / (PetscReal)n[1], rho = R + r * PetscCosReal(b);
-      const PetscInt i1 = (i + 1) % n[0], j1 = (j + 1) % n[1];
+      const PetscReal b = 2 * PETSC_PI * (PetscReal)j / (PetscReal)n[1];
+      const PetscReal rho = R + r * PetscCosReal(b);
+      const PetscInt i1 = (i + 1) % n[0];
+      const PetscInt j1 = (j + 1) % n[1];
       PetscReal *x = s->x[s->nvert++];
-      PetscInt *t = s->tri[s->ntri++], *u = s->tri[s->ntri++];
+      PetscInt *t = s->tri[s->ntri++];
+      PetscInt *u = s->tri[s->ntri++];
 
       x[0] = rho * PetscCosReal(a);
       x[1] = rho * PetscSinReal(a);
@@ -77,19 +84,23 @@ static inline void test_surface_torus(PetscReal R, PetscReal r, const PetscInt n
 /* The middle of an arc of the unit sphere; one vertex for both triangles at an edge. */
 static inline PetscInt test_middle(TestSurface *s, PetscInt a, PetscInt b)
 {
-  PetscReal m[3], length = 0;
+  PetscReal m[3];
+  PetscReal length = 0;
 
   for (int k = 0; k < 3; k++) {
     m[k] = s->x[a][k] + s->x[b][k];
     length += m[k] * m[k];
   }
   length = PetscSqrtReal(length);
-  for (int k = 0; k < 3; k++) m[k] /= length;
+  for (int k = 0; k < 3; k++)
+    m[k] /= length;
   for (PetscInt v = 6; v < s->nvert; v++)
-    if (PetscAbsReal(s->x[v][0] - m[0]) + PetscAbsReal(s->x[v][1] - m[1]) + PetscAbsReal(s->x[v][2] - m[2]) <
+    if (PetscAbsReal(s->x[v][0] - m[0]) + PetscAbsReal(s->x[v][1] - m[1]) +
+          PetscAbsReal(s->x[v][2] - m[2]) <
         1e-9)
       return v;
-  for (int k = 0; k < 3; k++) s->x[s->nvert][k] = m[k];
+  for (int k = 0; k < 3; k++)
+    s->x[s->nvert][k] = m[k];
   return s->nvert++;
 }
 
@@ -101,7 +112,8 @@ static inline void test_surface_sphere(int n, TestSurface *s)
 
   test_surface_grow(s, most, most);
   for (int v = 0; v < 6; v++)
-    for (int k = 0; k < 3; k++) s->x[v][k] = k == v / 2 ? (v % 2 ? -1 : 1) : 0;
+    for (int k = 0; k < 3; k++)
+      s->x[v][k] = k == v / 2 ? (v % 2 ? -1 : 1) : 0;
   s->nvert = 6;
   for (int f = 0; f < 8; f++) {
     const int turned = (f & 1) ^ (f >> 1 & 1) ^ (f >> 2 & 1);
@@ -119,7 +131,8 @@ static inline void test_surface_sphere(int n, TestSurface *s)
     for (PetscInt f = 0; f < m; f++) {
       PetscInt mid[3];
 
-      for (int e = 0; e < 3; e++) mid[e] = test_middle(s, old[f][e], old[f][(e + 1) % 3]);
+      for (int e = 0; e < 3; e++)
+        mid[e] = test_middle(s, old[f][e], old[f][(e + 1) % 3]);
       for (int e = 0; e < 4; e++) {
         PetscInt *t = s->tri[s->ntri++];
 
@@ -135,13 +148,16 @@ static inline void test_surface_sphere(int n, TestSurface *s)
 /* The surface so far once more, scaled about the origin and shifted along x. */
 static inline void test_surface_shifted_copy(TestSurface *s, PetscReal scale, PetscReal shift)
 {
-  const PetscInt nvert = s->nvert, ntri = s->ntri;
+  const PetscInt nvert = s->nvert;
+  const PetscInt ntri = s->ntri;
 
   test_surface_grow(s, nvert, ntri);
   for (PetscInt v = 0; v < nvert; v++)
-    for (int k = 0; k < 3; k++) s->x[nvert + v][k] = scale * s->x[v][k] + (k ? 0 : shift);
+    for (int k = 0; k < 3; k++)
+      s->x[nvert + v][k] = scale * s->x[v][k] + (k ? 0 : shift);
   for (PetscInt f = 0; f < ntri; f++)
-    for (int k = 0; k < 3; k++) s->tri[ntri + f][k] = nvert + s->tri[f][k];
+    for (int k = 0; k < 3; k++)
+      s->tri[ntri + f][k] = nvert + s->tri[f][k];
   s->nvert += nvert;
   s->ntri += ntri;
 }
@@ -165,7 +181,8 @@ static inline void write_stl(FILE *f, const TestSurface *s)
 
 static inline void write_little(FILE *f, uint32_t v)
 {
-  for (int k = 0; k < 4; k++) fputc((int)(v >> 8 * k & 255), f);
+  for (int k = 0; k < 4; k++)
+    fputc((int)(v >> 8 * k & 255), f);
 }
 
 /* Its header begins like that of a text. */
@@ -226,11 +243,11 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 }
 
 /*
-  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary
-  files. Collective: rank 0 writes, the path is the same on all ranks.
+  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for
+  temporary files. Collective: rank 0 writes, the path is the same on all ranks.
 */
-static inline PetscErrorCode test_file_write(const char *extension, PetscBool binary, const TestSurface *s,
-                                             const char *text, char path[512])
+static inline PetscErrorCode test_file_write(const char *extension, PetscBool binary,
+                                             const TestSurface *s, const char *text, char path[512])
 {
   static const struct {
     const char *extension;
@@ -241,10 +258,13 @@ static inline PetscErrorCode test_file_write(const char *extension, PetscBool bi
   PetscFunctionBeginUser;
   PetscCall(test_file_open(extension, path, &f));
   if (f) {
-    if (text) fprintf(f, "%s", text);
-    if (s && binary) write_stl_binary(f, s);
+    if (text)
+      fprintf(f, "%s", text);
+    if (s && binary)
+      write_stl_binary(f, s);
     for (size_t k = 0; s && !binary && k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
-      if (!strcmp(extension, kinds[k].extension)) (*kinds[k].write)(f, s);
+      if (!strcmp(extension, kinds[k].extension))
+        (*kinds[k].write)(f, s);
   }
   PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);

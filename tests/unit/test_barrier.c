@@ -1,5 +1,6 @@
 // @ranks 1
-/* The barrier of a pair: its derivatives by differences, with the radius of an obstacle, for parallel edges, a half-space and a bowl. */
+/* The barrier of a pair: its derivatives by differences, with the radius of an obstacle, for
+   parallel edges, a half-space and a bowl. */
 #include <sbbarrier.h>
 #include "pair_reference.h"
 
@@ -7,20 +8,23 @@
 
 static const PetscReal width = 0.5, pressure = 3.;
 
-/* b and its derivatives: positive, decreasing, convex; zero from the width on, infinite at zero gap. */
+/* b and its derivatives: positive, decreasing, convex; zero from the width on, infinite at zero
+   gap. */
 static void check_function(void)
 {
   PetscReal b[3], c[3], d[3];
 
   for (int i = 1; i < 100; i++) {
-    const PetscReal gap = 0.01 * i * width, step = 1e-6 * gap;
+    const PetscReal gap = 0.01 * i * width;
+    const PetscReal step = 1e-6 * gap;
 
     SbBarrier(gap, width, pressure, 2., b);
     SbBarrier(gap - step, width, pressure, 2., c);
     SbBarrier(gap + step, width, pressure, 2., d);
-    SB_CHECK(b[0] > 0. && b[1] < 0. && b[2] > 0., "signs at %g of the width: %g %g %g", 0.01 * i, b[0], b[1],
-             b[2]);
-    SB_CHECK_NEAR((d[0] - c[0]) / (2. * step), b[1], 1e-7 * (PetscAbsReal(b[1]) + pressure), "slope");
+    SB_CHECK(b[0] > 0. && b[1] < 0. && b[2] > 0., "signs at %g of the width: %g %g %g", 0.01 * i,
+             b[0], b[1], b[2]);
+    SB_CHECK_NEAR((d[0] - c[0]) / (2. * step), b[1], 1e-7 * (PetscAbsReal(b[1]) + pressure),
+                  "slope");
     SB_CHECK_NEAR((d[1] - c[1]) / (2. * step), b[2], 1e-7 * (PetscAbsReal(b[2]) + pressure / width),
                   "curvature");
   }
@@ -37,22 +41,28 @@ static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const Pet
   SbDistance distance;
 
   gap = SbContactPairGap(m, pair, x, &distance);
-  if (gap <= 0.) return PETSC_INFINITY;
+  if (gap <= 0.)
+    return PETSC_INFINITY;
   SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, PETSC_FALSE, NULL);
   return energy;
 }
 
-/* Edges of length 1 that cross at an angle of 0.01: at larger gaps their barrier is reduced by the mollifier, which its derivatives include; at small gaps it is complete. */
+/* Edges of length 1 that cross at an angle of 0.01: at larger gaps their barrier is reduced by the
+   mollifier, which its derivatives include; at small gaps it is complete. */
 static void check_crossing(void)
 {
-  PetscReal X[12] = {0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.}, x[12], gradient[12], last = 0., b[3];
+  PetscReal X[12] = {0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.};
+  PetscReal x[12], gradient[12];
+  PetscReal last = 0.;
+  PetscReal b[3];
   struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   const SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE, .v = {0, 1, 2, 3}, .area = 0.7};
 
   for (PetscReal gap = 0.02; gap > 1e-5; gap *= 0.8) {
     PetscReal energy;
 
-    for (int k = 0; k < 12; k++) x[k] = X[k] + (k % 3 == 2 && k > 5 ? gap : 0.);
+    for (int k = 0; k < 12; k++)
+      x[k] = X[k] + (k % 3 == 2 && k > 5 ? gap : 0.);
     x[7] -= 0.005;
     x[10] += 0.005;
     energy = energy_at(&mesh, &pair, x, gradient);
@@ -65,17 +75,24 @@ static void check_crossing(void)
   }
 }
 
-/* Gradient, Hessian and projected Hessian against central differences, for the motion of the first nv vertices, which belong to bodies. */
-static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv, PetscInt *tried)
+/* Gradient, Hessian and projected Hessian against central differences, for the motion of the first
+   nv vertices, which belong to bodies. */
+static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv,
+                       PetscInt *tried)
 {
   const PetscReal step = 1e-6;
-  PetscReal energy, gap, gradient[12], H[2][144], reference[144] = {0.}, largest = 0., worst = 0.;
+  PetscReal energy, gap, gradient[12], H[2][144];
+  PetscReal reference[144] = {0.};
+  PetscReal largest = 0.;
+  PetscReal worst = 0.;
   SbDistance distance;
 
   gap = SbContactPairGap(m, pair, x, &distance);
-  if (gap <= 0.02 || gap >= width) return;
+  if (gap <= 0.02 || gap >= width)
+    return;
   for (int clamp = 0; clamp < 2; clamp++)
-    SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, (PetscBool)clamp, H[clamp]);
+    SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, (PetscBool)clamp,
+                  H[clamp]);
   for (int k = 0; k < 3 * nv; k++) {
     PetscReal side[2], g[2][12];
 
@@ -86,17 +103,21 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
     x[k] -= step;
     SB_CHECK_NEAR((side[1] - side[0]) / (2. * step), gradient[k],
                   2e-4 * (pressure + PetscAbsReal(gradient[k])), "gradient");
-    for (int l = 0; l < 3 * nv; l++) reference[12 * k + l] = (g[1][l] - g[0][l]) / (2. * step);
+    for (int l = 0; l < 3 * nv; l++)
+      reference[12 * k + l] = (g[1][l] - g[0][l]) / (2. * step);
   }
 
-  /* the closest feature can change within the differences: then these are not symmetric or are large, and the pair is skipped */
+  /* the closest feature can change within the differences: then these are not symmetric or are
+     large, and the pair is skipped */
   for (int k = 0; k < 144; k++) {
     largest = PetscMax(largest, PetscAbsReal(reference[k]));
     worst = PetscMax(worst, PetscAbsReal(reference[k] - reference[12 * (k % 12) + k / 12]));
   }
-  if (worst > 1e-4 * largest) return;
+  if (worst > 1e-4 * largest)
+    return;
   for (int clamp = 0; clamp < 2; clamp++) {
-    if (clamp) SbSymmetricProjectPSD(12, reference);
+    if (clamp)
+      SbSymmetricProjectPSD(12, reference);
     for (int k = 0; k < 3 * nv; k++) {
       for (int l = 0; l < 3 * nv; l++)
         SB_CHECK_NEAR(H[clamp][12 * k + l], reference[12 * k + l], 2e-3 * largest + 1e-6,
@@ -117,7 +138,8 @@ int main(int argc, char **argv)
   check_function();
   check_crossing();
   for (int i = 0; i < NRANDOM; i++) {
-    for (int k = 0; k < 12; k++) X[k] = x[k] = pair_random();
+    for (int k = 0; k < 12; k++)
+      X[k] = x[k] = pair_random();
     pair.side = PETSC_FALSE;
     mesh.side = SB_SIDE_NONE;
     mesh.radius = 0.;
@@ -135,7 +157,8 @@ int main(int argc, char **argv)
     check_pair(&mesh, &pair, x, 4, &tried[2]);
 
     /* the same at such a small distance that the mollifier depends on the gap */
-    for (int k = 0; k < 3; k++) u[k] = x[3 + k] - x[k];
+    for (int k = 0; k < 3; k++)
+      u[k] = x[3 + k] - x[k];
     SbCross(u, X, n);
     for (int k = 0; k < 3; k++) {
       x[6 + k] = x[k] + 0.03 * n[k] / PetscSqrtReal(SbDot3(n, n));
@@ -147,19 +170,22 @@ int main(int argc, char **argv)
     /* the same with one edge of a capsule */
     mesh.nbody_vertex = 2;
     mesh.radius = 0.01;
-    for (int k = 0; k < 6; k++) x[6 + k] += 0.01 * n[k % 3] / PetscSqrtReal(SbDot3(n, n));
+    for (int k = 0; k < 6; k++)
+      x[6 + k] += 0.01 * n[k % 3] / PetscSqrtReal(SbDot3(n, n));
     check_pair(&mesh, &pair, x, 4, &tried[6]);
 
     /* half-space and bowl: only the first vertex moves */
     pair.side = PETSC_TRUE;
     mesh.nbody_vertex = 1;
     mesh.side = SB_SIDE_PLANE;
-    for (int k = 0; k < 3; k++) x[6 + k] = x[3 + k] + (k == 2);
+    for (int k = 0; k < 3; k++)
+      x[6 + k] = x[3 + k] + (k == 2);
     check_pair(&mesh, &pair, x, 1, &tried[3]);
     mesh.side = SB_SIDE_BOWL;
     mesh.radius = 1.;
     check_pair(&mesh, &pair, x, 1, &tried[4]);
   }
-  for (int k = 0; k < 7; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
+  for (int k = 0; k < 7; k++)
+    SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
   SB_TEST_END();
 }

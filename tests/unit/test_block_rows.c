@@ -1,11 +1,13 @@
 // @ranks 1 2 3
-/* Rows of an operator as blocks: those of AIJ, BAIJ, a matrix-free operator and (one rank) SBAIJ are the same, and they are what MatMult does. */
+/* Rows of an operator as blocks: those of AIJ, BAIJ, a matrix-free operator and (one rank) SBAIJ
+   are the same, and they are what MatMult does. */
 #include "../../src/solver/rotated.h"
 #include "../scene.h"
 
 static const char *const scene =
   "-bodies a -body_a_mesh box:1,0.5,0.4:4,3,2 -body_a_material corotated -body_a_tangent warped "
-  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 -sets left,low -set_left_at plane:1,0,0,0 "
+  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 -sets left,low -set_left_at "
+  "plane:1,0,0,0 "
   "-set_low_at plane:0,0,1,0 -effects clamp,slide -effect_clamp_type fixed -effect_clamp_on left "
   "-effect_slide_type fixed -effect_slide_on low -effect_slide_components z -body_a_element ";
 
@@ -27,7 +29,8 @@ static PetscErrorCode get(SbSpace s, Mat A, Rows *r)
   PetscFunctionBeginUser;
   r->n = 0;
   PetscCall(PetscMalloc2(s->nnode_owned, &r->node, s->nnode_owned + 1, &r->ia));
-  for (PetscInt i = s->nnode_owned - 1; i >= 0; i -= 2) r->node[r->n++] = i;
+  for (PetscInt i = s->nnode_owned - 1; i >= 0; i -= 2)
+    r->node[r->n++] = i;
   PetscCall(SbSpaceGetRows(s, A, r->n, r->node, r->ia, NULL, NULL));
   PetscCall(PetscMalloc2(r->ia[r->n], &r->ja, 9 * r->ia[r->n], &r->block));
   PetscCall(SbSpaceGetRows(s, A, r->n, r->node, r->ia, r->ja, r->block));
@@ -42,7 +45,8 @@ static PetscErrorCode put(Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest difference from the rows of `to`; prescribed diagonal entries need only be positive in both. */
+/* Largest difference from the rows of `to`; prescribed diagonal entries need only be positive in
+   both. */
 static PetscReal difference(SbSpace s, const Rows *r, const Rows *to)
 {
   PetscReal worst = 0.;
@@ -51,12 +55,15 @@ static PetscReal difference(SbSpace s, const Rows *r, const Rows *to)
     const PetscInt i = r->node[k];
 
     for (PetscInt at = r->ia[k]; at < r->ia[k + 1]; at++) {
-      if (r->ja[at] != to->ja[at]) return PETSC_MAX_REAL;
+      if (r->ja[at] != to->ja[at])
+        return PETSC_MAX_REAL;
       for (PetscInt e = 0; e < 9; e++) {
-        const PetscReal x = r->block[9 * at + e], y = to->block[9 * at + e];
+        const PetscReal x = r->block[9 * at + e];
+        const PetscReal y = to->block[9 * at + e];
 
         if (r->ja[at] == i && e % 4 == 0 && s->fixed[i] & (1 << e / 3)) {
-          if (x <= 0. || y <= 0.) return PETSC_MAX_REAL;
+          if (x <= 0. || y <= 0.)
+            return PETSC_MAX_REAL;
         } else
           worst = PetscMax(worst, PetscAbsReal(x - y));
       }
@@ -83,7 +90,8 @@ static PetscErrorCode against_product(SbSpace s, Mat A, const Rows *r, Vec X, Pe
       PetscReal sum = -y[3 * r->node[k] + c];
 
       for (PetscInt at = r->ia[k]; at < r->ia[k + 1]; at++)
-        for (PetscInt e = 0; e < 3; e++) sum += r->block[9 * at + 3 * c + e] * x[3 * r->ja[at] + e];
+        for (PetscInt e = 0; e < 3; e++)
+          sum += r->block[9 * at + 3 * c + e] * x[3 * r->ja[at] + e];
       *worst = PetscMax(*worst, PetscAbsReal(sum));
     }
   }
@@ -125,9 +133,12 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   PetscCall(SbSpaceAssembleTangent(s, &stage, A[2]));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  for (int k = 0; k < kinds; k++) PetscCall(get(s, A[k], &rows[k]));
+  for (int k = 0; k < kinds; k++)
+    PetscCall(get(s, A[k], &rows[k]));
   for (int k = 0; k < kinds; k++) {
-    SB_CHECK(rows[k].n == (s->nnode_owned + 1) / 2, "%s: %" PetscInt_FMT " rows", names[k], rows[k].n);
+    SB_CHECK(rows[k].n == (s->nnode_owned + 1) / 2, "%s: %" PetscInt_FMT " rows", names[k],
+             rows[k].n);
+
     /* entries are up to about 1e3 */
     worst = difference(s, &rows[k], &rows[1]);
     SB_CHECK(worst < 1e-10, "%s, %s: rows differ from BAIJ by %g", element, names[k], worst);

@@ -1,5 +1,6 @@
-// Cell pressure of the volumetric term: lambda/2 theta^2 is the part of every material's energy that vanishes with lambda, positive
-// in compression, and for small strains it is -lambda tr(eps). Cells of a scene get it from their own material.
+// Cell pressure of the volumetric term: lambda/2 theta^2 is the part of every material's energy
+// that vanishes with lambda, positive in compression, and for small strains it is -lambda tr(eps).
+// Cells of a scene get it from their own material.
 #include "../scene.h"
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
@@ -26,6 +27,7 @@ static PetscErrorCode test_energy(const char *law, PetscRandom random)
 
   PetscFunctionBeginUser;
   PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., &m));
+
   /* lambda is 0 for nu = 0; mu is that of m */
   PetscCall(SbMaterialCreateElastic(law, 2. * m->mu, 0., 1., &shear));
   for (int i = 0; i < 20; i++) {
@@ -54,16 +56,20 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal expected = -m->lambda * ((F[0][l] - 1.) + (F[4][l] - 1.) + (F[8][l] - 1.));
 
-    // the next order of the strain, and the rounding of 1 + 1e-6 in the materials that need F itself
+    // the next order of the strain, and the rounding of 1 + 1e-6 in the materials that need F
+    // itself
     SB_CHECK_NEAR(p[l], expected, m->lambda * (20. * size * size + 1e-14), law);
   }
   PetscCall(deform(random, 0., F));
   m->ops.pressure(m, (const SbPack *)F, p);
-  for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(p[l], 0., 1e-14 * m->lambda, "pressure at rest");
+  for (int l = 0; l < SB_BATCH; l++)
+    SB_CHECK_NEAR(p[l], 0., 1e-14 * m->lambda, "pressure at rest");
   for (int k = 0; k < 9; k += 4)
-    for (int l = 0; l < SB_BATCH; l++) F[k][l] = 0.9;
+    for (int l = 0; l < SB_BATCH; l++)
+      F[k][l] = 0.9;
   m->ops.pressure(m, (const SbPack *)F, p);
-  for (int l = 0; l < SB_BATCH; l++) SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, p[l]);
+  for (int l = 0; l < SB_BATCH; l++)
+    SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, p[l]);
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -89,9 +95,11 @@ static PetscErrorCode test_scene(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(
     "-bodies a,b,c -body_a_mesh box:1,1,1:2 -body_b_mesh box:1,1,1:2 -body_c_mesh box:1,1,1:2 "
-    "-body_a_element p1 -body_b_element cr -body_c_element dg -body_a_material linear -body_b_material stvk "
+    "-body_a_element p1 -body_b_element cr -body_c_element dg -body_a_material linear "
+    "-body_b_material stvk "
     "-body_c_material neohookean -body_a_young 1000 -body_a_poisson 0.3 -body_b_young 5000 "
-    "-body_b_poisson 0.25 -body_c_young 2000 -body_c_poisson 0.4 -time newmark -ts_dt 0.1 -ts_max_time 1",
+    "-body_b_poisson 0.25 -body_c_young 2000 -body_c_poisson 0.4 -time newmark -ts_dt 0.1 "
+    "-ts_max_time 1",
     &scene));
   PetscCall(test_fill(scene.model, squeeze, scene.run->U));
   PetscCall(PetscMalloc1(scene.model->mesh->ncell_owned, &p));

@@ -1,32 +1,37 @@
 // @ranks 1 2 3 4
 /*
-  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the constraint
-  force is the residual along the normals, directions act like supports, a body on constraints or stiff
-  springs only equals the body on a support, with every solver and by a factorisation, which also counts
-  negative eigenvalues.
+  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the
+  constraint force is the residual along the normals, directions act like supports, a body on
+  constraints or stiff springs only equals the body on a support, with every solver and by a
+  factorisation, which also counts negative eigenvalues.
 */
 #include <sbsolver.h>
 #include "../scene.h"
 
-#define SCENE                                                                                             \
-  "-bodies a -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 -body_a_poisson 0.3 " \
+#define SCENE                                                                         \
+  "-bodies a -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 " \
+  "-body_a_poisson 0.3 "                                                              \
   "-body_a_density 10 -ksp_rtol 1e-12 -time static "
 #define CLAMP "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin "
 #define FREE "-effects gravity "
 #define WEIGHT (10 * 0.2 * 9.81)
 
-typedef enum { PROJECTED, BESIDE, FACTORED } How;
+typedef enum {
+  PROJECTED,
+  BESIDE,
+  FACTORED
+} How;
 
 static const PetscReal oblique[3] = {0.36, 0.48, 0.8};
 
-static PetscErrorCode open_scene(const char *options, const char *element, const char *solver, How how,
-                                 PetscBool nonsymmetric, TestScene *t)
+static PetscErrorCode open_scene(const char *options, const char *element, const char *solver,
+                                 How how, PetscBool nonsymmetric, TestScene *t)
 {
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text), SCENE "%s -body_a_element %s -solver %s", options, element, solver));
+  PetscCall(PetscSNPrintf(text, sizeof(text), SCENE "%s -body_a_element %s -solver %s", options,
+                          element, solver));
   *t = (TestScene){0};
   PetscCall(test_options(text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
@@ -68,12 +73,14 @@ static PetscErrorCode fill(Vec x, unsigned state)
   PetscFunctionBeginUser;
   PetscCall(VecGetLocalSize(x, &n));
   PetscCall(VecGetArray(x, &v));
-  for (PetscInt i = 0; i < n; i++) v[i] = 0.5 * test_random(&state);
+  for (PetscInt i = 0; i < n; i++)
+    v[i] = 0.5 * test_random(&state);
   PetscCall(VecRestoreArray(x, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y.A x = x.A y and x.A x > 0 for free unknowns, and A x has no force along the constrained directions. */
+/* y.A x = x.A y and x.A x > 0 for free unknowns, and A x has no force along the constrained
+   directions. */
 static PetscErrorCode check_operator(TestScene *t, const char *what)
 {
   SbSpace s = t->model->space;
@@ -95,11 +102,12 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   PetscCall(VecDot(y, z, &yAx));
   PetscCall(VecDot(x, z, &xAx));
   SB_CHECK(xAx > 0, "%s: not positive", what);
-  SB_CHECK(PetscAbsReal(xAy - yAx) <= 1e-12 * PetscAbsReal(xAx), "%s: x.A y = %.16g, y.A x = %.16g", what,
-           xAy, yAx);
+  SB_CHECK(PetscAbsReal(xAy - yAx) <= 1e-12 * PetscAbsReal(xAx), "%s: x.A y = %.16g, y.A x = %.16g",
+           what, xAy, yAx);
   PetscCall(VecGetArray(z, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
-    if (at_end(s, i, 1)) SB_CHECK_NEAR(SbDot3(v + 3 * i, oblique), 0, 1e-10, what);
+    if (at_end(s, i, 1))
+      SB_CHECK_NEAR(SbDot3(v + 3 * i, oblique), 0, 1e-10, what);
   PetscCall(VecRestoreArray(z, &v));
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&y));
@@ -107,7 +115,8 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* End of a clamped bar constrained along an oblique direction, and loaded along it or, mu > 0, as in sliding friction. */
+/* End of a clamped bar constrained along an oblique direction, and loaded along it or, mu > 0, as
+   in sliding friction. */
 static PetscErrorCode check_oblique(const char *element, const char *solver, How how, PetscReal mu)
 {
   const PetscReal push[3] = {oblique[0] + mu * 0.8, oblique[1] - mu * 0.6, oblique[2]};
@@ -123,13 +132,15 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
   PetscCall(open_scene(CLAMP, element, solver, how, (PetscBool)(mu > 0), &t));
   s = t.model->space;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (!at_end(s, i, 1)) continue;
+    if (!at_end(s, i, 1))
+      continue;
     PetscCall(add(s, i, oblique, push, 0.02, -1, &number));
     SB_CHECK(number >= 0, "the first direction of node %d", (int)i);
   }
   PetscCall(SbSpaceAssembleConstraints(s));
   SB_CHECK(SbSpaceIsConstrained(s) && s->constraints->tilted == (mu > 0), "there are constraints");
-  if (mu <= 0) PetscCall(check_operator(&t, solver));
+  if (mu <= 0)
+    PetscCall(check_operator(&t, solver));
   PetscCall(VecZeroEntries(t.run->U));
   PetscCall(SNESGetKSP(t.run->snes, &ksp));
   PetscCall(SbSolverUpdateSymmetry(ksp, s));
@@ -148,16 +159,20 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
     SB_CHECK_NEAR(SbDot3(u + 3 * c->node, oblique), 0.02, 1e-14, "n.u");
     SB_CHECK_NEAR(c->sum, 0.02, 1e-14, "its sum");
     for (int i = 0; i < 3; i++)
-      SB_CHECK_NEAR(r[3 * c->node + i], c->force * push[i], 1e-7, "the residual is along what pushes");
+      SB_CHECK_NEAR(r[3 * c->node + i], c->force * push[i], 1e-7,
+                    "the residual is along what pushes");
     total[0] += c->force * push[2];
   }
   for (PetscInt i = 0; i < s->nnode_owned; i++)
-    if (at_end(s, i, 0)) total[0] += r[3 * i + 2];
+    if (at_end(s, i, 0))
+      total[0] += r[3 * i + 2];
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
   PetscCallMPI(MPI_Allreduce(&total[0], &total[1], 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+
   /* supports of DG carry their force elsewhere; then only the directions count */
-  if (!s->dirichlet_node) SB_CHECK_NEAR(total[1], WEIGHT, 1e-6, "both ends carry the weight");
+  if (!s->dirichlet_node)
+    SB_CHECK_NEAR(total[1], WEIGHT, 1e-6, "both ends carry the weight");
   PetscCall(VecDestroy(&R));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -172,21 +187,26 @@ static PetscErrorCode compare(const TestScene *t, const TestScene *other, PetscR
   PetscCall(VecNorm(other->run->U, NORM_INFINITY, &size));
   PetscCall(VecAXPY(t->run->U, -1., other->run->U));
   PetscCall(VecNorm(t->run->U, NORM_INFINITY, &difference));
-  SB_CHECK(size > 1e-4 && difference < tolerance * size, "%s: differs by %g of %g", what, difference, size);
+  SB_CHECK(size > 1e-4 && difference < tolerance * size, "%s: differs by %g of %g", what,
+           difference, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Constraints along x and y, added one after the other and not orthogonal: equal to a support of x and y. */
+/* Constraints along x and y, added one after the other and not orthogonal: equal to a support of x
+   and y. */
 static PetscErrorCode check_axes(const char *element, How how)
 {
-  const PetscReal x[3] = {1, 0, 0}, skew[3] = {0.6, 0.8, 0}, z[3] = {0, 0, 1};
+  const PetscReal x[3] = {1, 0, 0};
+  const PetscReal skew[3] = {0.6, 0.8, 0};
+  const PetscReal z[3] = {0, 0, 1};
   TestScene t, other;
   PetscInt number;
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&other,
-                      SCENE CLAMP "-body_a_element %s -effects gravity,clamp,end "
-                                  "-effect_end_type fixed -effect_end_on xmax -effect_end_components xy",
+                      SCENE CLAMP
+                      "-body_a_element %s -effects gravity,clamp,end "
+                      "-effect_end_type fixed -effect_end_on xmax -effect_end_components xy",
                       element));
   PetscCall(SbRunSolve(other.run));
   PetscCall(open_scene(CLAMP, element, "cg_two_level", how, PETSC_FALSE, &t));
@@ -211,7 +231,8 @@ static PetscErrorCode check_axes(const char *element, How how)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body that only constraints support: exact ones or, stiffness >= 0, springs; negative: the negative eigenvalues are counted. */
+/* A body that only constraints support: exact ones or, stiffness >= 0, springs; negative: the
+   negative eigenvalues are counted. */
 static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiffness, PetscInt most,
                                     PetscBool negative, const TestScene *clamped)
 {
@@ -251,7 +272,8 @@ static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiff
     SB_CHECK(count == 3 * t.model->space->Nnode - t.model->space->constraints->nexact,
              "%" PetscInt_FMT " negative eigenvalues", count);
   }
-  PetscCall(compare(&t, clamped, stiffness < 0 ? 1e-8 : 1e-4, solver)); /* springs have an error of 1/k */
+  PetscCall(
+    compare(&t, clamped, stiffness < 0 ? 1e-8 : 1e-4, solver)); /* springs have an error of 1/k */
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +317,8 @@ int main(int argc, char **argv)
     PetscBool has;
 
     PetscCall(SbHasPackage(packages[k], &has));
-    if (!has) continue;
+    if (!has)
+      continue;
     PetscCall(check_carried(packages[k], BESIDE, -1, 120, PETSC_FALSE, &clamped));
     if (!strcmp(packages[k], "mumps"))
       PetscCall(check_carried("cg_icc", FACTORED, -1, 5, PETSC_TRUE, &clamped));

@@ -1,6 +1,6 @@
 /*
-  Body force: force and moment of quadratic densities on all cells and on a part; time in the density and as a
-  factor; independence of the number of ranks; every element.
+  Body force: force and moment of quadratic densities on all cells and on a part; time in the
+  density and as a factor; independence of the number of ranks; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -13,7 +13,8 @@ static const char *const sets[][2] = {
 #define HALF "-effect_half_type body_force -effect_half_on lower,lower -effect_half_density 0;0;8"
 
 static const LoadCase cases[] = {
-  /* b = (1 + x, 2 y^2, x z) on the unit cube: M = integral X x b = (y x z - z 2 y^2, z (1 + x) - x x z, x 2 y^2 - y (1 + x)) */
+  /* b = (1 + x, 2 y^2, x z) on the unit cube: M = integral X x b = (y x z - z 2 y^2, z (1 + x) - x
+     x z, x 2 y^2 - y (1 + x)) */
   {"pull",
    PULL,
    PETSC_TRUE,
@@ -23,7 +24,8 @@ static const LoadCase cases[] = {
    {1. / 8 - 1. / 3, 3. / 4 - 1. / 6, 1. / 3 - 3. / 4},
    0},
   {"grow", GROW, PETSC_FALSE, 3, 10, {3 * 5 * 0.5, 0, 0}, {0, 3 * 5 * 0.25, -3 * 5 * 0.25}, 0},
-  /* 8 N/m^3 on the lower half, also if it is named twice; the force of the last effect is checked */
+  /* 8 N/m^3 on the lower half, also if it is named twice; the force of the last effect is
+     checked */
   {"half", HALF, PETSC_TRUE, 0, 4, {0, 0, 4}, {2, -2, 0}, 0}};
 
 int main(int argc, char **argv)
@@ -40,9 +42,11 @@ int main(int argc, char **argv)
     PetscCall(fixture_pair_create(1, PETSC_STATIC_ARRAY_LENGTH(sets), sets, &p));
     PetscCall(check_loads(&p, PETSC_STATIC_ARRAY_LENGTH(cases), cases));
     for (PetscInt i = 0; i < x->space->nnode; i++)
-      if (x->space->node_x[3 * i + 2] > 0.75) SB_CHECK(x->f[3 * i + 2] == 0, "force outside the set");
+      if (x->space->node_x[3 * i + 2] > 0.75)
+        SB_CHECK(x->f[3 * i + 2] == 0, "force outside the set");
     PetscCall(check_effect_refused(
-      &p.all, "flat", "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
+      &p.all, "flat",
+      "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
       "-effect_flat_on|set shell|9 vertices"));
     PetscCall(fixture_pair_destroy(&p));
   }

@@ -1,14 +1,16 @@
 /*
-  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of
-  contact springs against finite differences of the force, and Coulomb's law in the friction constraints.
+  Contact effect: options and their errors, incompatible settings, a scene without contact, the
+  tangent of contact springs against finite differences of the force, and Coulomb's law in the
+  friction constraints.
 */
 // @ranks 1 3
 #include "../scene.h"
 #include "effect_fixture.h"
 #include <sblog.h>
 
-#define FLOOR \
-  "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0.01 "
+#define FLOOR                                                                           \
+  "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle " \
+  "plane:0,0,1,0.01 "
 
 static const char *const hull[][2] = {{"boundary", "boundary"}};
 
@@ -20,7 +22,8 @@ static PetscErrorCode check_options(void)
     const char *options, *names;
     PetscErrorCode code;
   } refused[] = {
-    {"-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle ball:1,2,3,4",
+    {"-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
+     "ball:1,2,3,4",
      "-effect_floor_obstacle ball:1,2,3,4", PETSC_ERR_USER_INPUT},
     {FLOOR "-effect_floor_response glue", "-effect_floor_response glue|projected", PETSC_ERR_USER},
     {FLOOR "-effect_floor_friction -1", "-effect_floor_friction -1", PETSC_ERR_USER},
@@ -30,9 +33,10 @@ static PetscErrorCode check_options(void)
     {FLOOR "-effect_floor_damping 0.01", "-effect_floor_damping 0.01 s", PETSC_ERR_USER_INPUT},
     {FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
      "-effect_floor_restitution 0.5|-effect_floor_response projected", PETSC_ERR_USER_INPUT},
-    {FLOOR "-effect_floor_separation_steps 0.5", "-effect_floor_separation_steps 0.5", PETSC_ERR_USER},
-    {"-effect_floor_type contact -effect_floor_obstacle mesh:no.stl", "-effect_floor_obstacle|no.stl",
-     PETSC_ERR_FILE_OPEN},
+    {FLOOR "-effect_floor_separation_steps 0.5", "-effect_floor_separation_steps 0.5",
+     PETSC_ERR_USER},
+    {"-effect_floor_type contact -effect_floor_obstacle mesh:no.stl",
+     "-effect_floor_obstacle|no.stl", PETSC_ERR_FILE_OPEN},
     {FLOOR "-effect_floor_time_of_impact yes -effect_floor_restitution 0.5",
      "-effect_floor_restitution 0.5|-effect_floor_time_of_impact yes", PETSC_ERR_USER_INPUT},
     {FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis|0,0,0", PETSC_ERR_USER_INPUT},
@@ -44,7 +48,8 @@ static PetscErrorCode check_options(void)
   PetscFunctionBeginUser;
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
-    SB_CHECK_ERROR(effect_create(&x, "floor", refused[k].options, &e), refused[k].code, refused[k].names);
+    SB_CHECK_ERROR(effect_create(&x, "floor", refused[k].options, &e), refused[k].code,
+                   refused[k].names);
     PetscCall(SbEffectDestroy(&e));
     PetscCall(PetscOptionsClear(NULL));
   }
@@ -66,14 +71,14 @@ static PetscErrorCode check_options(void)
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
-  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.assemble_constraints && !e->ops.update_active_set &&
-             !x.space->constraints,
+  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.assemble_constraints &&
+             !e->ops.update_active_set && !x.space->constraints,
            "penalty");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
-  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && SbConstraintsSeparate(x.space) &&
-             x.space->constraints->nonsymmetric,
+  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints &&
+             SbConstraintsSeparate(x.space) && x.space->constraints->nonsymmetric,
            "friction has constraints");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
@@ -104,7 +109,8 @@ static PetscErrorCode press(Fixture *x, SbEffect e)
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, u0));
   push(x, 1);
-  if (e->ops.update_active_set) PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
+  if (e->ops.update_active_set)
+    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
   PetscCall(PetscFree(u0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -115,7 +121,8 @@ static PetscErrorCode to_vec(const Fixture *x, const PetscReal values[], Vec v)
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(v, &a));
-  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) a[i] = values[i];
+  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++)
+    a[i] = values[i];
   PetscCall(VecRestoreArray(v, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,8 +186,9 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscCall(VecNorm(less, NORM_2, &size));
   PetscCall(VecAXPY(less, 1, more));
   PetscCall(VecNorm(less, NORM_2, &difference));
-  SB_CHECK(size > 1 && difference < 1e-6 * size, "%s, %s: tangent and differences are %g of %g apart",
-           element, options, difference, size);
+  SB_CHECK(size > 1 && difference < 1e-6 * size,
+           "%s, %s: tangent and differences are %g of %g apart", element, options, difference,
+           size);
   PetscCall(VecDestroy(&w));
   PetscCall(VecDestroy(&more));
   PetscCall(VecDestroy(&less));
@@ -218,7 +226,8 @@ static PetscErrorCode rub(Fixture *x, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Coulomb's cone at every node, friction opposite to the motion, and the same result on any number of ranks. */
+/* Coulomb's cone at every node, friction opposite to the motion, and the same result on any number
+   of ranks. */
 static PetscErrorCode check_friction(const char *element)
 {
   const char *options = FLOOR "-effect_floor_response penalty -effect_floor_friction 0.4 "
@@ -231,9 +240,10 @@ static PetscErrorCode check_friction(const char *element)
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", 1, hull, &x));
   PetscCall(rub(&x, options));
   for (PetscInt i = 0; i < x.space->nnode_owned; i++) {
-    const PetscReal *f = x.f + 3 * i, *u = x.u + 3 * i;
-    const PetscReal t = PetscSqrtReal(f[0] * f[0] + f[1] * f[1]),
-                    s = PetscSqrtReal(u[0] * u[0] + u[1] * u[1]);
+    const PetscReal *f = x.f + 3 * i;
+    const PetscReal *u = x.u + 3 * i;
+    const PetscReal t = PetscSqrtReal(f[0] * f[0] + f[1] * f[1]);
+    const PetscReal s = PetscSqrtReal(u[0] * u[0] + u[1] * u[1]);
 
     if (f[2] <= 0) {
       SB_CHECK(t == 0 && x.space->node_x[3 * i + 2] > 1e-9, "a node off the floor feels nothing");
@@ -255,8 +265,9 @@ static PetscErrorCode check_friction(const char *element)
 
 /* ------------------------------------------------------------------ in a scene */
 
-#define BLOCK                                                                                            \
-  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 " \
+#define BLOCK                                                                        \
+  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material corotated -body_a_young 1e5 " \
+  "-body_a_poisson 0.3 "                                                             \
   "-body_a_density 1000 -ts_dt 0.01 -ts_max_time 0.02 "
 
 static PetscErrorCode open_only(const char *options)
@@ -285,12 +296,13 @@ static PetscErrorCode check_scene(void)
   SB_CHECK(before.count > 0, "contact is logged");
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_open(BLOCK "-effects gravity", &t));
-  SB_CHECK(!t.model->nbegin_step && !t.model->nassemble_constraints && !t.model->nupdate_active_set &&
-             !t.model->space->constraints,
+  SB_CHECK(!t.model->nbegin_step && !t.model->nassemble_constraints &&
+             !t.model->nupdate_active_set && !t.model->space->constraints,
            "a scene without contact has nothing of it");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &info));
-  SB_CHECK(info.count == before.count, "%d events of contact without contact", info.count - before.count);
+  SB_CHECK(info.count == before.count, "%d events of contact without contact",
+           info.count - before.count);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -303,7 +315,8 @@ static PetscErrorCode check_refused(void)
     {"-time newmark -effect_floor_response penalty ", "-time newmark|effect floor"},
     {"-time newmark -effect_floor_friction 0.3 ", "-time newmark|effect floor"},
     {"-time newmark -mass consistent ", "-time newmark|effect floor|-mass lumped"},
-    {"-time genalpha -effect_floor_restitution 0.5 ", "-effect_floor_restitution|-time euler_implicit"},
+    {"-time genalpha -effect_floor_restitution 0.5 ",
+     "-effect_floor_restitution|-time euler_implicit"},
     {"-body_a_tangent warped -solver realtime ", "-solver realtime|effect floor"},
     {"-body_a_element cr -solver pressure ", "-solver pressure"},
   };
@@ -312,8 +325,8 @@ static PetscErrorCode check_refused(void)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
     char options[2048];
 
-    PetscCall(
-      PetscSNPrintf(options, sizeof(options), BLOCK "-effects gravity,floor " FLOOR "%s", cases[k][0]));
+    PetscCall(PetscSNPrintf(options, sizeof(options), BLOCK "-effects gravity,floor " FLOOR "%s",
+                            cases[k][0]));
     SB_CHECK_ERROR(open_only(options), PETSC_ERR_USER_INPUT, cases[k][1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

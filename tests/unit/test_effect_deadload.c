@@ -1,10 +1,10 @@
 /*
-  Quadrature of dead loads: force and first moments of polynomial densities up to the documented degree, on
-  the cells and on one face of a unit cube; degree 5 and above must show an error (otherwise the test would
-  not detect the degree); time-dependent densities; every element.
+  Quadrature of dead loads: force and first moments of polynomial densities up to the documented
+  degree, on the cells and on one face of a unit cube; degree 5 and above must show an error
+  (otherwise the test would not detect the degree); time-dependent densities; every element.
 
-  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly if q phi_a is
-  integrated exactly: degree 4 of q on rules of degree 5.
+  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly if q
+  phi_a is integrated exactly: degree 4 of q on rules of degree 5.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -26,7 +26,8 @@ static PetscErrorCode moments(Fixture *x, SbEffect load, PetscReal t, PetscReal 
   PetscCall(effect_force(x, load, t));
   for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
     sum[0] += x->f[3 * i];
-    for (int c = 0; c < 3; c++) sum[1 + c] += x->f[3 * i] * x->space->node_x[3 * i + c];
+    for (int c = 0; c < 3; c++)
+      sum[1 + c] += x->f[3 * i] * x->space->node_x[3 * i + c];
     SB_CHECK(x->f[3 * i + 1] == 0 && x->f[3 * i + 2] == 0, "other components");
   }
   PetscCallMPI(MPI_Allreduce(sum, all, 4, MPIU_REAL, MPI_SUM, x->space->comm));
@@ -40,9 +41,10 @@ static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, const int p[3
   PetscReal sum[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "-effect_%s x^%d*y^%d*z^%d;0;0",
-                          ncorner == 4 ? "body_force_density" : "traction_on top -effect_traction_vector",
-                          p[0], p[1], p[2]));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), "-effect_%s x^%d*y^%d*z^%d;0;0",
+                  ncorner == 4 ? "body_force_density" : "traction_on top -effect_traction_vector",
+                  p[0], p[1], p[2]));
   PetscCall(effect_create(x, ncorner == 4 ? "body_force" : "traction", text, &load));
   PetscCall(moments(x, load, 0, sum));
   if (p[0] + p[1] + p[2] <= 4) {
@@ -55,7 +57,8 @@ static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, const int p[3
       SB_CHECK_NEAR(sum[1 + c], exact(ncorner, higher), 1e-14, text);
     }
   } else {
-    SB_CHECK(PetscAbsReal(sum[0] - exact(ncorner, p)) > 1e-10, "%s is beyond the rule, yet exact", text);
+    SB_CHECK(PetscAbsReal(sum[0] - exact(ncorner, p)) > 1e-10, "%s is beyond the rule, yet exact",
+             text);
   }
   PetscCall(SbEffectDestroy(&load));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -67,10 +70,11 @@ static PetscErrorCode check_time(Fixture *x)
   PetscReal sum[4];
 
   PetscFunctionBeginUser;
-  PetscCall(effect_create(x, "body_force", "-effect_body_force_density 3*t*x;0;0 -effect_body_force_time 0.5",
-                          &load));
+  PetscCall(effect_create(
+    x, "body_force", "-effect_body_force_density 3*t*x;0;0 -effect_body_force_time 0.5", &load));
   for (int k = 0; k < 4; k++) {
-    const PetscReal t = k < 2 ? 2.0 : (PetscReal)k - 3; // twice the same time, then back to earlier ones
+    const PetscReal t =
+      k < 2 ? 2.0 : (PetscReal)k - 3; // twice the same time, then back to earlier ones
 
     PetscCall(moments(x, load, t, sum));
     SB_CHECK_NEAR(sum[0], 0.5 * 3 * t * 0.5, 1e-14, "force that grows with time");
@@ -93,10 +97,13 @@ static PetscErrorCode check_element(const char *element)
 
     for (int i = 0; i <= 4; i++) {
       for (int j = 0; i + j <= 4; j++)
-        for (int k = 0; i + j + k <= 4; k++) PetscCall(check_monomial(&x, ncorner, (const int[3]){i, j, k}));
+        for (int k = 0; i + j + k <= 4; k++)
+          PetscCall(check_monomial(&x, ncorner, (const int[3]){i, j, k}));
     }
-    for (int i = 0; i < 2; i++) PetscCall(check_monomial(&x, ncorner, beyond[i]));
-    if (ncorner == 4) PetscCall(check_time(&x));
+    for (int i = 0; i < 2; i++)
+      PetscCall(check_monomial(&x, ncorner, beyond[i]));
+    if (ncorner == 4)
+      PetscCall(check_time(&x));
   }
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);

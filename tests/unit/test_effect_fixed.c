@@ -1,6 +1,6 @@
 /*
-  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body under its
-  weight, so that the support carries the weight at its nodes; every element.
+  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body
+  under its weight, so that the support carries the weight at its nodes; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -27,12 +27,14 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  PetscCall(effect_create(&x, "roll",
-                          "-effect_roll_type fixed -effect_roll_on bottom -effect_roll_components z", &roll));
+  PetscCall(
+    fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(effect_create(
+    &x, "roll", "-effect_roll_type fixed -effect_roll_on bottom -effect_roll_components z", &roll));
   PetscCall(effect_create(&x, "rest", "-effect_rest_type fixed -effect_rest_on all", &rest));
   PetscCall(SbSpacePrescribeDone(x.space));
-  SB_CHECK(roll->linear && roll->steady && !roll->ops.force && !roll->ops.tangent, "a support is no force");
+  SB_CHECK(roll->linear && roll->steady && !roll->ops.force && !roll->ops.tangent,
+           "a support is no force");
   SB_CHECK(roll->ncolumn == 3, "columns");
   PetscCall(PetscStrcmp(roll->column[2], "reaction_z", &same));
   SB_CHECK(same, "column %s", roll->column[2]);
@@ -40,10 +42,12 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
     SB_CHECK(x.space->fixed[i] == 7, "every unknown is constrained");
 
   // Values are overwritten by zeros, each by its owner.
-  for (PetscInt i = 0; i < 3 * x.space->nfixed; i++) x.space->fixed_value[i] = 1;
+  for (PetscInt i = 0; i < 3 * x.space->nfixed; i++)
+    x.space->fixed_value[i] = 1;
   PetscCall((*roll->ops.prescribe)(roll, x.space, 0));
   for (PetscInt k = 0; k < x.space->nfixed; k++) {
-    const PetscBool at = x.space->node_x[3 * x.space->fixed_node[k] + 2] < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
+    const PetscBool at =
+      x.space->node_x[3 * x.space->fixed_node[k] + 2] < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
 
     SB_CHECK(x.space->fixed_value[3 * k] == 1 && x.space->fixed_value[3 * k + 2] == (at ? 0 : 1),
              "values of the first support");
@@ -52,10 +56,12 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
   for (PetscInt i = 0; i < 3 * x.space->nfixed; i++)
     SB_CHECK(x.space->fixed_value[i] == 0, "values of both supports");
 
-  // Residual of a body in its reference state under its weight: minus the load. Both supports together carry 1200 kg.
+  // Residual of a body in its reference state under its weight: minus the load. Both supports
+  // together carry 1200 kg.
   PetscCall(effect_create(&x, "gravity", "", &weight));
   PetscCall(effect_force(&x, weight, 0));
-  for (PetscInt i = 0; i < 3 * x.space->nnode; i++) x.f[i] = -x.f[i];
+  for (PetscInt i = 0; i < 3 * x.space->nnode; i++)
+    x.f[i] = -x.f[i];
   PetscCall(history(&x, roll, R));
   SB_CHECK_NEAR(R[0], 0, 0, "sideways");
   SB_CHECK_NEAR(R[2], DENSITY * 9.81 * low, 1e-9, "reaction of the bottom");
@@ -73,8 +79,11 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  // In a box with this subdivision the lowest layer of vertices has a quarter of the mass: half of the lower of two layers.
+
+  // In a box with this subdivision the lowest layer of vertices has a quarter of the mass: half of
+  // the lower of two layers.
   PetscCall(check_element("p1", 0.25));
+
   // Eight tets of 48 have a face at the bottom, which has a quarter of their mass.
   PetscCall(check_element("cr", 8.0 / 48 / 4));
   PetscCall(check_element("dg", 8.0 / 48 / 4));

@@ -1,11 +1,12 @@
 /*
-  Gravity: weight and its moment about the origin for two boxes; the factor of time; contributions to nodes of
-  other ranks; every element, also mixed.
+  Gravity: weight and its moment about the origin for two boxes; the factor of time; contributions
+  to nodes of other ranks; every element, also mixed.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
 
-/* Unit boxes centred at (0.5, 0.5, 0.5) and (3.5, 0.5, 0.5), 1200 kg each: a force F acts at their common centre (2, .5, .5). */
+/* Unit boxes centred at (0.5, 0.5, 0.5) and (3.5, 0.5, 0.5), 1200 kg each: a force F acts at their
+   common centre (2, .5, .5). */
 #define AT(x, y, z)                                           \
   {x, y, z},                                                  \
   {                                                           \

@@ -1,6 +1,7 @@
 /*
-  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the origin, both
-  at once, single components; reaction and torque; every element, and supports of DG faces.
+  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the
+  origin, both at once, single components; reaction and torque; every element, and supports of DG
+  faces.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -8,14 +9,17 @@
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}, {"bottom", "plane:0,0,1,0"}};
 
-/* Prescribed values of the effect at time t against the function `expected`; nodes of other sets are ignored. */
+/* Prescribed values of the effect at time t against the function `expected`; nodes of other sets
+   are ignored. */
 static PetscErrorCode check_values(Fixture *x, SbEffect e, PetscReal t, PetscReal z, int components,
-                                   void (*expected)(const PetscReal X[3], PetscReal t, PetscReal u[3]))
+                                   void (*expected)(const PetscReal X[3], PetscReal t,
+                                                    PetscReal u[3]))
 {
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * x->space->nfixed; i++) x->space->fixed_value[i] = -77;
+  for (PetscInt i = 0; i < 3 * x->space->nfixed; i++)
+    x->space->fixed_value[i] = -77;
   PetscCall((*e->ops.prescribe)(e, x->space, t));
   for (PetscInt k = 0; k < x->space->nfixed; k++) {
     const PetscReal *X = &x->space->node_x[3 * x->space->fixed_node[k]];
@@ -26,7 +30,8 @@ static PetscErrorCode check_values(Fixture *x, SbEffect e, PetscReal t, PetscRea
       const PetscBool held =
         (components & (1 << c)) && PetscAbsReal(X[2] - z) < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
 
-      SB_CHECK_NEAR(x->space->fixed_value[3 * k + c], held ? u[c] : -77, 1e-15, "prescribed displacement");
+      SB_CHECK_NEAR(x->space->fixed_value[3 * k + c], held ? u[c] : -77, 1e-15,
+                    "prescribed displacement");
       n += held;
     }
   }
@@ -35,10 +40,12 @@ static PetscErrorCode check_values(Fixture *x, SbEffect e, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rotation by 90 t degrees about the axis through (1, 0, 0) along +z, and translation by t / 2 along it. */
+/* Rotation by 90 t degrees about the axis through (1, 0, 0) along +z, and translation by t / 2
+   along it. */
 static void turn_and_lift(const PetscReal X[3], PetscReal t, PetscReal u[3])
 {
-  const PetscReal a = t * PETSC_PI / 2, r[2] = {X[0] - 1, X[1]};
+  const PetscReal a = t * PETSC_PI / 2;
+  const PetscReal r[2] = {X[0] - 1, X[1]};
 
   u[0] = PetscCosReal(a) * r[0] - PetscSinReal(a) * r[1] - r[0];
   u[1] = PetscSinReal(a) * r[0] + PetscCosReal(a) * r[1] - r[1];
@@ -53,11 +60,13 @@ static void table_and_stretch(const PetscReal X[3], PetscReal t, PetscReal u[3])
   u[2] = t * X[0] * X[1];
 }
 
-/* A residual tangential to the axis of the effect: force k x (x - c) at each node of the top, in the reference state and after rotation. */
+/* A residual tangential to the axis of the effect: force k x (x - c) at each node of the top, in
+   the reference state and after rotation. */
 static PetscErrorCode check_torque(Fixture *x, SbEffect e)
 {
   const PetscReal n = x->space->faces ? 8 : 9; // nodes of the top
-  PetscReal mine[4], all[4], expected = 0;
+  PetscReal mine[4], all[4];
+  PetscReal expected = 0;
   const SbStage stage = {.u = x->u};
 
   PetscFunctionBeginUser;
@@ -72,17 +81,21 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
   if (!x->space->faces) {
     // Moment of k x r about k: r^2, over 3 x 3 nodes at distances (x - 1)^2 + y^2.
     for (int i = 0; i < 3; i++)
-      for (int j = 0; j < 3; j++) expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
+      for (int j = 0; j < 3; j++)
+        expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
   } else {
-    // The eight triangles of the top: relative to its centre their centroids are at 1/6 and 1/3 along x and y, however the
-    // diagonals run; so (x - 1)^2 and y^2 both sum to 4 (1/36 + 1/9) + 8/4.
+    // The eight triangles of the top: relative to its centre their centroids are at 1/6 and 1/3
+    // along x and y, however the diagonals run; so (x - 1)^2 and y^2 both sum to 4 (1/36 + 1/9) +
+    // 8/4.
     expected = 46.0 / 9;
   }
   PetscCall((*e->ops.history)(e, x->space, &stage, x->f, mine));
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all[2], n, 1e-14, "reaction along the axis");
   SB_CHECK_NEAR(all[3], expected, 1e-13, "torque");
-  // A rotation by 90 degrees rotates the sum of forces: r sums to n (-.5, .5), rotated to n (-.5, -.5), k x r to n (.5, -.5).
+
+  // A rotation by 90 degrees rotates the sum of forces: r sums to n (-.5, .5), rotated to n (-.5,
+  // -.5), k x r to n (.5, -.5).
   SB_CHECK_NEAR(all[0], 0.5 * n, 1e-13, "reaction x");
   SB_CHECK_NEAR(all[1], -0.5 * n, 1e-13, "reaction y");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -98,9 +111,11 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   PetscFunctionBeginUser;
   fixture_use(element, element, held);
   PetscCall(test_file_open(".txt", table, &file));
-  if (file) fprintf(file, "# t x\n0 0\n2, 3\n");
+  if (file)
+    fprintf(file, "# t x\n0 0\n2, 3\n");
   PetscCall(test_file_close(file));
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(
+    fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(effect_create(
     &x, "twist",
     "-effect_twist_type prescribed_displacement -effect_twist_on top -effect_twist_angle 90*t "

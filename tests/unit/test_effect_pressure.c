@@ -1,8 +1,8 @@
 /*
-  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by
-  Taylor remainders on a closed surface and on an open one, with free and fixed boundary; symmetry of the
-  matrix; boundaries that are supported, or in symmetry planes, need no boundary term; rest normals if
-  requested; every element.
+  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the
+  tangent by Taylor remainders on a closed surface and on an open one, with free and fixed boundary;
+  symmetry of the matrix; boundaries that are supported, or in symmetry planes, need no boundary
+  term; rest normals if requested; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -11,28 +11,34 @@ static const char *const sets[][2] = {{"skin", "boundary"}, {"top", "plane:0,0,1
 
 #define P 250.0 /* Pa */
 
-/* Current volume over all ranks, m^3: with nodes at vertices the sum of det / 6 over owned cells. */
+/* Current volume over all ranks, m^3: with nodes at vertices the sum of det / 6 over owned
+   cells. */
 static PetscErrorCode volume(const Fixture *x, const PetscReal u[], PetscReal *all)
 {
-  PetscReal sum = 0, energy, minJ;
+  PetscReal sum = 0;
+  PetscReal energy, minJ;
   PetscInt ninverted;
 
   PetscFunctionBeginUser;
-  if (!x->space->vertices) SbSpaceStrainEnergy(x->space, u, NULL, &energy, &minJ, &ninverted, &sum);
+  if (!x->space->vertices)
+    SbSpaceStrainEnergy(x->space, u, NULL, &energy, &minJ, &ninverted, &sum);
   for (PetscInt cell = 0; x->space->vertices && cell < x->mesh->ncell_owned; cell++) {
     const PetscInt *node = &x->space->cell_node[4 * cell];
     PetscReal p[4][3], e[9];
 
     for (int a = 0; a < 4; a++)
-      for (int i = 0; i < 3; i++) p[a][i] = x->space->node_x[3 * node[a] + i] + u[3 * node[a] + i];
-    for (int k = 0; k < 9; k++) e[k] = p[k / 3 + 1][k % 3] - p[0][k % 3];
+      for (int i = 0; i < 3; i++)
+        p[a][i] = x->space->node_x[3 * node[a] + i] + u[3 * node[a] + i];
+    for (int k = 0; k < 9; k++)
+      e[k] = p[k / 3 + 1][k % 3] - p[0][k % 3];
     sum += SbMatDet(e) / 6;
   }
   PetscCallMPI(MPI_Allreduce(&sum, all, 1, MPIU_REAL, MPI_SUM, x->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smooth direction w[nnode][3] that depends on the seed; with `rim` zero on the edges of the top. */
+/* Smooth direction w[nnode][3] that depends on the seed; with `rim` zero on the edges of the
+   top. */
 static void direction(const Fixture *x, PetscReal seed, PetscBool rim, PetscReal w[])
 {
   for (PetscInt i = 0; i < x->space->nnode; i++) {
@@ -42,31 +48,36 @@ static void direction(const Fixture *x, PetscReal seed, PetscBool rim, PetscReal
     const PetscReal one = rim && !in ? 0 : 1;
 
     for (int c = 0; c < 3; c++)
-      w[3 * i + c] = one * PetscSinReal(seed + 2 * c + 3 * X[0] - (1 + seed) * X[1] + 5 * X[2] * X[0]);
+      w[3 * i + c] =
+        one * PetscSinReal(seed + 2 * c + 3 * X[0] - (1 + seed) * X[1] + 5 * X[2] * X[0]);
   }
 }
 
-static PetscErrorCode dot(const Fixture *x, const PetscReal a[], const PetscReal b[], PetscReal *all)
+static PetscErrorCode dot(const Fixture *x, const PetscReal a[], const PetscReal b[],
+                          PetscReal *all)
 {
   PetscReal sum = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) sum += a[i] * b[i];
+  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++)
+    sum += a[i] * b[i];
   PetscCallMPI(MPI_Allreduce(&sum, all, 1, MPIU_REAL, MPI_SUM, x->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode check_closed(Fixture *x, Fixture *serial)
 {
-  const PetscReal zero[3] = {0, 0, 0}, h = 0.05;
+  const PetscReal zero[3] = {0, 0, 0};
+  const PetscReal h = 0.05;
   SbEffect e, es;
   PetscReal *w, *v, V[4], work;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    effect_create(x, "air", "-effect_air_type pressure -effect_air_on skin -effect_air_value 250", &e));
+  PetscCall(effect_create(
+    x, "air", "-effect_air_type pressure -effect_air_on skin -effect_air_value 250", &e));
   PetscCall(effect_create(serial, "air", "", &es));
-  SB_CHECK(!e->linear && e->steady && e->ops.tangent, "a follower load depends on the displacement");
+  SB_CHECK(!e->linear && e->steady && e->ops.tangent,
+           "a follower load depends on the displacement");
   deform(x, 1);
   deform(serial, 1);
   PetscCall(effect_force(x, e, 0));
@@ -74,13 +85,15 @@ static PetscErrorCode check_closed(Fixture *x, Fixture *serial)
   PetscCall(check_resultant(x, zero, zero, P, "pressure all around"));
   PetscCall(check_serial(x, serial, P, "parallel and serial pressure at a node"));
 
-  // V is a cubic polynomial along w: this difference is its exact derivative up to rounding, 1e-16 V / h.
+  // V is a cubic polynomial along w: this difference is its exact derivative up to rounding, 1e-16
+  // V / h.
   PetscCall(PetscMalloc2(3 * x->space->nnode, &w, 3 * x->space->nnode, &v));
   direction(x, 1, PETSC_FALSE, w);
   for (int k = 0; k < 4; k++) {
     const PetscReal step[] = {h, -h, 2 * h, -2 * h};
 
-    for (PetscInt i = 0; i < 3 * x->space->nnode; i++) v[i] = x->u[i] + step[k] * w[i];
+    for (PetscInt i = 0; i < 3 * x->space->nnode; i++)
+      v[i] = x->u[i] + step[k] * w[i];
     PetscCall(volume(x, v, &V[k]));
   }
   PetscCall(dot(x, x->f, w, &work));
@@ -95,14 +108,19 @@ static PetscErrorCode check_closed(Fixture *x, Fixture *serial)
 
 static PetscErrorCode check_face(Fixture *x)
 {
-  const PetscReal F[3] = {0, 0, -3 * P}, M[3] = {-1.5 * P, 1.5 * P, 0};
+  const PetscReal F[3] = {0, 0, -3 * P};
+  const PetscReal M[3] = {-1.5 * P, 1.5 * P, 0};
   const char *options =
     "-effect_hat_type pressure -effect_hat_on top -effect_hat_value 125*t -effect_hat_time t+1";
-  // A rotation by 90 degrees about x maps (x, y, z) to (x, -z, y): the top then faces -y, and its load is along +y at (.5, -1, .5).
-  const PetscReal G[3] = {0, 3 * P, 0}, N[3] = {-1.5 * P, 0, 1.5 * P};
+
+  // A rotation by 90 degrees about x maps (x, y, z) to (x, -z, y): the top then faces -y, and its
+  // load is along +y at (.5, -1, .5).
+  const PetscReal G[3] = {0, 3 * P, 0};
+  const PetscReal N[3] = {-1.5 * P, 0, 1.5 * P};
   SbEffect e;
 
   PetscFunctionBeginUser;
+
   // At t = 2: 250 Pa, times 3.
   deform(x, 0);
   PetscCall(effect_create(x, "hat", options, &e));
@@ -165,8 +183,8 @@ static PetscErrorCode apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[
 }
 
 /*
-  |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so the ratio
-  of two steps is 100 up to rounding. Without the tangent it is 10.
+  |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so
+  the ratio of two steps is 100 up to rounding. Without the tangent it is 10.
 */
 static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
 {
@@ -182,6 +200,7 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
   PetscCall(PetscArraycpy(f, x->f, 3 * n));
   PetscCall(tangent(x, e, 1, A));
   PetscCall(apply(x, A, w, Aw));
+
   // The part that is applied outside the matrix.
   if (e->ops.nonsymmetric) {
     const SbStage stage = {.t = 2, .u = x->u, .shift_k = 1};
@@ -189,18 +208,23 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
 
     PetscCall(PetscCalloc1(3 * n, &y));
     PetscCall((*e->ops.nonsymmetric)(e, x->space, &stage, w, y));
-    for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) Aw[i] += y[i];
+    for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++)
+      Aw[i] += y[i];
     PetscCall(PetscFree(y));
   }
   for (int k = 0; k < 2; k++) {
     const PetscReal h = k ? 1e-3 : 1e-2;
 
-    for (PetscInt i = 0; i < 3 * n; i++) x->u[i] = u[i] + h * w[i];
+    for (PetscInt i = 0; i < 3 * n; i++)
+      x->u[i] = u[i] + h * w[i];
     PetscCall(effect_force(x, e, 2));
-    for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] += h * Aw[i] - f[i];
+    for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++)
+      x->f[i] += h * Aw[i] - f[i];
+
     // With a constrained rim its own rows do not count.
     if (rim)
-      for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] *= w[3 * (i / 3)] == 0 ? 0 : 1;
+      for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++)
+        x->f[i] *= w[3 * (i / 3)] == 0 ? 0 : 1;
     PetscCall(dot(x, x->f, x->f, &remainder[k]));
     remainder[k] = PetscSqrtReal(remainder[k]);
   }
@@ -226,7 +250,9 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(SbSpacePrescribeDone(x->space));
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
-  // P1 and P2: the boundary term is outside the matrix; CR and DG, whose facets do not meet at edges: the whole tangent of an open surface is.
+
+  // P1 and P2: the boundary term is outside the matrix; CR and DG, whose facets do not meet at
+  // edges: the whole tangent of an open surface is.
   SB_CHECK(!closed->ops.nonsymmetric && open->ops.nonsymmetric, "what is beside the matrix");
   PetscCall(check_taylor(x, open, A, PETSC_FALSE));
   PetscCall(check_taylor(x, open, A, PETSC_TRUE));
@@ -253,7 +279,8 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rim of the top in symmetry planes, the edge at x = 1 fixed: no boundary term of the tangent is left. */
+/* Rim of the top in symmetry planes, the edge at x = 1 fixed: no boundary term of the tangent is
+   left. */
 static PetscErrorCode check_rim(Fixture *x)
 {
   SbEffect e;
@@ -263,9 +290,12 @@ static PetscErrorCode check_rim(Fixture *x)
     const PetscReal *X = &x->space->node_x[3 * i];
     int components = 0;
 
-    if (X[0] < 1e-9) components |= 1;
-    if (X[1] < 1e-9 || X[1] > 1 - 1e-9) components |= 2;
-    if (X[0] > 1 - 1e-9) components = 7;
+    if (X[0] < 1e-9)
+      components |= 1;
+    if (X[1] < 1e-9 || X[1] > 1 - 1e-9)
+      components |= 2;
+    if (X[0] > 1 - 1e-9)
+      components = 7;
     PetscCall(SbSpacePrescribe(x->space, i, components));
   }
   PetscCall(SbEffectCreate("hat", &e));
@@ -281,13 +311,15 @@ static PetscErrorCode check_element(const char *element)
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(
-    fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
+    fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets,
+                           &serial));
   PetscCall(check_closed(&x, &serial));
   PetscCall(check_face(&x));
   PetscCall(check_tangent(&x));
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &held));
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets),
+                           sets, &held));
   PetscCall(check_rim(&held));
   PetscCall(fixture_destroy(&held));
   PetscCall(fixture_destroy(&x));

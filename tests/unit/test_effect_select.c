@@ -1,6 +1,6 @@
 /*
-  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks,
-  each item once if sets overlap, and error messages for invalid sets.
+  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all
+  ranks, each item once if sets overlap, and error messages for invalid sets.
 */
 // @ranks 1 3
 #include "../../src/effect/effect_impl.h"
@@ -24,16 +24,19 @@ static const SbEffectOn *on_sets(const char *a, const char *b)
   return &on;
 }
 
-static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, PetscReal area, PetscInt count)
+static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, PetscReal area,
+                                   PetscInt count)
 {
   SbFacet *facets;
   PetscInt n;
-  PetscReal sum[2] = {0, 0}, all[2];
+  PetscReal sum[2] = {0, 0};
+  PetscReal all[2];
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(x->space, on_sets(a, b), &n, &facets));
   for (PetscInt i = 0; i < n; i++) {
-    if (facets[i].cell >= x->mesh->ncell_owned) continue;
+    if (facets[i].cell >= x->mesh->ncell_owned)
+      continue;
     sum[0] += facets[i].area;
     sum[1] += 1;
   }
@@ -46,7 +49,9 @@ static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, Pet
 
 static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, PetscInt count)
 {
-  PetscInt n, *nodes, owned = 0, all;
+  PetscInt n, *nodes;
+  PetscInt owned = 0;
+  PetscInt all;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectItems(x->space, on_sets(a, b), SB_ON_NODES, &n, &nodes));
@@ -63,7 +68,8 @@ static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, Pets
 static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, PetscReal volume)
 {
   PetscInt n, *cells;
-  PetscReal sum = 0, all;
+  PetscReal sum = 0;
+  PetscReal all;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectItems(x->space, on_sets(a, b), SB_ON_CELLS, &n, &cells));
@@ -82,15 +88,16 @@ static PetscErrorCode check_errors(Fixture *x)
   PetscInt n, *items;
 
   PetscFunctionBeginUser;
+
   // One vertex, no facet, no cell: the message names set and counts.
-  SB_CHECK_ERROR(SbEffectFacets(x->space, on_sets("bottom", "corner"), &n, &facets), PETSC_ERR_USER_INPUT,
-                 "1 vertices|0");
+  SB_CHECK_ERROR(SbEffectFacets(x->space, on_sets("bottom", "corner"), &n, &facets),
+                 PETSC_ERR_USER_INPUT, "1 vertices|0");
   SB_CHECK_ERROR(SbEffectItems(x->space, on_sets("bottom", "corner"), SB_ON_CELLS, &n, &items),
                  PETSC_ERR_USER_INPUT, "-effect_test_on|set bottom");
-  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets("botom", NULL), SB_ON_NODES, &n, &items), PETSC_ERR_USER,
-                 "bottom");
-  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets(NULL, NULL), SB_ON_NODES, &n, &items), PETSC_ERR_USER_INPUT,
-                 "-effect_test_on");
+  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets("botom", NULL), SB_ON_NODES, &n, &items),
+                 PETSC_ERR_USER, "bottom");
+  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets(NULL, NULL), SB_ON_NODES, &n, &items),
+                 PETSC_ERR_USER_INPUT, "-effect_test_on");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,7 +109,8 @@ static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bo
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(
+    fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(check_facets(&x, "all", "west", 6, 192));
   PetscCall(check_cells(&x, "lower", "all", 1));
   PetscCall(check_nodes(&x, "bottom", NULL, bottom));
@@ -122,11 +130,13 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
+
   // 64 cubes of six tets: 192 faces on the boundary, (6 * 64 * 4 - 192) / 2 inside.
   PetscCall(check_faces("cr", 864, 32));
   PetscCall(check_faces("dg", 1536, 32));
   fixture_use("p1", "p1", PETSC_FALSE);
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(
+    fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(check_facets(&x, "bottom", NULL, 1, 32));
   PetscCall(check_facets(&x, "bottom", "west", 2, 64));
   PetscCall(check_facets(&x, "bottom", "bottom", 1, 32));

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Cell kernels on random tets, a different one in each lane: gradients of affine maps, forces as derivatives
-  of the energy, blocks as derivatives of the forces, vanishing terms, and a patch of tets under constant
-  strain.
+  Cell kernels on random tets, a different one in each lane: gradients of affine maps, forces as
+  derivatives of the energy, blocks as derivatives of the forces, vanishing terms, and a patch of
+  tets under constant strain.
 */
 #include "material_checks.h"
 #include <sbelement.h>
@@ -17,7 +17,8 @@ static void make_cells(SbElement e, PetscReal size, Cells *c)
     PetscReal x[4][3], g[3][3], V;
 
     for (int a = 0; a < 4; a++)
-      for (int i = 0; i < 3; i++) x[a][i] = size * (0.15 * uniform() + (a == i + 1));
+      for (int i = 0; i < 3; i++)
+        x[a][i] = size * (0.15 * uniform() + (a == i + 1));
     e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
     SbPackPut(12, &x[0][0], l, c->X);
     SbPackPut(9, &g[0][0], l, c->g);
@@ -30,10 +31,12 @@ static void affine(const Cells *c, const SbPack A[9], const SbPack b[3], SbPack 
 {
   for (int l = 0; l < SB_BATCH; l++) {
     for (int k = 0; k < 12; k++) {
-      const int a = k / 3, i = k % 3;
+      const int a = k / 3;
+      const int i = k % 3;
 
       u[k][l] = b[i][l] - c->X[k][l];
-      for (int j = 0; j < 3; j++) u[k][l] += A[3 * i + j][l] * c->X[3 * a + j][l];
+      for (int j = 0; j < 3; j++)
+        u[k][l] += A[3 * i + j][l] * c->X[3 * a + j][l];
     }
   }
 }
@@ -56,7 +59,8 @@ static void random_state(const Cells *c, PetscReal size, SbPack A[9], SbPack u[1
 
     random_deformation(size, F);
     SbPackPut(9, F, l, A);
-    for (int i = 0; i < 3; i++) b[i][l] = c->X[1][l] * uniform();
+    for (int i = 0; i < 3; i++)
+      b[i][l] = c->X[1][l] * uniform();
   }
   affine(c, (const SbPack *)A, (const SbPack *)b, u);
 }
@@ -65,7 +69,8 @@ static PetscReal lane_difference(int n, const SbPack a[], const SbPack b[])
 {
   PetscReal worst = 0;
 
-  for (int k = 0; k < n; k++) worst = larger(worst, difference(SB_BATCH, a[k], b[k]));
+  for (int k = 0; k < n; k++)
+    worst = larger(worst, difference(SB_BATCH, a[k], b[k]));
   return worst;
 }
 
@@ -79,24 +84,30 @@ static void test_gradient(SbElement e)
     random_state(&c, 0.5, A, u);
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)F) < 1e-13,
-             "F of an affine map is off by %g", lane_difference(9, (const SbPack *)A, (const SbPack *)F));
+             "F of an affine map is off by %g",
+             lane_difference(9, (const SbPack *)A, (const SbPack *)F));
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 0., H);
     for (int k = 0; k < 9; k += 4)
-      for (int l = 0; l < SB_BATCH; l++) H[k][l] += 1;
+      for (int l = 0; l < SB_BATCH; l++)
+        H[k][l] += 1;
     SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)H) < 1e-13,
              "the rate of an affine map is wrong");
     for (int k = 0; k < 12; k++)
-      for (int l = 0; l < SB_BATCH; l++) u[k][l] = 1e3 * (1 + k % 3);
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] = 1e3 * (1 + k % 3);
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     for (int k = 0; k < 9; k++)
-      for (int l = 0; l < SB_BATCH; l++) SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
+      for (int l = 0; l < SB_BATCH; l++)
+        SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
   }
 }
 
-/* Force = d(V psi)/du by central differences of step 1e-5 size: truncation about 1e-10, rounding 1e-11 of E size^2. */
+/* Force = d(V psi)/du by central differences of step 1e-5 size: truncation about 1e-10, rounding
+   1e-11 of E size^2. */
 static void test_force(SbElement e, SbMaterial m)
 {
-  const PetscReal size = 0.01, h = 1e-5 * size;
+  const PetscReal size = 0.01;
+  const PetscReal h = 1e-5 * size;
 
   for (int t = 0; t < 10; t++) {
     Cells c;
@@ -106,10 +117,12 @@ static void test_force(SbElement e, SbMaterial m)
     random_state(&c, 0.25, A, u);
     force_of(m, &c, (const SbPack *)u, f);
     for (int k = 0; k < 12; k++) {
-      for (int l = 0; l < SB_BATCH; l++) u[k][l] += h;
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] += h;
       SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
       m->ops.energy(m, (const SbPack *)F, plus);
-      for (int l = 0; l < SB_BATCH; l++) u[k][l] -= 2 * h;
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] -= 2 * h;
       SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
       m->ops.energy(m, (const SbPack *)F, minus);
       for (int l = 0; l < SB_BATCH; l++) {
@@ -120,8 +133,8 @@ static void test_force(SbElement e, SbMaterial m)
     }
     for (int k = 0; k < 3; k++) {
       for (int l = 0; l < SB_BATCH; l++) {
-        SB_CHECK_NEAR(f[k][l] + f[3 + k][l] + f[6 + k][l] + f[9 + k][l], 0, 1e-14 * m->E * size * size,
-                      "sum of forces");
+        SB_CHECK_NEAR(f[k][l] + f[3 + k][l] + f[6 + k][l] + f[9 + k][l], 0,
+                      1e-14 * m->E * size * size, "sum of forces");
       }
     }
   }
@@ -130,11 +143,16 @@ static void test_force(SbElement e, SbMaterial m)
 /* Entry (3 a + i, 3 b + k) of the cell matrix from the ten blocks. */
 static PetscReal entry(const SbPack K[10][9], int row, int column, int l)
 {
-  const int a = row / 3, i = row % 3, b = column / 3, k = column % 3;
+  const int a = row / 3;
+  const int i = row % 3;
+  const int b = column / 3;
+  const int k = column % 3;
 
   for (int p = 0; p < 10; p++) {
-    if (SbPairA[p] == a && SbPairB[p] == b) return K[p][3 * i + k][l];
-    if (SbPairA[p] == b && SbPairB[p] == a) return K[p][3 * k + i][l];
+    if (SbPairA[p] == a && SbPairB[p] == b)
+      return K[p][3 * i + k][l];
+    if (SbPairA[p] == b && SbPairB[p] == a)
+      return K[p][3 * k + i][l];
   }
   return NAN;
 }
@@ -147,8 +165,8 @@ static void check_block_sums(const SbPack K[10][9], PetscReal scale)
   for (int l = 0; l < SB_BATCH; l++) {
     for (int row = 0; row < 12; row++) {
       for (int k = 0; k < 3; k++) {
-        const PetscReal sum =
-          entry(K, row, k, l) + entry(K, row, 3 + k, l) + entry(K, row, 6 + k, l) + entry(K, row, 9 + k, l);
+        const PetscReal sum = entry(K, row, k, l) + entry(K, row, 3 + k, l) +
+                              entry(K, row, 6 + k, l) + entry(K, row, 9 + k, l);
 
         SB_CHECK_NEAR(sum, 0, 1e-14 * scale, "sum of blocks");
       }
@@ -162,13 +180,16 @@ static void check_block_sums(const SbPack K[10][9], PetscReal scale)
   }
 }
 
-/* Exact tangents: blocks against central differences of the force. exact_spd: the specialised form against the general one. */
+/* Exact tangents: blocks against central differences of the force. exact_spd: the specialised form
+   against the general one. */
 static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
 {
-  const PetscReal size = 0.01, h = 1e-5 * size;
+  const PetscReal size = 0.01;
+  const PetscReal h = 1e-5 * size;
 
   PetscFunctionBeginUser;
-  if (!m->linear) PetscCall(SbMaterialSetTangent(m, kind));
+  if (!m->linear)
+    PetscCall(SbMaterialSetTangent(m, kind));
   for (int t = 0; t < 10; t++) {
     Cells c;
     SbPack A[9], u[12], F[9], C[81], K[10][9], J[10][9], plus[12], minus[12];
@@ -180,15 +201,18 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
     SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, K);
     check_block_sums((const SbPack(*)[9])K, (m->E + m->lambda) * size);
     for (int column = 0; kind == SB_TANGENT_EXACT && column < 12; column++) {
-      for (int l = 0; l < SB_BATCH; l++) u[column][l] += h;
+      for (int l = 0; l < SB_BATCH; l++)
+        u[column][l] += h;
       force_of(m, &c, (const SbPack *)u, plus);
-      for (int l = 0; l < SB_BATCH; l++) u[column][l] -= 2 * h;
+      for (int l = 0; l < SB_BATCH; l++)
+        u[column][l] -= 2 * h;
       force_of(m, &c, (const SbPack *)u, minus);
       for (int l = 0; l < SB_BATCH; l++) {
         u[column][l] += h;
         for (int row = 0; row < 12; row++) {
           SB_CHECK_NEAR(entry((const SbPack(*)[9])K, row, column, l),
-                        (plus[row][l] - minus[row][l]) / (2 * h), 1e-7 * m->E * size, "block against force");
+                        (plus[row][l] - minus[row][l]) / (2 * h), 1e-7 * m->E * size,
+                        "block against force");
         }
       }
     }
@@ -196,8 +220,8 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
       SbPack R[9], W[9];
 
       m->ops.spin(m, (const SbPack *)F, R, W);
-      SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, (const SbPack *)W,
-                            J);
+      SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R,
+                            (const SbPack *)W, J);
       check_block_sums((const SbPack(*)[9])J, (m->E + m->lambda) * size);
       for (int p = 0; p < 10; p++) {
         SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
@@ -222,7 +246,8 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Warped: K v is the force of R hooke(sym(R^T H(v))), and K is positive semi-definite: v . K v >= 0. */
+/* Warped: K v is the force of R hooke(sym(R^T H(v))), and K is positive semi-definite: v . K v >=
+   0. */
 static PetscErrorCode test_warped(SbElement e, SbMaterial m)
 {
   const PetscReal size = 10;
@@ -236,14 +261,16 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
     make_cells(e, size, &c);
     random_state(&c, 0.6, A, u);
     for (int k = 0; k < 12; k++)
-      for (int l = 0; l < SB_BATCH; l++) v[k][l] = uniform();
+      for (int l = 0; l < SB_BATCH; l++)
+        v[k][l] = uniform();
     SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
     m->ops.frame(m, (const SbPack *)F, R);
     SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, K);
     for (int k = 0; k < 9; k++)
-      for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->mu : 0;
-    SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, (const SbPack *)W,
-                          J);
+      for (int l = 0; l < SB_BATCH; l++)
+        W[k][l] = k % 4 == 0 ? -m->mu : 0;
+    SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R,
+                          (const SbPack *)W, J);
     for (int p = 0; p < 10; p++) {
       SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
                  1e-14 * (m->E + m->lambda) * size,
@@ -285,41 +312,52 @@ static void test_rotation(SbElement e, SbMaterial m)
     axis_rotation(axis, degree * PETSC_PI / 180, Q);
     for (int l = 0; l < SB_BATCH; l++) {
       SbPackPut(9, Q, l, A);
-      for (int i = 0; i < 3; i++) b[i][l] = 3 - i;
+      for (int i = 0; i < 3; i++)
+        b[i][l] = 3 - i;
     }
     affine(&c, (const SbPack *)A, (const SbPack *)b, u);
     force_of(m, &c, (const SbPack *)u, f);
     for (int k = 0; k < 12; k++)
-      for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(f[k][l], 0, 1e-12 * m->E, "force of a rotated cell");
+      for (int l = 0; l < SB_BATCH; l++)
+        SB_CHECK_NEAR(f[k][l], 0, 1e-12 * m->E, "force of a rotated cell");
   }
 }
 
 /*
-  Patch test: the unit cube cut into twelve tets around an off-centre interior point. Under constant strain
-  the interior point is in equilibrium, and the forces on the corners sum to zero and to the virial sum_a f_a
-  X_a^T = V P.
+  Patch test: the unit cube cut into twelve tets around an off-centre interior point. Under constant
+  strain the interior point is in equilibrium, and the forces on the corners sum to zero and to the
+  virial sum_a f_a X_a^T = V P.
 */
 static void test_patch(SbElement e, SbMaterial m)
 {
   static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                                   {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  PetscReal X[9][3] = {{0}}, f[9][3] = {{0}}, F[9], P[9], virial[9] = {0}, volume = 0;
+  PetscReal X[9][3] = {{0}};
+  PetscReal f[9][3] = {{0}};
+  PetscReal F[9], P[9];
+  PetscReal virial[9] = {0};
+  PetscReal volume = 0;
 
   for (int k = 0; k < 8; k++)
-    for (int i = 0; i < 3; i++) X[k][i] = (k >> i) & 1;
+    for (int i = 0; i < 3; i++)
+      X[k][i] = (k >> i) & 1;
   X[8][0] = 0.35;
   X[8][1] = 0.6;
   X[8][2] = 0.45;
   random_deformation(0.3, F);
   for (int start = 0; start < 12; start += 4) {
     Cells c;
-    SbPack A[9], b[3] = {{0}}, u[12], fe[12];
+    SbPack A[9];
+    SbPack b[3] = {{0}};
+    SbPack u[12], fe[12];
 
     for (int l = 0; l < SB_BATCH; l++) {
-      const int *corner = face[start + l % 4], node[4] = {8, corner[0], corner[1], corner[2]};
+      const int *corner = face[start + l % 4];
+      const int node[4] = {8, corner[0], corner[1], corner[2]};
       PetscReal x[4][3], g[3][3], V;
 
-      for (int a = 0; a < 4; a++) memcpy(x[a], X[node[a]], sizeof(x[a]));
+      for (int a = 0; a < 4; a++)
+        memcpy(x[a], X[node[a]], sizeof(x[a]));
       e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
       SbPackPut(12, &x[0][0], l, c.X);
       SbPackPut(9, &g[0][0], l, c.g);
@@ -329,11 +367,13 @@ static void test_patch(SbElement e, SbMaterial m)
     affine(&c, (const SbPack *)A, (const SbPack *)b, u);
     force_of(m, &c, (const SbPack *)u, fe);
     for (int l = 0; l < 4; l++) {
-      const int *corner = face[start + l], node[4] = {8, corner[0], corner[1], corner[2]};
+      const int *corner = face[start + l];
+      const int node[4] = {8, corner[0], corner[1], corner[2]};
 
       SB_CHECK(c.V[l] > 0, "tet %d of the patch is inverted", start + l);
       volume += c.V[l];
-      for (int k = 0; k < 12; k++) f[node[k / 3]][k % 3] += fe[k][l];
+      for (int k = 0; k < 12; k++)
+        f[node[k / 3]][k % 3] += fe[k][l];
     }
   }
   stress_of(m, F, P);
@@ -341,8 +381,10 @@ static void test_patch(SbElement e, SbMaterial m)
   for (int i = 0; i < 3; i++) {
     SB_CHECK_NEAR(f[8][i], 0, 1e-13 * (m->E + m->lambda), "force on the inner point of the patch");
     for (int j = 0; j < 3; j++) {
-      for (int k = 0; k < 9; k++) virial[3 * i + j] += f[k][i] * X[k][j];
-      SB_CHECK_NEAR(virial[3 * i + j], P[3 * i + j], 1e-13 * (m->E + m->lambda), "virial of the patch");
+      for (int k = 0; k < 9; k++)
+        virial[3 * i + j] += f[k][i] * X[k][j];
+      SB_CHECK_NEAR(virial[3 * i + j], P[3 * i + j], 1e-13 * (m->E + m->lambda),
+                    "virial of the patch");
     }
   }
 }
@@ -357,10 +399,14 @@ static void test_lanes(SbElement e)
   make_cells(e, 1, &c);
   for (int l = 0; l < SB_BATCH; l++) {
     /* even lanes equal lane 0 */
-    for (int k = 0; k < 81; k++) C[k][l] = l % 2 ? uniform() : l ? C[k][0] : uniform();
-    for (int k = 0; k < 12; k++) u[k][l] = l % 2 ? NAN : l ? u[k][0] : uniform();
-    for (int k = 0; k < 9; k++) R[k][l] = l % 2 ? uniform() : l ? R[k][0] : uniform();
-    for (int k = 0; k < 9; k++) c.g[k][l] = l % 2 ? c.g[k][l] : c.g[k][0];
+    for (int k = 0; k < 81; k++)
+      C[k][l] = l % 2 ? uniform() : l ? C[k][0] : uniform();
+    for (int k = 0; k < 12; k++)
+      u[k][l] = l % 2 ? NAN : l ? u[k][0] : uniform();
+    for (int k = 0; k < 9; k++)
+      R[k][l] = l % 2 ? uniform() : l ? R[k][0] : uniform();
+    for (int k = 0; k < 9; k++)
+      c.g[k][l] = l % 2 ? c.g[k][l] : c.g[k][0];
     c.V[l] = l % 2 ? c.V[l] : c.V[0];
   }
   SbCellGradient((const SbPack *)c.g, (const SbPack *)u, 1., F);
@@ -369,10 +415,13 @@ static void test_lanes(SbElement e)
   SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, J);
   SbCellBlocksCorotated((const SbPack *)c.g, c.V, 3, 2, (const SbPack *)R, (const SbPack *)C, S);
   for (int l = 2; l < SB_BATCH; l += 2) {
-    for (int k = 0; k < 9; k++) different += F[k][l] != F[k][0];
-    for (int k = 0; k < 12; k++) different += f[k][l] != f[k][0];
+    for (int k = 0; k < 9; k++)
+      different += F[k][l] != F[k][0];
+    for (int k = 0; k < 12; k++)
+      different += f[k][l] != f[k][0];
     for (int k = 0; k < 90; k++)
-      different += K[k / 9][k % 9][l] != K[k / 9][k % 9][0] || J[k / 9][k % 9][l] != J[k / 9][k % 9][0] ||
+      different += K[k / 9][k % 9][l] != K[k / 9][k % 9][0] ||
+                   J[k / 9][k % 9][l] != J[k / 9][k % 9][0] ||
                    S[k / 9][k % 9][l] != S[k / 9][k % 9][0];
   }
   SB_CHECK(!different, "%d numbers depend on their neighbours", (int)different);
@@ -398,8 +447,10 @@ int main(int argc, char **argv)
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT));
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT_SPD));
     test_patch(e, m);
-    if (!m->linear) test_rotation(e, m);
-    if (k == 1) PetscCall(test_warped(e, m));
+    if (!m->linear)
+      test_rotation(e, m);
+    if (k == 1)
+      PetscCall(test_warped(e, m));
     PetscCall(SbMaterialDestroy(&m));
   }
   PetscCall(SbElementDestroy(&e));

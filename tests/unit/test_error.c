@@ -1,8 +1,8 @@
 /*
   test_error.c - errors on some ranks: one line per run, the same exit code on all ranks, no hang.
 
-  The result is known after MPI_Finalize(), so this test counts its checks itself: all ranks write their
-  stderr to one file, which rank 0 reads.
+  The result is known after MPI_Finalize(), so this test counts its checks itself: all ranks write
+  their stderr to one file, which rank 0 reads.
 */
 // @ranks 1 3
 #include "test.h"
@@ -15,14 +15,16 @@ static PetscErrorCode fails(const char *what)
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", what);
 }
 
-/* The last rank fails alone, after the last common operation; PetscFinalize() would be another one. */
+/* The last rank fails alone, after the last common operation; PetscFinalize() would be another
+   one. */
 static PetscErrorCode program(int argc, char **argv, PetscMPIInt rank, PetscMPIInt size)
 {
   PetscFunctionBeginUser;
   PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(SbWarning(PETSC_COMM_WORLD, "a warning of %d rank%s", (int)size, size == 1 ? "" : "s"));
-  if (rank == size - 1) PetscCall(fails("the last rank failed"));
+  if (rank == size - 1)
+    PetscCall(fails("the last rank failed"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -31,7 +33,8 @@ static int spoken;
 static void farewell(const char *message, void *ctx)
 {
   (void)ctx;
-  if (!strcmp(message, "the last rank failed")) spoken++;
+  if (!strcmp(message, "the last rank failed"))
+    spoken++;
 }
 
 /* Lines of the file that are exactly `line`, and all its lines. */
@@ -44,14 +47,17 @@ static void count_lines(const char *file, const char *line, int *matches, int *a
   while (f && fgets(text, sizeof(text), f)) {
     (*all)++;
     text[strcspn(text, "\n")] = 0;
-    if (!strcmp(text, line)) (*matches)++;
+    if (!strcmp(text, line))
+      (*matches)++;
   }
-  if (f) (void)fclose(f);
+  if (f)
+    (void)fclose(f);
 }
 
 int main(int argc, char **argv)
 {
-  char file[] = "/tmp/sb_test_error_XXXXXX", warning[64];
+  char file[] = "/tmp/sb_test_error_XXXXXX";
+  char warning[64];
   PetscMPIInt rank, size;
   int fd, matches, all, code;
 
@@ -60,11 +66,13 @@ int main(int argc, char **argv)
   (void)MPI_Comm_size(MPI_COMM_WORLD, &size);
   if (!rank) {
     fd = mkstemp(file);
-    if (fd >= 0) (void)close(fd);
+    if (fd >= 0)
+      (void)close(fd);
   }
   (void)MPI_Bcast(file, sizeof(file), MPI_CHAR, 0, MPI_COMM_WORLD);
   fd = open(file, O_WRONLY | O_APPEND);
-  if (fd < 0 || dup2(fd, STDERR_FILENO) < 0) return 2;
+  if (fd < 0 || dup2(fd, STDERR_FILENO) < 0)
+    return 2;
 
   SbErrorSetFailureHandler(farewell, NULL);
   code = SbErrorFinish(program(argc, argv, rank, size));

@@ -1,16 +1,17 @@
 // @ranks 1 3
 /*
-  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards
-  (to the 1e-4 of the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local
-  rows are never chosen.
+  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes
+  afterwards (to the 1e-4 of the 16-bit factor); the correction is symmetric; constrained nodes and
+  nodes with non-local rows are never chosen.
 */
 #include "../../src/solver/rotated.h"
 #include "../scene.h"
 
-static const char *const scene = "-bodies a -body_a_mesh box:1,0.5,0.4:6,4,4 -body_a_material corotated "
-                                 "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
-                                 "-sets left -set_left_at plane:1,0,0,0 -effects clamp -effect_clamp_type "
-                                 "fixed -effect_clamp_on left -effect_clamp_components x";
+static const char *const scene =
+  "-bodies a -body_a_mesh box:1,0.5,0.4:6,4,4 -body_a_material corotated "
+  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
+  "-sets left -set_left_at plane:1,0,0,0 -effects clamp -effect_clamp_type "
+  "fixed -effect_clamp_on left -effect_clamp_components x";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {
@@ -22,9 +23,11 @@ static void wave(const PetscReal x[3], PetscReal v[3])
 /* z = M r, with P a multiple of the identity. */
 static void apply(SbExactNodes *e, PetscInt n, const float r[], float work[], float z[])
 {
-  for (PetscInt i = 0; i < n; i++) work[i] = r[i];
+  for (PetscInt i = 0; i < n; i++)
+    work[i] = r[i];
   SbExactNodesBefore(e, work);
-  for (PetscInt i = 0; i < n; i++) z[i] = 0.01f * work[i];
+  for (PetscInt i = 0; i < n; i++)
+    z[i] = 0.01f * work[i];
   SbExactNodesAfter(e, r, z);
 }
 
@@ -33,8 +36,12 @@ int main(int argc, char **argv)
   TestScene t;
   SbExactNodes e = {0};
   SbSpace s;
-  PetscReal *spread, worst = 0., products[2] = {0., 0.};
-  PetscInt n, wrong = 0, total;
+  PetscReal *spread;
+  PetscReal worst = 0.;
+  PetscReal products[2] = {0., 0.};
+  PetscInt n;
+  PetscInt wrong = 0;
+  PetscInt total;
   float *r, *w, *z, *r2, *z2;
   Mat A;
   Vec U;
@@ -48,7 +55,8 @@ int main(int argc, char **argv)
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
   PetscCall(SbModelTangent(t.model, 0., 0., 50., 1., U, NULL, A));
   PetscCall(PetscMalloc6(s->nnode_owned, &spread, n, &r, n, &w, n, &z, n, &r2, n, &z2));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = s->node_x[3 * i] < 0.5 ? 1. : 0.;
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    spread[i] = s->node_x[3 * i] < 0.5 ? 1. : 0.;
   for (PetscInt i = 0; i < n; i++) {
     r[i] = sinf((float)(i + 1));
     r2[i] = cosf((float)(3 * i));
@@ -56,7 +64,8 @@ int main(int argc, char **argv)
   PetscCall(SbExactNodesSetUp(&e, s, A, spread, 2.));
   SB_CHECK(e.n == 0, "%" PetscInt_FMT " nodes above a limit that none reaches", e.n);
   apply(&e, n, r, w, z);
-  for (PetscInt i = 0; i < n; i++) wrong += z[i] != 0.01f * r[i];
+  for (PetscInt i = 0; i < n; i++)
+    wrong += z[i] != 0.01f * r[i];
   SB_CHECK(wrong == 0, "without nodes the rest is not left alone");
 
   PetscCall(SbExactNodesSetUp(&e, s, A, spread, 0.5));
@@ -74,7 +83,8 @@ int main(int argc, char **argv)
       PetscReal sum = -r[3 * e.node[k] + c];
 
       for (PetscInt at = e.ia[k]; at < e.ia[k + 1]; at++)
-        for (PetscInt d = 0; d < 3; d++) sum += e.value[9 * at + 3 * c + d] * z[3 * e.ja[at] + d];
+        for (PetscInt d = 0; d < 3; d++)
+          sum += e.value[9 * at + 3 * c + d] * z[3 * e.ja[at] + d];
       worst = PetscMax(worst, PetscAbsReal(sum));
     }
   }

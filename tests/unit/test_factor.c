@@ -1,8 +1,9 @@
 // @ranks 1
 /*
-  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept nodes,
-  disconnected parts, a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest
-  entry gives errors of that size times the condition number of the factor, here about 3: 2e-4 is allowed.
+  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept
+  nodes, disconnected parts, a matrix that is not positive definite. Rounding the columns to 1.5e-5
+  of their largest entry gives errors of that size times the condition number of the factor, here
+  about 3: 2e-4 is allowed.
 */
 #include "../../src/solver/factor.h"
 #include <test.h>
@@ -13,19 +14,21 @@ typedef struct {
   PetscReal *block, *dense;    /* [ia[n]][9]; [3n][3n] */
 } Problem;
 
-/* Two nodes are connected if they are neighbours in a grid of nx x ny x nz nodes that is disconnected every `gap` layers. */
+/* Two nodes are connected if they are neighbours in a grid of nx x ny x nz nodes that is
+   disconnected every `gap` layers. */
 static PetscBool joined(const PetscInt d[3], PetscInt gap, PetscInt i, PetscInt j)
 {
   const PetscInt p[3] = {i % d[0], i / d[0] % d[1], i / (d[0] * d[1])};
   const PetscInt q[3] = {j % d[0], j / d[0] % d[1], j / (d[0] * d[1])};
 
   for (int k = 0; k < 3; k++)
-    if (PetscAbsInt(p[k] - q[k]) > 1) return PETSC_FALSE;
+    if (PetscAbsInt(p[k] - q[k]) > 1)
+      return PETSC_FALSE;
   return (PetscBool)(!gap || p[2] / gap == q[2] / gap);
 }
 
-static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt nkeep, PetscRandom random,
-                                   Problem *p)
+static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt nkeep,
+                                   PetscRandom random, Problem *p)
 {
   const PetscInt n = d[0] * d[1] * d[2];
 
@@ -39,12 +42,15 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
   for (PetscInt i = 0; i < n; i++) {
     p->ia[i + 1] = p->ia[i];
     for (PetscInt j = 0; j < n; j++)
-      if (joined(d, gap, i, j)) p->ja[p->ia[i + 1]++] = j;
+      if (joined(d, gap, i, j))
+        p->ja[p->ia[i + 1]++] = j;
   }
+
   /* off-diagonal entries in (-1, 1), with a dominant diagonal */
   for (PetscInt i = 0; i < 3 * n; i++) {
     for (PetscInt j = 0; j < i; j++) {
-      if (!joined(d, gap, i / 3, j / 3)) continue;
+      if (!joined(d, gap, i / 3, j / 3))
+        continue;
       PetscCall(PetscRandomGetValue(random, &p->dense[i * 3 * n + j]));
       p->dense[j * 3 * n + i] = p->dense[i * 3 * n + j];
       p->dense[i * 3 * n + i] += PetscAbsReal(p->dense[i * 3 * n + j]);
@@ -63,18 +69,26 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
 /* Solves A x = b with known x; the dense Schur complement solves for the kept nodes. */
 static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const char *name)
 {
-  const PetscInt n = 3 * p->n, m = 3 * p->nkeep, free = n - m;
-  PetscReal *schur, *x, error = 0., size = 0.;
+  const PetscInt n = 3 * p->n;
+  const PetscInt m = 3 * p->nkeep;
+  const PetscInt free = n - m;
+  PetscReal *schur, *x;
+  PetscReal error = 0.;
+  PetscReal size = 0.;
   float *b, *kept, *y;
-  PetscBLASInt bm, one = 1, info;
-  SbFactor f, old = NULL;
+  PetscBLASInt bm;
+  PetscBLASInt one = 1;
+  PetscBLASInt info;
+  SbFactor f;
+  SbFactor old = NULL;
   PetscBool ok;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc4(m * m + 1, &schur, n, &x, n, &b, n, &y));
   PetscCall(PetscMalloc1(m + 1, &kept));
   for (PetscInt i = 0; i < m; i++)
-    for (PetscInt j = 0; j < m; j++) schur[i * m + j] = p->dense[(free + i) * n + free + j];
+    for (PetscInt j = 0; j < m; j++)
+      schur[i * m + j] = p->dense[(free + i) * n + free + j];
   PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &f));
   for (int again = 0; again < 2; again++) {
     PetscReal *work = NULL;
@@ -84,14 +98,17 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     PetscCall(PetscArraycpy(work, schur, m * m));
     PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, work, &ok));
     SB_CHECK(ok, "%s: not positive definite", name);
-    if (again) PetscCall(PetscArraycpy(schur, work, m * m));
+    if (again)
+      PetscCall(PetscArraycpy(schur, work, m * m));
     PetscCall(PetscFree(work));
   }
-  for (PetscInt i = 0; i < n; i++) PetscCall(PetscRandomGetValue(random, &x[i]));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(PetscRandomGetValue(random, &x[i]));
   for (PetscInt i = 0; i < n; i++) {
     PetscReal sum = 0.;
 
-    for (PetscInt j = 0; j < n; j++) sum += p->dense[i * n + j] * x[j];
+    for (PetscInt j = 0; j < n; j++)
+      sum += p->dense[i * n + j] * x[j];
     b[i] = (float)sum;
   }
   SbFactorForward(f, b, kept);
@@ -99,12 +116,14 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     PetscReal *k;
 
     PetscCall(PetscMalloc1(m, &k));
-    for (PetscInt i = 0; i < m; i++) k[i] = kept[i];
+    for (PetscInt i = 0; i < m; i++)
+      k[i] = kept[i];
     PetscCall(PetscBLASIntCast(m, &bm));
     PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &bm, schur, &bm, &info));
     SB_CHECK(info == 0, "%s: Schur complement is not positive definite", name);
     PetscCallBLAS("LAPACKpotrs", LAPACKpotrs_("L", &bm, &one, schur, &bm, k, &bm, &info));
-    for (PetscInt i = 0; i < m; i++) kept[i] = (float)k[i];
+    for (PetscInt i = 0; i < m; i++)
+      kept[i] = (float)k[i];
     PetscCall(PetscFree(k));
   }
   SbFactorBackward(f, kept, y);
@@ -115,7 +134,8 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, error, size);
   PetscCall(SbFactorDestroy(&f));
 
-  /* stored in full: exact up to rounding, with its own order and with that of another factor, in place */
+  /* stored in full: exact up to rounding, with its own order and with that of another factor, in
+     place */
   for (int given = 0; given < 2 && !m; given++) {
     PetscReal *z;
 
@@ -125,10 +145,12 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     SB_CHECK(ok, "%s: not positive definite when kept as it is", name);
     for (PetscInt i = 0; i < n; i++) {
       z[i] = 0.;
-      for (PetscInt j = 0; j < n; j++) z[i] += p->dense[i * n + j] * x[j];
+      for (PetscInt j = 0; j < n; j++)
+        z[i] += p->dense[i * n + j] * x[j];
     }
     PetscCall(SbFactorSolve(f, z, z));
-    for (PetscInt i = 0; i < n; i++) SB_CHECK_NEAR(z[i], x[i], 1e-9 * size, name);
+    for (PetscInt i = 0; i < n; i++)
+      SB_CHECK_NEAR(z[i], x[i], 1e-9 * size, name);
     PetscCall(SbFactorDestroy(&old));
     old = f;
     PetscCall(PetscFree(z));
@@ -142,14 +164,18 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
 /* Exact Schur complement (in doubles): A_kk - A_ki A_ii^-1 A_ik by dense elimination. */
 static PetscErrorCode check_schur(Problem *p)
 {
-  const PetscInt n = 3 * p->n, m = 3 * p->nkeep, free = n - m;
-  PetscReal *mine, error = 0.;
+  const PetscInt n = 3 * p->n;
+  const PetscInt m = 3 * p->nkeep;
+  const PetscInt free = n - m;
+  PetscReal *mine;
+  PetscReal error = 0.;
   SbFactor f;
   PetscBool ok;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(m * m, &mine));
-  for (PetscInt i = 0; i < m * m; i++) mine[i] = p->dense[(free + i / m) * n + free + i % m];
+  for (PetscInt i = 0; i < m * m; i++)
+    mine[i] = p->dense[(free + i / m) * n + free + i % m];
   PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &f));
   PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, mine, &ok));
   PetscCall(SbFactorDestroy(&f));
@@ -157,7 +183,8 @@ static PetscErrorCode check_schur(Problem *p)
     for (PetscInt i = k + 1; i < n; i++) {
       const PetscReal l = p->dense[i * n + k] / p->dense[k * n + k];
 
-      for (PetscInt j = k + 1; j < n && l != 0.; j++) p->dense[i * n + j] -= l * p->dense[k * n + j];
+      for (PetscInt j = k + 1; j < n && l != 0.; j++)
+        p->dense[i * n + j] -= l * p->dense[k * n + j];
     }
   }
   for (PetscInt j = 0; j < m; j++)
@@ -176,7 +203,8 @@ static PetscErrorCode check_indefinite(Problem *p)
   PetscFunctionBeginUser;
   PetscCall(SbFactorCreate(p->n, 0, p->ia, p->ja, NULL, &f));
   for (PetscInt k = p->ia[5]; k < p->ia[6]; k++)
-    if (p->ja[k] == 5) p->block[9 * k] = -1.;
+    if (p->ja[k] == 5)
+      p->block[9 * k] = -1.;
   PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, NULL, &ok));
   SB_CHECK(!ok, "an indefinite matrix was factored");
   PetscCall(SbFactorDestroy(&f));
@@ -204,7 +232,8 @@ int main(int argc, char **argv)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
     PetscCall(make_problem(cases[k].d, cases[k].gap, cases[k].nkeep, random, &p));
     PetscCall(check_solve(&p, random, cases[k].name));
-    if (cases[k].check) PetscCall((*cases[k].check)(&p));
+    if (cases[k].check)
+      PetscCall((*cases[k].check)(&p));
     PetscCall(PetscFree2(p.ia, p.ja));
     PetscCall(PetscFree2(p.block, p.dense));
   }

@@ -13,9 +13,10 @@ static PetscErrorCode value(const char *text, PetscReal expected)
 
   PetscFunctionBeginUser;
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f));
+
   /* the same operations in the same order give bitwise the same result */
-  SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text, SbFormulaEval(f, 4, X),
-           expected);
+  SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text,
+           SbFormulaEval(f, 4, X), expected);
   PetscCall(SbFormulaDestroy(&f));
   SB_CHECK(!f, "destroyed formula is not NULL");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -23,7 +24,10 @@ static PetscErrorCode value(const char *text, PetscReal expected)
 
 static PetscErrorCode test_values(void)
 {
-  const PetscReal t = 4, x = X[0], y = X[1], z = X[2];
+  const PetscReal t = 4;
+  const PetscReal x = X[0];
+  const PetscReal y = X[1];
+  const PetscReal z = X[2];
 
   PetscFunctionBeginUser;
   PetscCall(value("2", 2));
@@ -75,6 +79,7 @@ static PetscErrorCode test_uses(void)
              "%s: time %d, place %d", cases[i].text, SbFormulaUses(f, 't'), SbFormulaUses(f, 'x'));
     PetscCall(SbFormulaDestroy(&f));
   }
+
   /* without a dependence on position, x may be NULL */
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, "3*t", "-test", &f));
   SB_CHECK(SbFormulaEval(f, 2, NULL) == 6, "3*t");
@@ -118,7 +123,8 @@ static PetscErrorCode test_refused(void)
   deep[300] = 0;
   PetscCall(refused(deep, "-test|column 257"));
   nested[0] = 0;
-  for (int i = 0; i < 70; i++) PetscCall(PetscStrlcat(nested, "1-(", sizeof(nested)));
+  for (int i = 0; i < 70; i++)
+    PetscCall(PetscStrlcat(nested, "1-(", sizeof(nested)));
   PetscCall(refused(nested, "-test|column 194"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /*
-  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D + L of the
-  rank's diagonal block, compared with PETSc's MatSOR() on the same matrix, for P1, P2 and CR, with prescribed
-  nodes; the residual returned by the first one equals that of a product.
+  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D
+  + L of the rank's diagonal block, compared with PETSc's MatSOR() on the same matrix, for P1, P2
+  and CR, with prescribed nodes; the residual returned by the first one equals that of a product.
 */
 // @ranks 1 3
 #include "../../src/solver/solver_impl.h"
@@ -25,11 +25,12 @@ static PetscErrorCode compare(const char *element)
   Mat A;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&scene,
-                      "-bodies b -body_b_mesh box:2,1,1:3 -body_b_element %s -body_b_material linear "
-                      "-body_b_young 1e4 -body_b_poisson 0.3 -effects hold -effect_hold_type fixed "
-                      "-effect_hold_on xmin -time static -solver cg_pbjacobi",
-                      element));
+  PetscCall(
+    test_open(&scene,
+              "-bodies b -body_b_mesh box:2,1,1:3 -body_b_element %s -body_b_material linear "
+              "-body_b_young 1e4 -body_b_poisson 0.3 -effects hold -effect_hold_type fixed "
+              "-effect_hold_on xmin -time static -solver cg_pbjacobi",
+              element));
   s = scene.model->space;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
   PetscCall(SbSpaceAssembleTangent(s, &stage, A));
@@ -53,10 +54,10 @@ static PetscErrorCode compare(const char *element)
       PetscCall(VecNorm(t, NORM_2, &error));
       SB_CHECK(error <= 1e-13 * size, "%s: residual off by %g of %g", element, error, size);
     }
-    PetscCall(
-      MatSOR(A, left, 1.,
-             (MatSORType)((k ? SOR_LOCAL_FORWARD_SWEEP : SOR_LOCAL_BACKWARD_SWEEP) | SOR_ZERO_INITIAL_GUESS),
-             0., 1, 1, reference));
+    PetscCall(MatSOR(A, left, 1.,
+                     (MatSORType)((k ? SOR_LOCAL_FORWARD_SWEEP : SOR_LOCAL_BACKWARD_SWEEP) |
+                                  SOR_ZERO_INITIAL_GUESS),
+                     0., 1, 1, reference));
     if (k) {
       PetscCall(VecAXPY(reference, 1., z));
       PetscCall(SbGaussSeidelUp(A, inverse, NULL, r, z, t));

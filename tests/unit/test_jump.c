@@ -1,8 +1,9 @@
 // @ranks 1 3
 /*
-  Face terms of CR and DG against their formula: for each face the jump at three points of a quadrature rule
-  that is exact for squares, from the functions of the two cells at these positions, without the face nodes
-  used in jump.c. Constrained DG faces add the difference of the mean to that of their support.
+  Face terms of CR and DG against their formula: for each face the jump at three points of a
+  quadrature rule that is exact for squares, from the functions of the two cells at these positions,
+  without the face nodes used in jump.c. Constrained DG faces add the difference of the mean to that
+  of their support.
 */
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"
@@ -12,8 +13,10 @@ static const char *const scene =
   "-bodies a,b -body_a_mesh box:0.5,0.4,0.3:2 -body_a_material corotated -body_a_young 1e5 "
   "-body_a_poisson 0.3 -body_a_density 1000 -body_a_element %s -body_a_gamma1 0.7 %s "
   "-body_b_mesh tests/data/two_cubes_41.msh -body_b_scale 0.1 -body_b_translate 0,0,2 "
-  "-body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 -body_b_density 500 -body_b_element %s "
-  "-effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type fixed -effect_clamp_on a.xmin";
+  "-body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 -body_b_density 500 "
+  "-body_b_element %s "
+  "-effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type fixed -effect_clamp_on "
+  "a.xmin";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {
@@ -48,10 +51,13 @@ static void cell_value(SbSpace s, PetscInt cell, const PetscReal u[], const Pets
 {
   const PetscInt *v = s->mesh->cell + 4 * cell;
 
-  for (int k = 0; k < 3; k++) value[k] = 0.;
+  for (int k = 0; k < 3; k++)
+    value[k] = 0.;
   for (int a = 0; a < 4; a++) {
-    const PetscReal *o = s->mesh->x + 3 * v[(a + 1) % 4], *p = s->mesh->x + 3 * v[(a + 2) % 4],
-                    *q = s->mesh->x + 3 * v[(a + 3) % 4], *top = s->mesh->x + 3 * v[a];
+    const PetscReal *o = s->mesh->x + 3 * v[(a + 1) % 4];
+    const PetscReal *p = s->mesh->x + 3 * v[(a + 2) % 4];
+    const PetscReal *q = s->mesh->x + 3 * v[(a + 3) % 4];
+    const PetscReal *top = s->mesh->x + 3 * v[a];
     PetscReal e[3], f[3], n[3], here[3], there[3];
 
     for (int k = 0; k < 3; k++) {
@@ -62,7 +68,8 @@ static void cell_value(SbSpace s, PetscInt cell, const PetscReal u[], const Pets
     }
     SbCross(e, f, n);
     for (int k = 0; k < 3; k++)
-      value[k] += (1. - 3. * SbDot3(here, n) / SbDot3(there, n)) * u[3 * s->cell_node[4 * cell + a] + k];
+      value[k] +=
+        (1. - 3. * SbDot3(here, n) / SbDot3(there, n)) * u[3 * s->cell_node[4 * cell + a] + k];
   }
 }
 
@@ -71,7 +78,8 @@ static PetscReal cell_volume(SbMesh mesh, PetscInt cell)
   PetscReal e[9], n[3];
 
   for (int k = 0; k < 9; k++)
-    e[k] = mesh->x[3 * mesh->cell[4 * cell + 1 + k / 3] + k % 3] - mesh->x[3 * mesh->cell[4 * cell] + k % 3];
+    e[k] = mesh->x[3 * mesh->cell[4 * cell + 1 + k / 3] + k % 3] -
+           mesh->x[3 * mesh->cell[4 * cell] + k % 3];
   SbCross(e + 3, e + 6, n);
   return SbDot3(e, n) / 6.;
 }
@@ -82,8 +90,10 @@ static PetscReal face_corners(SbMesh mesh, PetscInt i, const PetscReal *corner[3
   PetscReal edge[6], n[3];
 
   for (PetscInt a = 0, k = 0; a < 4; a++)
-    if (a != i % 4) corner[k++] = mesh->x + 3 * mesh->cell[4 * (i / 4) + a];
-  for (int k = 0; k < 6; k++) edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
+    if (a != i % 4)
+      corner[k++] = mesh->x + 3 * mesh->cell[4 * (i / 4) + a];
+  for (int k = 0; k < 6; k++)
+    edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
   SbCross(edge, edge + 3, n);
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
@@ -94,14 +104,18 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
   const SbSpace s = m->space;
   const SbElement e = SbSpaceCellElement(s, i / 4);
   const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
-  const PetscReal *corner[3], area = face_corners(s->mesh, i, corner);
-  PetscReal h, mean[3] = {0., 0., 0.}, square = 0.;
+  const PetscReal *corner[3];
+  const PetscReal area = face_corners(s->mesh, i, corner);
+  PetscReal h;
+  PetscReal mean[3] = {0., 0., 0.};
+  PetscReal square = 0.;
 
   h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->neighbour[i])) / (2. * area);
   for (int k = 0; k < 3; k++) {
     PetscReal at[3], a[3], b[3];
 
-    for (int c = 0; c < 3; c++) at[c] = 0.5 * (corner[k][c] + corner[(k + 1) % 3][c]);
+    for (int c = 0; c < 3; c++)
+      at[c] = 0.5 * (corner[k][c] + corner[(k + 1) % 3][c]);
     cell_value(s, i / 4, u, at, a);
     cell_value(s, s->neighbour[i], u, at, b);
     for (int c = 0; c < 3; c++) {
@@ -110,7 +124,8 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
     }
   }
   return 0.5 * area / h *
-         (e->gamma1 * 2. * law->mu * square + e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
+         (e->gamma1 * 2. * law->mu * square +
+          e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
 }
 
 /* Energy of a constrained DG face: its mean against that of the rigid support. */
@@ -118,8 +133,9 @@ static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
   const SbSpace s = m->space;
   const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
-  const PetscReal *corner[3], area = face_corners(s->mesh, i, corner),
-                              k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
+  const PetscReal *corner[3];
+  const PetscReal area = face_corners(s->mesh, i, corner);
+  const PetscReal k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
   PetscReal square = 0.;
 
   for (int c = 0; c < 3; c++)
@@ -137,13 +153,15 @@ static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->neighbour[i] >= 0)
       *energy += 0.5 * face_energy(m, i, u);
-    if (s->dirichlet_node && s->dirichlet_node[i] >= 0) *energy += support_energy(m, i, u);
+    if (s->dirichlet_node && s->dirichlet_node[i] >= 0)
+      *energy += support_energy(m, i, u);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode energy_of(SbSpace s, const PetscReal u[], SbJumpFactor factor, PetscReal *energy)
+static PetscErrorCode energy_of(SbSpace s, const PetscReal u[], SbJumpFactor factor,
+                                PetscReal *energy)
 {
   PetscFunctionBeginUser;
   *energy = SbJumpEnergy(s, u, factor, NULL);
@@ -156,16 +174,21 @@ static PetscErrorCode dot(SbSpace s, const PetscReal f[], const PetscReal u[], P
 {
   PetscFunctionBeginUser;
   *sum = 0.;
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) *sum += f[i] * u[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    *sum += f[i] * u[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 1, MPIU_REAL, MPI_SUM, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest difference between K u by the face matrices and the forces f, relative to the largest force. */
-static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal f[], PetscReal *worst)
+/* Largest difference between K u by the face matrices and the forces f, relative to the largest
+   force. */
+static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal f[],
+                                PetscReal *worst)
 {
-  const PetscInt *node, nbatch = SbJumpCliques(s, &node);
-  PetscReal *g, largest = 0.;
+  const PetscInt *node;
+  const PetscInt nbatch = SbJumpCliques(s, &node);
+  PetscReal *g;
+  PetscReal largest = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &g));
@@ -175,13 +198,15 @@ static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal 
 
     SbJumpMatrix(s, k / SB_BATCH, k % SB_BATCH, K);
     for (int p = 0; p < 8; p++) {
-      PetscReal sum = 0., size = 0.;
+      PetscReal sum = 0.;
+      PetscReal size = 0.;
 
       for (int q = 0; q < 8; q++) {
         SB_CHECK(K[p][q] == K[q][p], "the matrix of a face is not symmetric");
         sum += K[p][q];
         size += PetscAbsReal(K[p][q]);
-        for (int c = 0; c < 3; c++) g[3 * face[p * SB_BATCH] + c] += K[p][q] * u[3 * face[q * SB_BATCH] + c];
+        for (int c = 0; c < 3; c++)
+          g[3 * face[p * SB_BATCH] + c] += K[p][q] * u[3 * face[q * SB_BATCH] + c];
       }
       SB_CHECK_NEAR(sum, 0., 1e-15 * size, "force of a translation");
     }
@@ -199,10 +224,12 @@ static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal 
 }
 
 /* Energy, force and matrix of one state, and the force on another one: the form is symmetric. */
-static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u[], const PetscReal w[])
+static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u[],
+                                  const PetscReal w[])
 {
   const SbSpace s = m->space;
-  PetscReal *f, *fw, energy, exact, product, other, damping, worst, beta, largest = 0.;
+  PetscReal *f, *fw, energy, exact, product, other, damping, worst, beta;
+  PetscReal largest = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
@@ -211,7 +238,8 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   SbJumpAdd(s, w, SB_JUMP_STIFFNESS, fw);
   PetscCall(formula(m, u, &exact));
   PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
-  PetscCall(PetscPrintf(m->comm, "  %s: energy %.12g J, by the formula %.12g J\n", what, energy, exact));
+  PetscCall(
+    PetscPrintf(m->comm, "  %s: energy %.12g J, by the formula %.12g J\n", what, energy, exact));
   SB_CHECK(energy > 0., "%s: energy %g", what, energy);
   SB_CHECK_NEAR(energy, exact, 1e-12 * exact, "energy against the formula");
   PetscCall(dot(s, f, u, &product));
@@ -225,7 +253,8 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   SbJumpAdd(s, u, SB_JUMP_DAMPING, fw);
   beta = s->beta[s->region[0].body];
   SB_CHECK(beta == 0.02, "beta is %g", beta);
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) largest = PetscMax(largest, PetscAbsReal(f[i]));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    largest = PetscMax(largest, PetscAbsReal(f[i]));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     SB_CHECK_NEAR(fw[i], beta * f[i], 1e-14 * beta * largest, "force of damping");
   PetscCall(energy_of(s, u, SB_JUMP_DAMPING, &damping));
@@ -239,14 +268,17 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
 static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
 {
   const SbSpace s = m->space;
-  PetscReal *f, energy, worst = 0.;
+  PetscReal *f, energy;
+  PetscReal worst = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   SbJumpAdd(s, u, SB_JUMP_STIFFNESS, f);
   PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) worst = PetscMax(worst, PetscAbsReal(f[i]));
-  SB_CHECK(worst < 1e-11 * 1e5 && energy < 1e-24 * 1e5, "affine: force %g N, energy %g J", worst, energy);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    worst = PetscMax(worst, PetscAbsReal(f[i]));
+  SB_CHECK(worst < 1e-11 * 1e5 && energy < 1e-24 * 1e5, "affine: force %g N, energy %g J", worst,
+           energy);
   PetscCall(PetscFree(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,14 +1,15 @@
 // @ranks 1 3
-/* Creation of materials by name and from options, errors, and moduli derived from E, nu and density. */
+/* Creation of materials by name and from options, errors, and moduli derived from E, nu and
+   density. */
 #include "../test.h"
 #include <sbmaterial.h>
 
 /* Options of a body, one set for each material, read as the program does. */
-static PetscErrorCode create(const char *law, const char *young, const char *poisson, const char *density,
-                             const char *tangent, SbMaterial *m)
+static PetscErrorCode create(const char *law, const char *young, const char *poisson,
+                             const char *density, const char *tangent, SbMaterial *m)
 {
-  const char *keys[4] = {"young", "poisson", "density", "tangent"},
-             *values[4] = {young, poisson, density, tangent};
+  const char *keys[4] = {"young", "poisson", "density", "tangent"};
+  const char *values[4] = {young, poisson, density, tangent};
   SbScope scope;
 
   PetscFunctionBeginUser;

@@ -1,15 +1,25 @@
 // @ranks 1
-/* Co-rotated material: published homogeneous states, requirements of every material, the three tangents, degenerate F. */
+/* Co-rotated material: published homogeneous states, requirements of every material, the three
+   tangents, degenerate F. */
 #include "material_checks.h"
 
 static void test_states(SbMaterial m)
 {
-  const PetscReal values[5] = {0.1, 0.5, 0.8, 1.2, 2}, l = m->lambda, mu = m->mu;
+  const PetscReal values[5] = {0.1, 0.5, 0.8, 1.2, 2};
+  const PetscReal l = m->lambda;
+  const PetscReal mu = m->mu;
 
   for (int k = 0; k < 5; k++) {
-    const PetscReal a = values[k], g = values[k], r = sqrt(4 + g * g), s = g / r, c = 2 / r, q = l * (r - 2);
-    const PetscReal F[9] = {a, 0, 0, 0, 1, 0, 0, 0, 1}, G[9] = {1, g, 0, 0, 1, 0, 0, 0, 1};
+    const PetscReal a = values[k];
+    const PetscReal g = values[k];
+    const PetscReal r = sqrt(4 + g * g);
+    const PetscReal s = g / r;
+    const PetscReal c = 2 / r;
+    const PetscReal q = l * (r - 2);
+    const PetscReal F[9] = {a, 0, 0, 0, 1, 0, 0, 0, 1};
+    const PetscReal G[9] = {1, g, 0, 0, 1, 0, 0, 0, 1};
     const PetscReal P[9] = {(l + 2 * mu) * (a - 1), 0, 0, 0, l * (a - 1), 0, 0, 0, l * (a - 1)};
+
     /* F = R S with R = [c s; -s c]: P = 2 mu (F - R) + q R */
     const PetscReal S[9] = {2 * mu * (1 - c) + q * c,
                             2 * mu * (g - s) + q * s,
@@ -38,7 +48,8 @@ static PetscErrorCode test_warped(SbMaterial m)
     SbPack f[9], r[9];
 
     random_deformation(0.4, F);
-    for (int k = 0; k < 9; k++) H[k] = uniform();
+    for (int k = 0; k < 9; k++)
+      H[k] = uniform();
     batch(F, f);
     m->ops.frame(m, (const SbPack *)f, r);
     SbPackGet(9, (const SbPack *)r, 2, R);
@@ -78,8 +89,10 @@ static PetscErrorCode test_degenerate(SbMaterial m)
         SB_CHECK(isfinite(C[i]), "tangent %d of degenerate F %d is %g", kind, k, C[i]);
     }
     stress_of(m, F[k], P);
-    for (int i = 0; i < 9; i++) SB_CHECK(isfinite(P[i]), "stress of degenerate F %d is %g", k, P[i]);
-    SB_CHECK(energy_of(m, F[k]) > 0.1 * m->mu, "energy of degenerate F %d is %g", k, energy_of(m, F[k]));
+    for (int i = 0; i < 9; i++)
+      SB_CHECK(isfinite(P[i]), "stress of degenerate F %d is %g", k, P[i]);
+    SB_CHECK(energy_of(m, F[k]) > 0.1 * m->mu, "energy of degenerate F %d is %g", k,
+             energy_of(m, F[k]));
   }
   PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -93,8 +106,13 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbMaterialCreateElastic("corotated", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, &m));
-    SB_CHECK(m->tangent == SB_TANGENT_WARPED && m->ops.frame, "the warped tangent is not the default");
+    PetscCall(SbMaterialCreateElastic("corotated", 5e3,
+                                      k == 0   ? 0.3
+                                      : k == 1 ? 0.49
+                                               : 0,
+                                      1000, &m));
+    SB_CHECK(m->tangent == SB_TANGENT_WARPED && m->ops.frame,
+             "the warped tangent is not the default");
     test_states(m);
     PetscCall(test_warped(m));
     PetscCall(test_degenerate(m));

@@ -1,23 +1,31 @@
 // @ranks 1
-/* Eigenvalues of symmetric matrices on lanes, signed stretches, and the sum of the modes of an isotropic tangent. */
+/* Eigenvalues of symmetric matrices on lanes, signed stretches, and the sum of the modes of an
+   isotropic tangent. */
 #include "../../src/material/material_impl.h"
 #include "material_checks.h"
 
 static const PetscReal eps = 2.2204460492503131e-16;
 
-/* S = V diag(s) V^T and V^T V = I up to rounding of the largest entry, for eigenvalues of any ratio, equal ones, zero. */
+/* S = V diag(s) V^T and V^T V = I up to rounding of the largest entry, for eigenvalues of any
+   ratio, equal ones, zero. */
 static void test_eig(void)
 {
   for (int t = 0; t < 20000; t++) {
-    const PetscReal size = pow(10, 3 * uniform()), small = pow(10, -16 * fabs(uniform()));
-    PetscReal w[3] = {uniform(), uniform(), uniform()}, Q[9], A[9], D[9], v[9], s[3];
+    const PetscReal size = pow(10, 3 * uniform());
+    const PetscReal small = pow(10, -16 * fabs(uniform()));
+    PetscReal w[3] = {uniform(), uniform(), uniform()};
+    PetscReal Q[9], A[9], D[9], v[9], s[3];
     SbPack S[6], e[3], V[9];
 
-    if (t % 4 == 1) w[1] = w[0] + small;
-    if (t % 4 == 2) w[1] = w[2] = small * uniform();
-    if (t % 4 == 3) w[0] = w[1] = w[2] = t % 8 == 3 ? 0 : 1;
+    if (t % 4 == 1)
+      w[1] = w[0] + small;
+    if (t % 4 == 2)
+      w[1] = w[2] = small * uniform();
+    if (t % 4 == 3)
+      w[0] = w[1] = w[2] = t % 8 == 3 ? 0 : 1;
     random_rotation(Q);
-    for (int k = 0; k < 9; k++) D[k] = size * w[k % 3] * Q[k];
+    for (int k = 0; k < 9; k++)
+      D[k] = size * w[k % 3] * Q[k];
     SbMatMulTranspose(D, Q, A);
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal upper[6] = {A[0], A[1], A[2], A[4], A[5], A[8]};
@@ -30,12 +38,14 @@ static void test_eig(void)
     SbSymEig((const SbPack *)S, e, V);
     SbPackGet(9, (const SbPack *)V, 5, v);
     SbPackGet(3, (const SbPack *)e, 5, s);
-    for (int k = 0; k < 9; k++) D[k] = s[k % 3] * v[k];
+    for (int k = 0; k < 9; k++)
+      D[k] = s[k % 3] * v[k];
     SbMatMulTranspose(D, v, Q);
     SB_CHECK(difference(9, A, Q) < 20 * eps * size, "V diag(s) V^T is %g from S of size %g",
              difference(9, A, Q), size);
     SbMatTransposeMul(v, v, Q);
-    for (int k = 0; k < 9; k++) SB_CHECK_NEAR(Q[k], k % 4 == 0, 20 * eps, "V^T V");
+    for (int k = 0; k < 9; k++)
+      SB_CHECK_NEAR(Q[k], k % 4 == 0, 20 * eps, "V^T V");
     SB_CHECK_NEAR(SbMatDet(v), 1, 20 * eps, "det V");
   }
 }
@@ -52,8 +62,10 @@ static void test_stretches(void)
     SbStretches((const SbPack *)f, U, s, V);
     SbPackGet(9, (const SbPack *)U, 2, u);
     SbPackGet(9, (const SbPack *)V, 2, v);
-    for (int k = 0; k < 9; k++) d[k] = u[k] * s[k % 3][2];
+    for (int k = 0; k < 9; k++)
+      d[k] = u[k] * s[k % 3][2];
     SbMatMulTranspose(d, v, G);
+
     /* the gap of the polar rotation is at least 0.05 here */
     SB_CHECK(difference(9, F, G) < 1e-13, "U diag(s) V^T is %g from F", difference(9, F, G));
     SB_CHECK_NEAR(SbMatDet(u), 1, 50 * eps, "det U");
@@ -61,7 +73,8 @@ static void test_stretches(void)
   }
 }
 
-/* For any nonnegative flips, twists and Hessian the tangent has exactly these eigenvalues and eigenmatrices. */
+/* For any nonnegative flips, twists and Hessian the tangent has exactly these eigenvalues and
+   eigenmatrices. */
 static void test_modes(void)
 {
   for (int t = 0; t < 500; t++) {
@@ -70,10 +83,12 @@ static void test_modes(void)
 
     random_rotation(u);
     random_rotation(v);
-    for (int k = 0; k < 9; k++) q[k] = uniform();
+    for (int k = 0; k < 9; k++)
+      q[k] = uniform();
     SbMatMulTranspose(q, q, h);
     const int index[6] = {0, 1, 2, 4, 5, 8};
-    for (int k = 0; k < 6; k++) upper[k] = h[index[k]];
+    for (int k = 0; k < 6; k++)
+      upper[k] = h[index[k]];
     for (int k = 0; k < 3; k++) {
       f[k] = uniform();
       w[k] = uniform();
@@ -85,15 +100,18 @@ static void test_modes(void)
       SbPackPut(3, w, l, twist);
       SbPackPut(6, upper, l, hessian);
     }
-    SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
-                      (const SbPack *)twist, c);
+    SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian,
+                      (const SbPack *)flip, (const SbPack *)twist, c);
     SbPackGet(81, (const SbPack *)c, 3, C);
     for (int mode = 0; mode < 9; mode++) {
-      const int k = mode % 3, i = (k + 1) % 3, j = (k + 2) % 3;
+      const int k = mode % 3;
+      const int i = (k + 1) % 3;
+      const int j = (k + 2) % 3;
       PetscReal E[9], CE[9], expected[9];
 
       for (int p = 0; p < 9; p++) {
-        const PetscReal *up = u + 3 * (p / 3), *vp = v + 3 * (p % 3);
+        const PetscReal *up = u + 3 * (p / 3);
+        const PetscReal *vp = v + 3 * (p % 3);
 
         E[p] = mode < 3   ? up[i] * vp[j] + up[j] * vp[i]
                : mode < 6 ? up[i] * vp[j] - up[j] * vp[i]

@@ -1,12 +1,15 @@
 // @ranks 1 2 3 4
-/* The matrix-free operator equals the assembled tangent with constraints, damping, linear materials and rotations. */
+/* The matrix-free operator equals the assembled tangent with constraints, damping, linear materials
+   and rotations. */
 #include "../scene.h"
 
 static const char *const scene =
   "-bodies a,b -body_a_mesh box:1,0.5,0.4:4,3,2 -body_a_material corotated -body_a_tangent warped "
   "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 "
-  "-body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 "
-  "-sets left,low -set_left_at plane:1,0,0,0 -set_low_at plane:0,0,1,0 -effects clamp,slide,damping "
+  "-body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 -body_b_poisson 0.4 "
+  "-body_b_density 7 "
+  "-sets left,low -set_left_at plane:1,0,0,0 -set_low_at plane:0,0,1,0 -effects "
+  "clamp,slide,damping "
   "-effect_clamp_type fixed -effect_clamp_on left -effect_slide_type fixed -effect_slide_on low "
   "-effect_slide_components z -effect_damping_alpha 0.3 -effect_damping_beta 0.02 %s";
 
@@ -33,7 +36,8 @@ static PetscErrorCode hold(SbSpace s, Vec X)
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt c = 0; c < 3; c++)
-      if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
+      if (s->fixed[i] & (1 << c))
+        x[3 * i + c] = 0.;
   }
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -77,8 +81,9 @@ static PetscErrorCode compare(const char *law)
   PetscCall(VecAXPY(Z, -1., Y));
   PetscCall(VecNorm(Y, NORM_2, &norm));
   PetscCall(VecNorm(Z, NORM_2, &difference));
-  SB_CHECK(norm > 0. && difference < 1e-13 * norm, "%s: the operators differ by %g of %g", law, difference,
-           norm);
+  SB_CHECK(norm > 0. && difference < 1e-13 * norm, "%s: the operators differ by %g of %g", law,
+           difference, norm);
+
   /* values at prescribed entries do not affect the free rows */
   PetscCall(test_fill(t.model, other, Y));
   PetscCall(MatMult(F, Y, Z));
@@ -86,8 +91,8 @@ static PetscErrorCode compare(const char *law)
   PetscCall(MatMult(F, X, Y));
   PetscCall(VecAXPY(Z, -1., Y));
   PetscCall(VecNorm(Z, NORM_2, &difference));
-  SB_CHECK(difference < 1e-13 * norm, "%s: prescribed entries change free rows by %g of %g", law, difference,
-           norm);
+  SB_CHECK(difference < 1e-13 * norm, "%s: prescribed entries change free rows by %g of %g", law,
+           difference, norm);
   PetscCall(MatMult(F, W, Z));
   PetscCall(VecDot(X, Z, &b));
   SB_CHECK_NEAR(a, b, 1e-13 * PetscAbsReal(a), "symmetry");

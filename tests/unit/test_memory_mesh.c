@@ -8,14 +8,15 @@ static PetscErrorCode check_mesh(SbModel m)
   PetscInt marked = 0;
 
   PetscFunctionBeginUser;
-  SB_CHECK(mesh->Nvert == 5 && mesh->Ncell == 2, "%d vertices, %d tets", (int)mesh->Nvert, (int)mesh->Ncell);
+  SB_CHECK(mesh->Nvert == 5 && mesh->Ncell == 2, "%d vertices, %d tets", (int)mesh->Nvert,
+           (int)mesh->Ncell);
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     const PetscInt o = mesh->vert_orig[v];
 
     for (int k = 0; k < 3; k++)
       SB_CHECK(mesh->x[3 * v + k] == given_x[o][k], "vertex %d is elsewhere", (int)o);
-    SB_CHECK(!(mesh->vert_set[v] & GIVEN_SIDE) == (o == 1 || o == 4), "vertex %d: sets 0x%llx", (int)o,
-             (unsigned long long)mesh->vert_set[v]);
+    SB_CHECK(!(mesh->vert_set[v] & GIVEN_SIDE) == (o == 1 || o == 4), "vertex %d: sets 0x%llx",
+             (int)o, (unsigned long long)mesh->vert_set[v]);
   }
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt o = mesh->cell_orig[c];
@@ -24,7 +25,8 @@ static PetscErrorCode check_mesh(SbModel m)
       const PetscInt v = mesh->vert_orig[mesh->cell[4 * c + a]];
 
       SB_CHECK(v == given_cell[o][a], "corner %d of tet %d is %d", a, (int)o, (int)v);
-      if (!(mesh->face_set[4 * c + a] & GIVEN_SIDE)) continue;
+      if (!(mesh->face_set[4 * c + a] & GIVEN_SIDE))
+        continue;
       SB_CHECK(o == 0 && v == 1, "face %d of tet %d is in the set", a, (int)o);
       marked += c < mesh->ncell_owned;
     }

@@ -1,5 +1,5 @@
-// Mesh of a scene on any number of ranks: local meshes agree with the global one, errors are raised on all ranks.
-// @ranks 1 2 3 4
+// Mesh of a scene on any number of ranks: local meshes agree with the global one, errors are raised
+// on all ranks. @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 #include <sbsurface.h>
@@ -7,7 +7,9 @@
 
 #define DATA "tests/data/"
 
-enum { NSET = 5 };
+enum {
+  NSET = 5
+};
 
 static PetscErrorCode make_scene(SbBody body[3], SbSet set[NSET])
 {
@@ -28,7 +30,8 @@ static PetscErrorCode make_scene(SbBody body[3], SbSet set[NSET])
 /* Every rank builds the whole mesh again and compares its local mesh with it. */
 static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
 {
-  PetscInt wrong_vert = 0, wrong_cell = 0;
+  PetscInt wrong_vert = 0;
+  PetscInt wrong_cell = 0;
 
   PetscFunctionBeginUser;
   SB_CHECK(mesh->Nvert == whole->nvert && mesh->Ncell == whole->ncell, "%d vertices, %d cells",
@@ -37,7 +40,8 @@ static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
     const SbVertexData *p = &whole->vertex[mesh->vert_orig[v]];
 
     wrong_vert += p->body != mesh->vert_body[v] || p->set != mesh->vert_set[v];
-    for (int i = 0; i < 3; i++) wrong_vert += p->x[i] != mesh->x[3 * v + i];
+    for (int i = 0; i < 3; i++)
+      wrong_vert += p->x[i] != mesh->x[3 * v + i];
   }
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt orig = mesh->cell_orig[c];
@@ -57,7 +61,8 @@ static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
 /* A value of each owned cell arrives at all its ghosts. */
 static PetscErrorCode check_broadcast(SbMesh mesh)
 {
-  PetscInt *value, wrong = 0;
+  PetscInt *value;
+  PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(2 * mesh->ncell, &value));
@@ -73,16 +78,20 @@ static PetscErrorCode check_broadcast(SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With nodes at faces: every cell at a vertex of an owned cell is local, exactly once. Counted over all ranks by the corners of owned cells. */
+/* With nodes at faces: every cell at a vertex of an owned cell is local, exactly once. Counted over
+   all ranks by the corners of owned cells. */
 static PetscErrorCode check_layer(SbMesh mesh)
 {
-  PetscInt *around, *total, missing = 0;
+  PetscInt *around, *total;
+  PetscInt missing = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc2(mesh->Nvert, &around, mesh->Nvert, &total));
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) total[mesh->vert_orig[mesh->cell[i]]]++;
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
+    total[mesh->vert_orig[mesh->cell[i]]]++;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, total, (int)mesh->Nvert, MPIU_INT, MPI_SUM, mesh->comm));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) around[mesh->vert_orig[mesh->cell[i]]]++;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++)
+    around[mesh->vert_orig[mesh->cell[i]]]++;
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
     const PetscInt v = mesh->vert_orig[mesh->cell[i]];
 
@@ -107,10 +116,13 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   body[0].other_nodes = face_nodes;
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
   PetscCall(SbMeshValidate(mesh));
-  PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 3, body_again, NSET, set_again, &whole));
+  PetscCall(
+    SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 3, body_again, NSET, set_again, &whole));
   PetscCall(compare_with_whole(mesh, &whole));
   PetscCall(check_broadcast(mesh));
-  if (face_nodes) PetscCall(check_layer(mesh));
+  if (face_nodes)
+    PetscCall(check_layer(mesh));
+
   // What rank 0 found is the same on all ranks.
   SB_CHECK(!memcmp(set, set_again, sizeof(set)), "counts of the sets");
   for (int b = 0; b < 3; b++) {
@@ -142,7 +154,8 @@ static PetscErrorCode test_few(const char *file, PetscInt ncell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices of one rank have close numbers: the largest difference within a cell of a slender bar. */
+/* Vertices of one rank have close numbers: the largest difference within a cell of a slender
+   bar. */
 static PetscErrorCode test_order(void)
 {
   SbBody body = test_body("b", "box:60,2,2:60,2,2");
@@ -154,13 +167,17 @@ static PetscErrorCode test_order(void)
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     for (int a = 0; a < 4; a++) {
       for (int b = 0; b < a; b++) {
-        const PetscInt v = mesh->cell[4 * c + a], w = mesh->cell[4 * c + b];
+        const PetscInt v = mesh->cell[4 * c + a];
+        const PetscInt w = mesh->cell[4 * c + b];
 
-        if (v < mesh->nvert_owned && w < mesh->nvert_owned) width = PetscMax(width, PetscAbsInt(v - w));
+        if (v < mesh->nvert_owned && w < mesh->nvert_owned)
+          width = PetscMax(width, PetscAbsInt(v - w));
       }
     }
   }
-  /* three layers of 9 vertices; the numbering of a middle rank also starts at one of its two ends */
+
+  /* three layers of 9 vertices; the numbering of a middle rank also starts at one of its two
+     ends */
   SB_CHECK(width <= 27, "bandwidth %d", (int)width);
   PetscCall(SbMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -173,13 +190,15 @@ static PetscErrorCode create(const char *file, const char *set_text)
   SbMesh mesh = NULL;
 
   PetscFunctionBeginUser;
-  if (set_text) PetscCall(test_set("clamp", set_text, &set));
+  if (set_text)
+    PetscCall(test_set("clamp", set_text, &set));
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, set_text ? 1 : 0, &set, &mesh));
   PetscCall(SbMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The validation detects the damage that it is made for; all ranks have the damage, so that all stop at the same check. */
+/* The validation detects the damage that it is made for; all ranks have the damage, so that all
+   stop at the same check. */
 static PetscErrorCode test_validation(void)
 {
   SbBody body = test_body("b", "box:1,1,1:4");
@@ -198,7 +217,8 @@ static PetscErrorCode test_validation(void)
   mesh->vert_orig[0] = mesh->vert_orig[1];
   SB_CHECK_ERROR(SbMeshValidate(mesh), PETSC_ERR_PLIB, "vertex numbers");
   mesh->vert_orig[0] = keep;
-  for (PetscInt s = 0; s < 4 * mesh->ncell_owned; s++) mesh->face_set[s] &= ~SB_ON_BOUNDARY;
+  for (PetscInt s = 0; s < 4 * mesh->ncell_owned; s++)
+    mesh->face_set[s] &= ~SB_ON_BOUNDARY;
   SB_CHECK_ERROR(SbMeshValidate(mesh), PETSC_ERR_PLIB, "boundary facets");
   PetscCall(SbMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -216,8 +236,10 @@ int main(int argc, char **argv)
   PetscCall(test_few(DATA "two_tets.msh", 2));
   PetscCall(test_few("box:1,1,1:1", 6));
   PetscCall(test_order());
+
   /* only rank 0 reads, but all ranks return the same error and message */
-  SB_CHECK_ERROR(create(DATA "none.msh", NULL), PETSC_ERR_FILE_OPEN, "body 'liver'|tests/data/none.msh");
+  SB_CHECK_ERROR(create(DATA "none.msh", NULL), PETSC_ERR_FILE_OPEN,
+                 "body 'liver'|tests/data/none.msh");
   SB_CHECK_ERROR(create(DATA "bad_nan.msh", NULL), PETSC_ERR_FILE_UNEXPECTED, "line 9|node 4");
   SB_CHECK_ERROR(create(DATA "bad_twice.msh", NULL), PETSC_ERR_USER_INPUT, "1|3");
   SB_CHECK_ERROR(create("box:1,1,1:2", "group:ymix"), PETSC_ERR_USER_INPUT, "group 'ymix'");

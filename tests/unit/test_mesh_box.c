@@ -31,20 +31,24 @@ static PetscErrorCode free_box(Box *box)
 }
 
 /* A conforming box has two boundary facets per cell side on its six sides, and no others. */
-static PetscErrorCode test_box(const char *text, PetscInt nx, PetscInt ny, PetscInt nz, PetscReal volume)
+static PetscErrorCode test_box(const char *text, PetscInt nx, PetscInt ny, PetscInt nz,
+                               PetscReal volume)
 {
   Box box;
   const PetscInt nfacet = 4 * (nx * ny + ny * nz + nz * nx);
 
   PetscFunctionBeginUser;
   PetscCall(make_box(text, &box));
-  SB_CHECK(box.body.nvert == (nx + 1) * (ny + 1) * (nz + 1), "%s: %d vertices", text, (int)box.body.nvert);
+  SB_CHECK(box.body.nvert == (nx + 1) * (ny + 1) * (nz + 1), "%s: %d vertices", text,
+           (int)box.body.nvert);
   SB_CHECK(box.body.ncell == 6 * nx * ny * nz, "%s: %d cells", text, (int)box.body.ncell);
-  SB_CHECK(box.body.nfacet == nfacet, "%s: %d boundary facets instead of %d", text, (int)box.body.nfacet,
-           (int)nfacet);
+  SB_CHECK(box.body.nfacet == nfacet, "%s: %d boundary facets instead of %d", text,
+           (int)box.body.nfacet, (int)nfacet);
   SB_CHECK(box.body.npart == 1, "%s: %d parts", text, (int)box.body.npart);
-  SB_CHECK(!box.body.note[0], "%s: '%s'", text, box.body.note); /* no tet reoriented, removed or pinched */
-  SB_CHECK(box.im.item[2].n == nfacet, "%s: %d triangles in the sides", text, (int)box.im.item[2].n);
+  SB_CHECK(!box.body.note[0], "%s: '%s'", text,
+           box.body.note); /* no tet reoriented, removed or pinched */
+  SB_CHECK(box.im.item[2].n == nfacet, "%s: %d triangles in the sides", text,
+           (int)box.im.item[2].n);
   SB_CHECK_NEAR(box.body.volume, volume, 1e-13 * volume, text); /* rounding of some hundred sums */
   PetscCall(free_box(&box));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -83,7 +87,8 @@ static PetscErrorCode test_sides(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tets of a cube: dihedral angles 45, 60, 90 degrees; edges 1, sqrt 2, sqrt 3: R = sqrt 3 / 2, r = 1 / (2 + 2 sqrt 2). */
+/* The tets of a cube: dihedral angles 45, 60, 90 degrees; edges 1, sqrt 2, sqrt 3: R = sqrt 3 / 2,
+   r = 1 / (2 + 2 sqrt 2). */
 static PetscErrorCode test_quality(void)
 {
   Box box;
@@ -91,30 +96,33 @@ static PetscErrorCode test_quality(void)
   PetscFunctionBeginUser;
   PetscCall(make_box("box:1,1,1:2", &box));
   SB_CHECK_NEAR(box.body.min_dihedral, 45, 1e-10, "smallest dihedral angle");
-  SB_CHECK_NEAR(box.body.max_radius_ratio, PetscSqrtReal(3.) / 2 * (2 + 2 * PetscSqrtReal(2.)) / 3, 1e-12,
-                "radius ratio");
+  SB_CHECK_NEAR(box.body.max_radius_ratio, PetscSqrtReal(3.) / 2 * (2 + 2 * PetscSqrtReal(2.)) / 3,
+                1e-12, "radius ratio");
   PetscCall(free_box(&box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mirrored neighbours: with even numbers of cells the edges are symmetric about the centre of the box. */
+/* Mirrored neighbours: with even numbers of cells the edges are symmetric about the centre of the
+   box. */
 static PetscErrorCode test_symmetry(void)
 {
   Box box;
   const PetscInt n = 4;
-  PetscInt *valence, v = 0;
+  PetscInt *valence;
+  PetscInt v = 0;
 
   PetscFunctionBeginUser;
   PetscCall(make_box("box:1,1,1:4", &box));
   PetscCall(PetscCalloc1(box.im.nvert, &valence));
-  for (PetscInt i = 0; i < 4 * box.im.item[3].n; i++) valence[box.im.item[3].vert[i]]++;
+  for (PetscInt i = 0; i < 4 * box.im.item[3].n; i++)
+    valence[box.im.item[3].vert[i]]++;
   for (PetscInt k = 0; k <= n; k++) {
     for (PetscInt j = 0; j <= n; j++) {
       for (PetscInt i = 0; i <= n; i++, v++) {
         const PetscInt mirror = (k * (n + 1) + j) * (n + 1) + n - i;
 
-        SB_CHECK(valence[v] == valence[mirror], "vertex %d has %d cells, its mirror image %d", (int)v,
-                 (int)valence[v], (int)valence[mirror]);
+        SB_CHECK(valence[v] == valence[mirror], "vertex %d has %d cells, its mirror image %d",
+                 (int)v, (int)valence[v], (int)valence[mirror]);
       }
     }
   }
@@ -125,10 +133,12 @@ static PetscErrorCode test_symmetry(void)
 
 static PetscErrorCode test_refusals(void)
 {
-  static const char *const bad[] = {
-    "box:",         "box:1,1:2",    "box:1,1,1",    "box:1,1,1:",    "box:1,1,1:2,2",   "box:1,1,1:2,2,2,2",
-    "box:1,0,1:2",  "box:1,1,-1:2", "box:1,1,1:0",  "box:1,1,1:1.5", "box:1,1,1:2,0,2", "box:1,1,nan:2",
-    "box:1,1,1:2x", "box:a,1,1:2",  "box:1,1,1:-2", "box:inf,1,1:2"};
+  static const char *const bad[] = {"box:",          "box:1,1:2",       "box:1,1,1",
+                                    "box:1,1,1:",    "box:1,1,1:2,2",   "box:1,1,1:2,2,2,2",
+                                    "box:1,0,1:2",   "box:1,1,-1:2",    "box:1,1,1:0",
+                                    "box:1,1,1:1.5", "box:1,1,1:2,0,2", "box:1,1,nan:2",
+                                    "box:1,1,1:2x",  "box:a,1,1:2",     "box:1,1,1:-2",
+                                    "box:inf,1,1:2"};
   Box box;
 
   PetscFunctionBeginUser;
@@ -136,7 +146,8 @@ static PetscErrorCode test_refusals(void)
     SB_CHECK_ERROR(make_box(bad[i], &box), PETSC_ERR_USER_INPUT, "box:lx,ly,lz");
     PetscCall(free_box(&box));
   }
-  SB_CHECK_ERROR(make_box("box:1,1,1:100000", &box), PETSC_ERR_USER_INPUT, "body 'b'|box:1,1,1|100000");
+  SB_CHECK_ERROR(make_box("box:1,1,1:100000", &box), PETSC_ERR_USER_INPUT,
+                 "body 'b'|box:1,1,1|100000");
   PetscCall(free_box(&box));
   SB_CHECK_ERROR(make_box("bax.step", &box), PETSC_ERR_USER_INPUT, "body 'b'|'bax.step'");
   PetscCall(free_box(&box));

@@ -13,7 +13,8 @@ static void write_text(const char *name, const char *text)
 
   (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
   file = fopen(path, "wb");
-  if (!file) return;
+  if (!file)
+    return;
   (void)fputs(text, file);
   (void)fclose(file);
 }
@@ -60,22 +61,23 @@ static PetscErrorCode test_tetgen(void)
     {"4 3 900000000 0\n1 0 0 0\n2 0 0 0\n3 0 0 0\n", "t.node|line 1|900000000 attributes"},
     {"0 3 0 0\n", "t.node|line 1|0 points"},
     {NULL, NULL}};
-  static const Case ele[] = {{"1 4 0\n1 1 2 3 4\n", NULL},
-                             {"# all\n1 4\n1 1 2 3 4\n", NULL},
-                             {"1 4 0\n1 1 2 3 5\n", "t.ele|line 2|point 5|1|4"},
-                             {"1 4 0\n1 0 1 2 3\n", "t.ele|line 2|point 0|1|4"},
-                             {"1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n", "t.ele|line 2|point 5"},
-                             {"1 3 0\n1 1 2 3\n", "t.ele|line 1|3 points|4"},
-                             {"1 4 1\n1 1 2 3 4 1.5\n", "t.ele|line 2|1.5"},
-                             {"1 4 1\n1 1 2 3 4\n", "t.ele|line 2"},
-                             {"2 4 0\n1 1 2 3 4\n", "t.ele|line 3"},
-                             {"1 4 0\n1 1 2 3 4 # one\n", NULL},
-                             {"1 4 3\n1 1 2 3 4 1 2.5 0\n", NULL},
-                             {"1 4 0\n1 1 2 3 4 1\n", "t.ele|line 2|tetrahedron 1|4 points|0 attributes"},
-                             {"1 4 1\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points|1 attributes"},
-                             {"1 0\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points"},
-                             {"0 4 0\n", "t.ele"},
-                             {NULL, NULL}};
+  static const Case ele[] = {
+    {"1 4 0\n1 1 2 3 4\n", NULL},
+    {"# all\n1 4\n1 1 2 3 4\n", NULL},
+    {"1 4 0\n1 1 2 3 5\n", "t.ele|line 2|point 5|1|4"},
+    {"1 4 0\n1 0 1 2 3\n", "t.ele|line 2|point 0|1|4"},
+    {"1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n", "t.ele|line 2|point 5"},
+    {"1 3 0\n1 1 2 3\n", "t.ele|line 1|3 points|4"},
+    {"1 4 1\n1 1 2 3 4 1.5\n", "t.ele|line 2|1.5"},
+    {"1 4 1\n1 1 2 3 4\n", "t.ele|line 2"},
+    {"2 4 0\n1 1 2 3 4\n", "t.ele|line 3"},
+    {"1 4 0\n1 1 2 3 4 # one\n", NULL},
+    {"1 4 3\n1 1 2 3 4 1 2.5 0\n", NULL},
+    {"1 4 0\n1 1 2 3 4 1\n", "t.ele|line 2|tetrahedron 1|4 points|0 attributes"},
+    {"1 4 1\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points|1 attributes"},
+    {"1 0\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points"},
+    {"0 4 0\n", "t.ele"},
+    {NULL, NULL}};
 
   PetscFunctionBeginUser;
   write_text("t.ele", "1 4 0\n1 1 2 3 4\n");
@@ -97,7 +99,8 @@ static PetscErrorCode test_netgen(void)
     {POINTS "1\n1 1 2 3 4\n1\n1 1 2 3\n", NULL},
     {POINTS "1\n1 1 2 3 4\n", NULL},
     {POINTS "1\n1 1 2 3 4 5 6 7 8 9 10\n", "line 7|element 1|point 5|4"},
-    {"12" /* points */ "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n2 2 2\n3 3 3\n4 4 4\n5 5 5\n6 6 6\n7 7 7\n8 8 "
+    {"12" /* points */ "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n2 2 2\n3 3 3\n4 4 4\n5 5 5\n6 6 6\n7 "
+     "7 7\n8 8 "
      "8\n1\n1 1 2 3 4 5 6 7 8\n",
      "1 hexahedra"},
     {POINTS "1\n1 1 2 3\n", "line 7|3 points|4"},
@@ -112,7 +115,8 @@ static PetscErrorCode test_netgen(void)
     {"mesh3d\nvolumeelements\n1\n1 4 1 2 3 7\npoints\n" POINTS, "v.vol|line 4|element 1|point 7"},
     {"mesh3d\nvolumeelements\n1\n1 9 1 2 3 4\npoints\n" POINTS, "v.vol|line 4|9 points"},
     {"mesh3d\nvolumeelements\n2\n1 4 1 2 3 4\npoints\n" POINTS, "v.vol|line 5|'points'"},
-    {"mesh3d\nvolumeelements\n1\n1 4 1 2 3 4\npoints\n" POINTS "materials\n1\n1\n", NULL}, /* no name */
+    {"mesh3d\nvolumeelements\n1\n1 4 1 2 3 4\npoints\n" POINTS "materials\n1\n1\n",
+     NULL}, /* no name */
     {"mesh3d\nvolumeelements\n1\n1 4 1 2 3 4\npoints\n" POINTS "materials\n1\nx\n", "'x'"},
     {NULL, NULL}};
 
@@ -139,13 +143,14 @@ static const Case medit[] = {
   {HEAD "Vertices\n999999999\n", "999999999 vertices"},
   {NULL, NULL}};
 
-#define VTK                                                                                                 \
-  "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 " \
+#define VTK                                                                                       \
+  "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 " \
+  "0 1 0 0 0 "                                                                                    \
   "1\n"
 static const Case vtk[] = {
   {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n", NULL},
-  {VTK
-   "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\nVECTORS v float\n1 2 3\nFIELD f 1\nr 1 1 int\n7\n",
+  {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\nVECTORS v float\n1 2 3\nFIELD f 1\nr "
+       "1 1 int\n7\n",
    NULL},
   {"solid\n", "line 1|'# vtk DataFile Version'|VTK"},
   {"# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n", "line 4|POLYDATA|UNSTRUCTURED_GRID"},
@@ -155,7 +160,8 @@ static const Case vtk[] = {
   {VTK "CELLS 1 5\n9 0 1 2 3\nCELL_TYPES 1\n10\n", "cell 0|1|9 points"},
   {VTK "CELLS 1 5\n4 0 1 2 3\n", "CELL_TYPES"},
   {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 2\n", "2 cells|1"},
-  {VTK "CELLS 2 4\nOFFSETS vtktypeint64\n0 9\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n",
+  {VTK
+   "CELLS 2 4\nOFFSETS vtktypeint64\n0 9\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n",
    "line 7|cell 0|9|4"},
   {VTK "CELLS 900000000 5\n", "900000000 cells"},
   {NULL, NULL}};
@@ -173,23 +179,31 @@ static const Case vtk[] = {
 static const Case vtu[] = {
   {VTU("", X, TET), NULL},
   {"<VTKFile type=\"PolyData\">\n", "u.vtu|line 1|type 'PolyData'|UnstructuredGrid"},
-  {VTU(" compressor=\"vtkLZ4DataCompressor\"", X, TET), "line 2|vtkLZ4DataCompressor|vtkZLibDataCompressor"},
+  {VTU(" compressor=\"vtkLZ4DataCompressor\"", X, TET),
+   "line 2|vtkLZ4DataCompressor|vtkZLibDataCompressor"},
   {VTU("", "", TET), "line 5"},
   {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "4")), "line 6|'types'"},
   {VTU("", X, ARRAY("connectivity", "0 1 2 8") ARRAY("offsets", "4") ARRAY("types", "10")),
    "line 6|cell 0|point 8"},
   {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "5") ARRAY("types", "10")),
    "line 6|'connectivity'|5 numbers"},
-  {VTU("", X, ARRAY("connectivity", "0 1 x 3") ARRAY("offsets", "4") ARRAY("types", "10")), "line 6|'x'"},
-  {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">MAAAAAAA****</DataArray>",
+  {VTU("", X, ARRAY("connectivity", "0 1 x 3") ARRAY("offsets", "4") ARRAY("types", "10")),
+   "line 6|'x'"},
+  {VTU("",
+       "<DataArray type=\"Float32\" NumberOfComponents=\"3\" "
+       "format=\"binary\">MAAAAAAA****</DataArray>",
        TET),
    "line 5|''|12 numbers"},
-  {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>", TET),
+  {VTU("",
+       "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>",
+       TET),
    "line 5|0"},
-  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece><Piece "
+  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"4\" "
+   "NumberOfCells=\"1\"></Piece><Piece "
    "NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece></VTKFile>",
    "u.vtu|line 1"},
-  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"-4\" NumberOfCells=\"1\"></Piece></VTKFile>",
+  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"-4\" "
+   "NumberOfCells=\"1\"></Piece></VTKFile>",
    "u.vtu|line 1|NumberOfPoints|'-4'"},
   {NULL, NULL}};
 
@@ -205,10 +219,12 @@ static PetscErrorCode test_abaqus(void)
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n1, 1,2,3,4\n", "element 1"},
     {"*PART, NAME=A\n" NODE "*PART, NAME=B\n", "a.inp|line 7|*PART"},
     {"*INCLUDE, INPUT=more.inp\n", "a.inp|line 1|*INCLUDE"},
-    {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*INSTANCE, NAME=I, PART=P\n1., 0., 0.\n", "a.inp|line 9"},
+    {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*INSTANCE, NAME=I, PART=P\n1., 0., 0.\n",
+     "a.inp|line 9"},
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*NSET, NSET=N, GENERATE\n1, 1000000000, 1\n", NULL},
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*SURFACE, NAME=S\n1, S5\n", "a.inp|line 9|'S5'"},
-    {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*SURFACE, NAME=S\n2, S1\n", "a.inp|line 9|surface 'S'|element 2"},
+    {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*SURFACE, NAME=S\n2, S1\n",
+     "a.inp|line 9|surface 'S'|element 2"},
     {"*NODE\n1, 0, zero, 0\n", "a.inp|line 2|node 1|'zero'"},
     {"solid\n", "*NODE"},
     {NULL, NULL}};
@@ -218,21 +234,25 @@ static PetscErrorCode test_abaqus(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_cases("a.inp", cases));
+
   /* many lines that each list all nodes: no valid file of this size does that */
   (void)snprintf(path, sizeof(path), "%s/many.inp", folder);
   file = fopen(path, "w");
   SB_CHECK(file, "%s cannot be written", path);
   (void)fputs(NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*NODE\n", file);
-  for (int i = 5; i < 3000; i++) (void)fprintf(file, "%d,9,9,9\n", i);
+  for (int i = 5; i < 3000; i++)
+    (void)fprintf(file, "%d,9,9,9\n", i);
   (void)fputs("*NSET, NSET=N, GENERATE\n", file);
-  for (int i = 0; i < 3000; i++) (void)fputs("1,9999,1\n", file);
+  for (int i = 0; i < 3000; i++)
+    (void)fputs("1,9999,1\n", file);
   (void)fclose(file);
   SB_CHECK_ERROR(use_mesh("many.inp"), PETSC_ERR_FILE_UNEXPECTED, "many.inp|members");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define UNODE                                                                                               \
-  "    -1\n  2411\n 1 1 1 11\n 0.D+0 0. 0.\n 2 1 1 11\n 1.D+0 0. 0.\n 3 1 1 11\n 0. 1. 0.\n 4 1 1 11\n 0. " \
+#define UNODE                                                                                     \
+  "    -1\n  2411\n 1 1 1 11\n 0.D+0 0. 0.\n 2 1 1 11\n 1.D+0 0. 0.\n 3 1 1 11\n 0. 1. 0.\n 4 1 " \
+  "1 11\n 0. "                                                                                    \
   "0. 1.E0\n    -1\n"
 #define UTET "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n    -1\n"
 static const Case unv[] = {
@@ -242,8 +262,10 @@ static const Case unv[] = {
   {"solid\n", "u.unv|line 1|-1"},
   {UTET, "body 'b'|line 2"},
   {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 9\n    -1\n", "u.unv|line 15|element 1|node 9"},
-  {UNODE "    -1\n  2412\n 1 118 2 1 7 4\n 1 2 3 4\n    -1\n", "line 14|element 1|kind 118|4 nodes|10"},
-  {UNODE "    -1\n  2412\n 1 118 2 1 7 10\n 1 0 2 0 3 0 0 0\n 0 4\n    -1\n", "line 15|element 1|node 0"},
+  {UNODE "    -1\n  2412\n 1 118 2 1 7 4\n 1 2 3 4\n    -1\n",
+   "line 14|element 1|kind 118|4 nodes|10"},
+  {UNODE "    -1\n  2412\n 1 118 2 1 7 10\n 1 0 2 0 3 0 0 0\n 0 4\n    -1\n",
+   "line 15|element 1|node 0"},
   {UNODE "    -1\n  2412\n 1 115 2 1 7 8\n 1 2 3 4 1 2 3 4\n    -1\n", "1 hexahedra"},
   {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n", "-1"},
   {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 1\nname\n 7 8 0 0\n    -1\n", "group 'name'|node 8"},
@@ -258,7 +280,8 @@ static const Case gmsh_40[] = {
   {FORMAT40 ENTITY40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
   {"\n" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
   {"\xef\xbb\xbf" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
-  {FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 9\n$EndElements\n", "g.msh|line 15|element 1|node 9"},
+  {FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 9\n$EndElements\n",
+   "g.msh|line 15|element 1|node 9"},
   {FORMAT40 NODES40 "$Elements\n1 2\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", "line 15|2 elements|1"},
   {FORMAT40 "$Nodes\n1 1\n1 7 0 1\n1 0 0 0\n", "line 6|dimension 7"},
   {FORMAT40, "g.msh"},
@@ -270,7 +293,7 @@ static PetscErrorCode test_nastran(void)
   static const Case cases[] = {
     {GRIDS "CTETRA,1,5,1,2,3,4\nENDDATA\n", NULL},
     {"\xef\xbb\xbf" GRIDS "CTETRA,1,5,1,2,3,4\nENDDATA\n", NULL}, /* the mark of UTF-8 */
-    {GRIDS "CTETRA,1,,1,2,3,4\nSPC1,1,123,7\n", NULL},            /* no property; a point of another kind */
+    {GRIDS "CTETRA,1,,1,2,3,4\nSPC1,1,123,7\n", NULL}, /* no property; a point of another kind */
     {"solid\n", "n.bdf|line 2|GRID"},
     {GRIDS "CTETRA,1,5,1,2,3,9\n", "n.bdf|line 5|element 1|node 9"},
     {GRIDS "CTETRA,1,5,1,2,3\n", "line 5"},

@@ -1,5 +1,5 @@
-// Files that once broke a reader, and every damaged file of tests/data: each gives a mesh or an error as documented.
-// @ranks 1
+// Files that once broke a reader, and every damaged file of tests/data: each gives a mesh or an
+// error as documented. @ranks 1
 #include <dirent.h>
 #include <stdlib.h>
 #include "../fuzz/readers.h"
@@ -17,7 +17,8 @@ static PetscErrorCode replay(int reader, const char *scratch, const char *path)
   PetscFunctionBeginUser;
   ierr = SbScanOpen("replay", path, &scan);
   if (!ierr) {
-    const PetscErrorCode code = fuzz_read(reader, scratch, scan.data, (size_t)(scan.end - scan.data), text);
+    const PetscErrorCode code =
+      fuzz_read(reader, scratch, scan.data, (size_t)(scan.end - scan.data), text);
 
     broken = fuzz_broken_promise(code, text);
     SB_CHECK(!broken, "%s: %s: '%s' (code %d)", path, broken, text, (int)code);
@@ -28,7 +29,8 @@ static PetscErrorCode replay(int reader, const char *scratch, const char *path)
 }
 
 /* All files of a folder with this extension; NULL: any. */
-static PetscErrorCode replay_folder(int reader, const char *scratch, const char *folder, const char *ending)
+static PetscErrorCode replay_folder(int reader, const char *scratch, const char *folder,
+                                    const char *ending)
 {
   DIR *dir = opendir(folder);
   struct dirent *entry;
@@ -36,15 +38,18 @@ static PetscErrorCode replay_folder(int reader, const char *scratch, const char 
 
   PetscFunctionBeginUser;
   while (dir && (entry = readdir(dir))) {
-    const size_t n = strlen(entry->d_name), m = ending ? strlen(ending) : 0;
+    const size_t n = strlen(entry->d_name);
+    const size_t m = ending ? strlen(ending) : 0;
 
-    if (entry->d_name[0] == '.' || n < m || (ending && strcmp(entry->d_name + n - m, ending) != 0)) continue;
+    if (entry->d_name[0] == '.' || n < m || (ending && strcmp(entry->d_name + n - m, ending) != 0))
+      continue;
     (void)snprintf(path, sizeof(path), "%s/%s", folder, entry->d_name);
     PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
     PetscCall(replay(reader, scratch, path));
     PetscCall(PetscPopErrorHandler());
   }
-  if (dir) closedir(dir);
+  if (dir)
+    closedir(dir);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -55,9 +60,11 @@ static PetscErrorCode test_sound(const char *scratch)
   int reader = 0;
 
   PetscFunctionBeginUser;
-  while (fuzz_readers[reader].read != SbImportRead_H5) reader++;
+  while (fuzz_readers[reader].read != SbImportRead_H5)
+    reader++;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++) {
-    char path[64], text[1024] = "";
+    char path[64];
+    char text[1024] = "";
     SbScan scan;
     PetscErrorCode code;
 
@@ -72,7 +79,8 @@ static PetscErrorCode test_sound(const char *scratch)
 
 int main(int argc, char **argv)
 {
-  char scratch[] = "/tmp/sbfuzz_XXXXXX", folder[64], command[64];
+  char scratch[] = "/tmp/sbfuzz_XXXXXX";
+  char folder[64], command[64];
 
   SB_TEST_BEGIN(argc, argv);
   SB_CHECK(mkdtemp(scratch), "no folder %s", scratch);

@@ -1,5 +1,5 @@
-// Reader of gmsh files: the four variants of one mesh give the same result, each kind of damage has its message.
-// @ranks 1
+// Reader of gmsh files: the four variants of one mesh give the same result, each kind of damage has
+// its message. @ranks 1
 #include "../file.h"
 #include "mesh_test.h"
 
@@ -27,7 +27,8 @@ static PetscErrorCode test_variant(const char *path)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cubes); k++) {
     const PetscInt n = test_count(&im, cubes[k].dim, cubes[k].group);
 
-    SB_CHECK(n == cubes[k].n, "%s: %d of dimension %d in '%s'", path, (int)n, cubes[k].dim, cubes[k].group);
+    SB_CHECK(n == cubes[k].n, "%s: %d of dimension %d in '%s'", path, (int)n, cubes[k].dim,
+             cubes[k].group);
   }
   for (PetscInt i = 0; i < 3 * im.nvert && im.nvert == reference.nvert; i++)
     difference = PetscMax(difference, PetscAbsReal(im.x[i] - reference.x[i]));
@@ -40,7 +41,8 @@ static PetscErrorCode test_variant(const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Binary file with the other byte order: the 4.1 file with every number of its sections reversed. */
+/* Binary file with the other byte order: the 4.1 file with every number of its sections
+   reversed. */
 static PetscErrorCode test_other_byte_order(void)
 {
   static const unsigned char one[4] = {0, 0, 0, 1};
@@ -75,7 +77,8 @@ static PetscErrorCode test_other_byte_order(void)
   fprintf(file, "\n$EndElements\n");
   PetscCall(test_file_close(file));
   PetscCall(test_import(path, &im));
-  SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert,
+           (int)im.item[3].n);
   SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", im.x[3], im.x[11]);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,7 +118,8 @@ static PetscErrorCode test_damage(void)
     (void)snprintf(path, sizeof(path), DATA "%s", bad[i].file);
     SB_CHECK_ERROR(test_mesh_use(path), PETSC_ERR_FILE_UNEXPECTED, bad[i].words);
   }
-  SB_CHECK_ERROR(test_mesh_use(DATA "none.msh"), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.msh");
+  SB_CHECK_ERROR(test_mesh_use(DATA "none.msh"), PETSC_ERR_FILE_OPEN,
+                 "body 'b'|tests/data/none.msh");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,9 +159,11 @@ int main(int argc, char **argv)
   PetscCall(test_variant(DATA "two_cubes_41.msh"));
   PetscCall(test_variant(DATA "two_cubes_41_bin.msh"));
   PetscCall(test_other_byte_order());
+
   /* nodes with widely separated numbers, unused nodes, an irrelevant section */
   PetscCall(test_import(DATA "odd.msh", &im));
-  SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert,
+           (int)im.item[3].n);
   SB_CHECK(im.item[3].vert[1] == 2, "node 1000000000002 became vertex %d", (int)im.item[3].vert[1]);
   SB_CHECK(test_count(&im, 2, "skin") == 3 && test_count(&im, 3, "flesh") == 2,
            "groups of a file with names");

@@ -6,7 +6,8 @@
 #include "mesh_test.h"
 #include "sbgmsh.h"
 
-static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work, void *ctx, SbImport *im)
+static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work, void *ctx,
+                          SbImport *im)
 {
   const SbGmshJob job = {im->where, doing, seconds, work, ctx};
 
@@ -30,20 +31,25 @@ static PetscErrorCode try_work(PetscReal seconds, SbGmshWork work, void *ctx)
 
 /* ------------------------------------------------------------------ volume from a surface */
 
-/* Unit cube as twelve triangles of a discrete surface; its volume mesh has the size that ctx points to. */
+/* Unit cube as twelve triangles of a discrete surface; its volume mesh has the size that ctx points
+   to. */
 static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
 {
   double x[24];
-  size_t tag[8], tri[36] = {1, 3, 2, 2, 3, 4, 5, 6, 7, 6, 8, 7, 1, 2, 5, 2, 6, 5,
-                            3, 7, 4, 4, 7, 8, 1, 5, 3, 3, 5, 7, 2, 4, 6, 4, 8, 6};
-  int surface = 1, loop = 1, volume = 1;
+  size_t tag[8];
+  size_t tri[36] = {1, 3, 2, 2, 3, 4, 5, 6, 7, 6, 8, 7, 1, 2, 5, 2, 6, 5,
+                    3, 7, 4, 4, 7, 8, 1, 5, 3, 3, 5, 7, 2, 4, 6, 4, 8, 6};
+  int surface = 1;
+  int loop = 1;
+  int volume = 1;
   size_t *number, ntet, *node, nnode, *vertex, nvert, nx, nparameter;
   double *place, *parameter;
 
   PetscFunctionBeginUser;
   for (int v = 0; v < 8; v++) {
     tag[v] = (size_t)v + 1;
-    for (int i = 0; i < 3; i++) x[3 * v + i] = v >> i & 1;
+    for (int i = 0; i < 3; i++)
+      x[3 * v + i] = v >> i & 1;
   }
   SB_GMSH(gmsh, ModelAddDiscreteEntity, 2, surface, NULL, 0);
   SB_GMSH(gmsh, ModelMeshAddNodes, 2, surface, tag, 8, x, 24, NULL, 0);
@@ -53,18 +59,22 @@ static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
   SB_GMSH0(gmsh, ModelGeoSynchronize);
   SB_GMSH(gmsh, OptionSetNumber, "Mesh.MeshSizeMax", *(const double *)ctx);
   SB_GMSH(gmsh, ModelMeshGenerate, 3);
+
   // tags of nodes are 1, 2, ...
-  SB_GMSH(gmsh, ModelMeshGetNodes, &vertex, &nvert, &place, &nx, &parameter, &nparameter, -1, -1, 0, 0);
+  SB_GMSH(gmsh, ModelMeshGetNodes, &vertex, &nvert, &place, &nx, &parameter, &nparameter, -1, -1, 0,
+          0);
   PetscCall(SbImportSetVertices(result, (PetscInt)nvert));
   for (size_t v = 0; v < nvert; v++) {
     result->vert_number[v] = (int64_t)v + 1;
-    for (int i = 0; i < 3; i++) result->x[3 * (vertex[v] - 1) + (size_t)i] = place[3 * v + (size_t)i];
+    for (int i = 0; i < 3; i++)
+      result->x[3 * (vertex[v] - 1) + (size_t)i] = place[3 * v + (size_t)i];
   }
   SB_GMSH(gmsh, ModelMeshGetElementsByType, 4, &number, &ntet, &node, &nnode, volume, 0, 1);
   for (size_t c = 0; c < ntet; c++) {
     PetscInt vert[4];
 
-    for (int a = 0; a < 4; a++) vert[a] = (PetscInt)node[4 * c + (size_t)a] - 1;
+    for (int a = 0; a < 4; a++)
+      vert[a] = (PetscInt)node[4 * c + (size_t)a] - 1;
     PetscCall(SbImportAddItem(result, 3, vert, 0, (int64_t)number[c]));
   }
   gmsh->Free(vertex);
@@ -84,9 +94,11 @@ static PetscErrorCode test_cube(void)
   PetscFunctionBeginUser;
   (void)snprintf(im.where, sizeof(im.where), "body 'b': cube");
   PetscCall(run("made tetrahedra", 60, mesh_cube, &size, &im));
-  SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
+  SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n,
+           (int)im.nvert);
   PetscCall(SbMeshFileMeasure(&im, &facts));
   SB_CHECK_NEAR(facts.body.volume, 1, 1e-12, "volume");
+
   /* more items can be added to the body */
   PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
   PetscCall(SbImportDestroy(&im));
@@ -107,7 +119,8 @@ static PetscErrorCode hang(const SbGmsh *gmsh, void *ctx, SbImport *result)
 {
   (void)gmsh, (void)ctx, (void)result;
   PetscFunctionBeginUser;
-  for (;;) (void)sleep(1);
+  for (;;)
+    (void)sleep(1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,7 +154,8 @@ static PetscErrorCode test_failures(void)
   SB_CHECK_ERROR(try_work(60, crash, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'");
   SB_CHECK_ERROR(try_work(1.5, hang, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|1.5 s");
   SB_CHECK_ERROR(try_work(60, leave, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|code 3");
-  SB_CHECK_ERROR(try_work(60, refuse, "seven is too many"), PETSC_ERR_USER_INPUT, "seven is too many");
+  SB_CHECK_ERROR(try_work(60, refuse, "seven is too many"), PETSC_ERR_USER_INPUT,
+                 "seven is too many");
   SB_CHECK_ERROR(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'");
   SB_CHECK_ERROR(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "Nowhere.AtAll");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -155,8 +169,10 @@ static PetscErrorCode test_not_loaded(void)
   PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  while (maps && fgets(line, sizeof(line), maps)) found = (PetscBool)(found || strstr(line, "libgmsh"));
-  if (maps) fclose(maps);
+  while (maps && fgets(line, sizeof(line), maps))
+    found = (PetscBool)(found || strstr(line, "libgmsh"));
+  if (maps)
+    fclose(maps);
   SB_CHECK(!found, "libgmsh is loaded in the program itself");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -172,6 +188,7 @@ int main(int argc, char **argv)
     PetscCall(test_failures());
     PetscCall(test_not_loaded());
   }
+
   /* MPI still works after the child processes, and the other ranks have waited */
   PetscCallMPI(MPI_Bcast(&rank, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   SB_CHECK(rank == 0, "rank %d from rank 0", (int)rank);

@@ -1,5 +1,5 @@
-// Meshes in HDF5, written by supple-mesh and by a run: the same distributed mesh as from other files; each kind of damage has its message.
-// @ranks 1 2 3
+// Meshes in HDF5, written by supple-mesh and by a run: the same distributed mesh as from other
+// files; each kind of damage has its message. @ranks 1 2 3
 #include <hdf5.h>
 #include "mesh_same.h"
 #include <sbsurface.h>
@@ -18,7 +18,8 @@ static PetscErrorCode write_mesh(const char *mesh, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums over owned cells that do not depend on the partition: volume, original numbers with their vertices, sets. */
+/* Sums over owned cells that do not depend on the partition: volume, original numbers with their
+   vertices, sets. */
 static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
 {
   SbBody body = test_body("b", mesh_path);
@@ -36,9 +37,11 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
 
     sum[0] += SbTetDeterminant(mesh->x, v) / 6;
     for (int a = 0; a < 4; a++)
-      sum[1] += (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
+      sum[1] +=
+        (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
     sum[2] += (mesh->cell_set[c] & SB_SET_BIT(1)) != 0;
-    for (int f = 0; f < 4; f++) sum[3] += (mesh->face_set[4 * c + f] & SB_SET_BIT(0)) != 0;
+    for (int f = 0; f < 4; f++)
+      sum[3] += (mesh->face_set[4 * c + f] & SB_SET_BIT(0)) != 0;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   PetscCall(SbMeshDestroy(&mesh));
@@ -50,12 +53,14 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
 static void put_array(hid_t file, const char *name, int ndim, const hsize_t size[], hid_t type,
                       const void *data)
 {
-  const hid_t links = H5Pcreate(H5P_LINK_CREATE), space = H5Screate_simple(ndim, size, NULL);
+  const hid_t links = H5Pcreate(H5P_LINK_CREATE);
+  const hid_t space = H5Screate_simple(ndim, size, NULL);
   hid_t set;
 
   (void)H5Pset_create_intermediate_group(links, 1);
   set = H5Dcreate2(file, name, type, space, links, H5P_DEFAULT, H5P_DEFAULT);
-  if (data) (void)H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
+  if (data)
+    (void)H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
   (void)H5Dclose(set);
   (void)H5Sclose(space);
   (void)H5Pclose(links);
@@ -63,7 +68,8 @@ static void put_array(hid_t file, const char *name, int ndim, const hsize_t size
 
 static void put_text(hid_t file, const char *where, const char *name, const char *text)
 {
-  const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  const hid_t space = H5Screate(H5S_SCALAR);
   hid_t a;
 
   (void)H5Tset_size(type, strlen(text) + 1);
@@ -89,9 +95,11 @@ static void write_output(const char *path)
   put_array(file, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, tet);
   put_array(file, "/mesh/body", 1, one, H5T_NATIVE_INT, body);
   put_text(file, "/mesh", "bodies", "stone,liver");
-  for (int i = 0; i < 12; i++) u[i] = 0.5f;
+  for (int i = 0; i < 12; i++)
+    u[i] = 0.5f;
   put_array(file, "/step/0000/000003/displacement", 2, four_by_three, H5T_NATIVE_FLOAT, u);
-  for (int i = 0; i < 12; i++) u[i] = 2.f;
+  for (int i = 0; i < 12; i++)
+    u[i] = 2.f;
   put_array(file, "/step/0001/000120/displacement", 2, four_by_three, H5T_NATIVE_FLOAT, u);
   (void)H5Fclose(file);
 }
@@ -121,12 +129,15 @@ static PetscErrorCode test_output(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -output_discontinuous: two tets with separate points; a shared vertex is at the mean of its points. */
+/* -output_discontinuous: two tets with separate points; a shared vertex is at the mean of its
+   points. */
 static PetscErrorCode test_discontinuous(void)
 {
   const double x[24] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1};
-  const int cells[8] = {0, 1, 2, 3, 4, 5, 6, 7}, vertices[8] = {0, 1, 2, 3, 1, 2, 3, 4};
-  const hsize_t points[2] = {8, 3}, tets[2] = {2, 4};
+  const int cells[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  const int vertices[8] = {0, 1, 2, 3, 1, 2, 3, 4};
+  const hsize_t points[2] = {8, 3};
+  const hsize_t tets[2] = {2, 4};
   double u[24] = {0};
   char path[512];
   SbImport *im;
@@ -149,7 +160,8 @@ static PetscErrorCode test_discontinuous(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A linear tet and a P2 tet that is cut into eight: both are read, with six edge nodes, one of them off its midpoint; damaged arrays are reported. */
+/* A linear tet and a P2 tet that is cut into eight: both are read, with six edge nodes, one of them
+   off its midpoint; damaged arrays are reported. */
 static PetscErrorCode test_cut(void)
 {
   static const struct {
@@ -173,7 +185,8 @@ static PetscErrorCode test_cut(void)
                         0, 0, 1, .5, 0, 0, .5, .5, 0, 0, .5, .1, 0, 0, .5, .5, 0, .5, 0, .5, .5};
   const int cells[36] = {0,  1, 2, 3,  4,  8,  10, 11, 8,  5,  9, 12, 10, 9, 6, 13, 11, 12,
                          13, 7, 8, 13, 10, 11, 8,  13, 11, 12, 8, 13, 12, 9, 8, 13, 9,  10};
-  const hsize_t points[2] = {14, 3}, tets[2] = {9, 4};
+  const hsize_t points[2] = {14, 3};
+  const hsize_t tets[2] = {9, 4};
   char path[512];
   SbImport *im;
 
@@ -181,18 +194,24 @@ static PetscErrorCode test_cut(void)
   PetscCall(test_path("cut.h5", path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    int body[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1}, parent[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
+    int body[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
+    int parent[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
     int ten[100] = {0, 1, 2, 3, -1, -1, -1, -1, -1, -1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
-    const hsize_t nbody[1] = {9}, nparent[1] = {(hsize_t)PetscMax(cases[i].nparent, 0)},
-                  nten[2] = {(hsize_t)PetscMax(cases[i].nten, 0), 10};
+    const hsize_t nbody[1] = {9};
+    const hsize_t nparent[1] = {(hsize_t)PetscMax(cases[i].nparent, 0)};
+    const hsize_t nten[2] = {(hsize_t)PetscMax(cases[i].nten, 0), 10};
 
-    if (cases[i].at || cases[i].parent) parent[cases[i].at] = cases[i].parent;
-    if (cases[i].where) ten[cases[i].where] = cases[i].ten;
+    if (cases[i].at || cases[i].parent)
+      parent[cases[i].at] = cases[i].parent;
+    if (cases[i].where)
+      ten[cases[i].where] = cases[i].ten;
     put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
     put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
     put_array(file, "/mesh/body", 1, nbody, H5T_NATIVE_INT, body);
-    if (cases[i].nten >= 0) put_array(file, "/mesh/cells10", 2, nten, H5T_NATIVE_INT, ten);
-    if (cases[i].nparent >= 0) put_array(file, "/mesh/parent", 1, nparent, H5T_NATIVE_INT, parent);
+    if (cases[i].nten >= 0)
+      put_array(file, "/mesh/cells10", 2, nten, H5T_NATIVE_INT, ten);
+    if (cases[i].nparent >= 0)
+      put_array(file, "/mesh/parent", 1, nparent, H5T_NATIVE_INT, parent);
     (void)H5Fclose(file);
     if (cases[i].words) {
       SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, cases[i].words);
@@ -211,8 +230,10 @@ static PetscErrorCode test_cut(void)
 
 /* ------------------------------------------------------------------ damaged files */
 
-/* Reading must fail with these words (NULL: it succeeds), with both -mesh_reading types and in supple-mesh; with a note, supple-mesh succeeds and gives the note. */
-static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *words, const char *note)
+/* Reading must fail with these words (NULL: it succeeds), with both -mesh_reading types and in
+   supple-mesh; with a note, supple-mesh succeeds and gives the note. */
+static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *words,
+                             const char *note)
 {
   static const char *const reading[] = {"rank0", "slabs"};
   SbMeshStatistics facts;
@@ -253,17 +274,27 @@ static void replace(const char *path, const char *name, int ndim, const hsize_t 
   const hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
 
   (void)H5Ldelete(file, name, H5P_DEFAULT);
-  if (ndim) put_array(file, name, ndim, size, type, data);
+  if (ndim)
+    put_array(file, name, ndim, size, type, data);
   (void)H5Fclose(file);
 }
 
 static PetscErrorCode test_damage(void)
 {
-  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, pair[2] = {2, 2}, groups[1] = {8}, two[1] = {2},
-                vertices[2] = {23, 3}, tets[1] = {48};
-  const double bad[4] = {0}, reals[69] = {[68] = NAN};
-  const int wild[4] = {0, 1, 2, 4711}, below[4] = {0, -1, 2, 3}, high[8] = {0, 1, 2, 3, 4, 3, 3, 3},
-            falling[2] = {1, 0}, tags[48] = {[47] = 4711};
+  const hsize_t lie[2] = {100000000, 4};
+  const hsize_t few[1] = {3};
+  const hsize_t pair[2] = {2, 2};
+  const hsize_t groups[1] = {8};
+  const hsize_t two[1] = {2};
+  const hsize_t vertices[2] = {23, 3};
+  const hsize_t tets[1] = {48};
+  const double bad[4] = {0};
+  const double reals[69] = {[68] = NAN};
+  const int wild[4] = {0, 1, 2, 4711};
+  const int below[4] = {0, -1, 2, 3};
+  const int high[8] = {0, 1, 2, 3, 4, 3, 3, 3};
+  const int falling[2] = {1, 0};
+  const int tags[48] = {[47] = 4711};
   const struct {
     const char *name;
     int ndim; /* 0: the array is removed */
@@ -300,7 +331,8 @@ static PetscErrorCode test_damage(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Layout 2 of a cube of six tets around its diagonal 0-7, with two unused vertices: rows of both arrays (-1: absent), and the expected message. */
+/* Layout 2 of a cube of six tets around its diagonal 0-7, with two unused vertices: rows of both
+   arrays (-1: absent), and the expected message. */
 static PetscErrorCode test_curved_damage(void)
 {
   static const struct {
@@ -316,15 +348,69 @@ static PetscErrorCode test_curved_damage(void)
     {2, 1, -1, {{0, 7}}, {{0}}, "layout 2|/mesh/edge_offsets", NULL},
     {2, -1, 1, {{0}}, {{0.1}}, "layout 2|/mesh/curved_edges", NULL},
     {2, 2, 3, {{0, 7}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/edge_offsets|3 rows|2 are", NULL},
-    {2, 2, 2, {{0, 7}, {0, 10}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds 10|row 2|from 0 to 9", NULL},
-    {2, 2, 2, {{-1, 7}, {0, 1}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds -1|row 1|from 0 to 9", NULL},
-    {2, 3, 3, {{0, 7}, {0, 1}, {4, 4}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|holds 4 twice|row 3", NULL},
-    {2, 3, 3, {{0, 7}, {6, 1}, {0, 1}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|1 and 6|row 2", NULL},
-    {2, 3, 3, {{0, 7}, {0, 1}, {1, 6}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|1 and 6|row 3", NULL},
-    {2, 3, 3, {{0, 7}, {0, 1}, {8, 9}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|8 and 9|row 3", NULL},
-    {2, 3, 3, {{0, 7}, {8, 0}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|0 and 8|row 2", NULL},
-    {2, 3, 3, {{0, 7}, {0, 1}, {7, 0}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|rows 1 and 3", NULL},
-    {2, 3, 3, {{0, 7}, {1, 7}, {1, 7}}, {{0.1}, {0.1}, {0.2}}, "/mesh/curved_edges|rows 2 and 3", NULL},
+    {2,
+     2,
+     2,
+     {{0, 7}, {0, 10}},
+     {{0.1}, {0.1}},
+     "/mesh/curved_edges|holds 10|row 2|from 0 to 9",
+     NULL},
+    {2,
+     2,
+     2,
+     {{-1, 7}, {0, 1}},
+     {{0.1}, {0.1}},
+     "/mesh/curved_edges|holds -1|row 1|from 0 to 9",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {0, 1}, {4, 4}},
+     {{0.1}, {0.1}, {0}},
+     "/mesh/curved_edges|holds 4 twice|row 3",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {6, 1}, {0, 1}},
+     {{0.1}, {0.1}, {0}},
+     "/mesh/curved_edges|1 and 6|row 2",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {0, 1}, {1, 6}},
+     {{0.1}, {0.1}, {0}},
+     "/mesh/curved_edges|1 and 6|row 3",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {0, 1}, {8, 9}},
+     {{0.1}, {0.1}, {0.1}},
+     "/mesh/curved_edges|8 and 9|row 3",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {8, 0}, {0, 1}},
+     {{0.1}, {0.1}, {0.1}},
+     "/mesh/curved_edges|0 and 8|row 2",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {0, 1}, {7, 0}},
+     {{0.1}, {0.1}, {0.1}},
+     "/mesh/curved_edges|rows 1 and 3",
+     NULL},
+    {2,
+     3,
+     3,
+     {{0, 7}, {1, 7}, {1, 7}},
+     {{0.1}, {0.1}, {0.2}},
+     "/mesh/curved_edges|rows 2 and 3",
+     NULL},
     {2, 3, 3, {{1, 0}, {0, 1}, {0, 7}}, {{0}, {0}, {0.1}}, "/mesh/curved_edges|rows 1 and 2", NULL},
     {2, 2, 2, {{0, 7}, {0, 1}}, {{0.1}, {0, INFINITY}}, "/mesh/edge_offsets|row 2", NULL},
     {2, 2, 2, {{0, 7}, {0, 1}}, {{0.1}, {0, 0, NAN}}, "/mesh/edge_offsets|row 2", NULL},
@@ -340,24 +426,26 @@ static PetscErrorCode test_curved_damage(void)
   PetscFunctionBeginUser;
   PetscCall(test_path_of_all("curved.h5", path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2},
-                  offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
+    const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2};
+    const hsize_t offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
 
     if (!test_rank) {
       hid_t file, a;
 
       PetscCall(write_mesh("box:1,1,1:1", path));
       replace(path, "/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, x);
-      replace(path, "/mesh/curved_edges", cases[i].nedge < 0 ? 0 : 2, edges, H5T_NATIVE_INT, cases[i].edge);
-      replace(path, "/mesh/edge_offsets", cases[i].noff < 0 ? 0 : 2, offs, H5T_NATIVE_DOUBLE, cases[i].off);
+      replace(path, "/mesh/curved_edges", cases[i].nedge < 0 ? 0 : 2, edges, H5T_NATIVE_INT,
+              cases[i].edge);
+      replace(path, "/mesh/edge_offsets", cases[i].noff < 0 ? 0 : 2, offs, H5T_NATIVE_DOUBLE,
+              cases[i].off);
       file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
       a = H5Aopen(file, "supple_mesh", H5P_DEFAULT);
       (void)H5Awrite(a, H5T_NATIVE_INT, &cases[i].layout);
       (void)H5Aclose(a);
       (void)H5Fclose(file);
     }
-    PetscCall(refuse(path, cases[i].note ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED, cases[i].words,
-                     cases[i].note));
+    PetscCall(refuse(path, cases[i].note ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED,
+                     cases[i].words, cases[i].note));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -401,12 +489,14 @@ static PetscErrorCode test_foreign(void)
   FILE *text;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.h5");
+  SB_CHECK_ERROR(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN,
+                 "body 'b'|tests/data/none.h5");
   PetscCall(test_path("foreign.h5", path));
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put_array(file, "/weather/rain", 2, one_by_four, H5T_NATIVE_INT, tet);
   (void)H5Fclose(file);
-  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|/mesh/x|/mesh/cells");
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
+                 "body 'b'|/mesh/x|/mesh/cells");
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   space = H5Screate(H5S_SCALAR);
   a = H5Acreate2(file, "supple_mesh", H5T_NATIVE_INT, space, H5P_DEFAULT, H5P_DEFAULT);
@@ -432,10 +522,12 @@ int main(int argc, char **argv)
   PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
   PetscCall(SbOptionsRegister("body", "", PETSC_DECIDE, SbTetRows));
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+
   /* the .h5 file and its .xmf give every rank the same sums as the .msh */
   PetscCall(test_path_of_all("cubes.h5", path));
   PetscCall(test_path_of_all("cubes.xmf", index));
-  if (!test_rank) PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
+  if (!test_rank)
+    PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
   PetscCall(fingerprint(path, own));

@@ -41,7 +41,8 @@ static PetscErrorCode test_growth(void)
       PetscCall(SbImportAddItem(&im, d, (PetscInt[]){i, i + 1, i + 2, i + 3}, i % 7, i + d));
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < im.item[d].n; i++) {
-      for (int k = 0; k <= d; k++) wrong += im.item[d].vert[(d + 1) * i + k] != i + k;
+      for (int k = 0; k <= d; k++)
+        wrong += im.item[d].vert[(d + 1) * i + k] != i + k;
       wrong += im.item[d].tags[i] != i % 7;
       wrong += im.item[d].number[i] != i + d;
     }
@@ -53,8 +54,9 @@ static PetscErrorCode test_growth(void)
 }
 
 /* Vertex (1, 1, 1) of a unit box, scaled, then rotated, then translated. */
-static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4], const PetscReal translate[3],
-                                 const PetscReal expected[3], PetscReal tolerance)
+static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4],
+                                 const PetscReal translate[3], const PetscReal expected[3],
+                                 PetscReal tolerance)
 {
   SbImport im = {0};
   SbBody body = test_body("b", "box:1,1,1:1");
@@ -64,7 +66,8 @@ static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4], con
   PetscCall(PetscArraycpy(body.rotate, rotate, 4));
   PetscCall(PetscArraycpy(body.translate, translate, 3));
   PetscCall(SbImportRead(&body, &im));
-  for (int i = 0; i < 3; i++) SB_CHECK_NEAR(im.x[3 * 7 + i], expected[i], tolerance, "placed coordinate");
+  for (int i = 0; i < 3; i++)
+    SB_CHECK_NEAR(im.x[3 * 7 + i], expected[i], tolerance, "placed coordinate");
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -82,7 +85,10 @@ static PetscErrorCode test_bad_place(SbBody body)
 
 int main(int argc, char **argv)
 {
-  const PetscReal none[4] = {0, 0, 0, 0}, zero[3] = {0, 0, 0}, c = PetscCosReal(0.5), s = PetscSinReal(0.5);
+  const PetscReal none[4] = {0, 0, 0, 0};
+  const PetscReal zero[3] = {0, 0, 0};
+  const PetscReal c = PetscCosReal(0.5);
+  const PetscReal s = PetscSinReal(0.5);
   SbBody body = test_body("b", "box:1,1,1:1");
 
   SB_TEST_BEGIN(argc, argv);
@@ -90,13 +96,16 @@ int main(int argc, char **argv)
   PetscCall(test_growth());
   PetscCall(test_place(1, none, zero, (PetscReal[]){1, 1, 1}, 0));
   PetscCall(test_place(0.01, none, (PetscReal[]){1, 2, 3}, (PetscReal[]){1.01, 2.01, 3.01}, 0));
-  /* quarter rotations are exact; counter-clockwise as seen from the tip of the axis, whatever its length */
+
+  /* quarter rotations are exact; counter-clockwise as seen from the tip of the axis, whatever its
+     length */
   PetscCall(test_place(1, (PetscReal[]){0, 0, 5, 90}, zero, (PetscReal[]){-1, 1, 1}, 0));
-  PetscCall(test_place(2, (PetscReal[]){0.1, 0, 0, 90}, (PetscReal[]){0, 0, 1}, (PetscReal[]){2, -2, 3}, 0));
+  PetscCall(test_place(2, (PetscReal[]){0.1, 0, 0, 90}, (PetscReal[]){0, 0, 1},
+                       (PetscReal[]){2, -2, 3}, 0));
   PetscCall(test_place(1, (PetscReal[]){0, 1, 0, -90}, zero, (PetscReal[]){-1, 1, 1}, 0));
   PetscCall(test_place(1, (PetscReal[]){1, 1, 1, 120}, zero, (PetscReal[]){1, 1, 1}, 1e-15));
-  PetscCall(
-    test_place(1, (PetscReal[]){0, 0, 1, 90 / PETSC_PI}, zero, (PetscReal[]){c - s, s + c, 1}, 1e-15));
+  PetscCall(test_place(1, (PetscReal[]){0, 0, 1, 90 / PETSC_PI}, zero,
+                       (PetscReal[]){c - s, s + c, 1}, 1e-15));
   body.rotate[3] = 30;
   SB_CHECK_ERROR(test_bad_place(body), PETSC_ERR_USER_INPUT, "body 'b'");
   body.rotate[3] = 0;

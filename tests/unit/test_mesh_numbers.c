@@ -1,5 +1,5 @@
-// Map from file numbers to indices, and groups assigned to items by number: against a linear search.
-// @ranks 1
+// Map from file numbers to indices, and groups assigned to items by number: against a linear
+// search. @ranks 1
 #include <stdlib.h>
 #include "mesh_test.h"
 
@@ -10,13 +10,15 @@ static PetscErrorCode test_find(PetscInt n, const int64_t number[])
   PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) PetscCall(SbNumbersAdd(&index, number[i]));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(SbNumbersAdd(&index, number[i]));
   for (PetscInt i = 0; i < n; i++) {
     for (int64_t d = -1; d <= 1; d++) {
       const int64_t wanted = (int64_t)((uint64_t)number[i] + (uint64_t)d);
       PetscInt at = -1;
 
-      for (PetscInt k = 0; k < n; k++) at = number[k] == wanted ? k : at;
+      for (PetscInt k = 0; k < n; k++)
+        at = number[k] == wanted ? k : at;
       wrong += SbNumbersFind(&index, wanted) != at;
     }
   }
@@ -30,21 +32,28 @@ static PetscBool has_group(const SbImport *im, int dim, PetscInt item, PetscInt 
   const PetscInt tags = im->item[dim].tags[item];
 
   for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
-    if (im->tags_group[t] == group) return PETSC_TRUE;
+    if (im->tags_group[t] == group)
+      return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
-/* Random group memberships, some repeated, beside one group that the items have from the beginning. */
+/* Random group memberships, some repeated, beside one group that the items have from the
+   beginning. */
 static PetscErrorCode test_members(void)
 {
-  enum { NITEM = 40, NGROUP = 9 };
+  enum {
+    NITEM = 40,
+    NGROUP = 9
+  };
   static PetscBool expected[4][NITEM][NGROUP + 1];
   SbImport im = {0};
-  PetscInt group[NGROUP + 1], tags, wrong = 0;
+  PetscInt group[NGROUP + 1], tags;
+  PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
-  for (int g = 0; g <= NGROUP; g++) PetscCall(SbImportGroup(&im, g % 4, 100 + g, NULL, &group[g]));
+  for (int g = 0; g <= NGROUP; g++)
+    PetscCall(SbImportGroup(&im, g % 4, 100 + g, NULL, &group[g]));
   PetscCall(SbImportTagSet(&im, 1, &group[NGROUP], &tags));
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < NITEM; i++) {
@@ -56,7 +65,9 @@ static PetscErrorCode test_members(void)
   }
   srand(7);
   for (int k = 0; k < 700; k++) {
-    const int d = rand() % 4, i = rand() % NITEM, g = rand() % NGROUP;
+    const int d = rand() % 4;
+    const int i = rand() % NITEM;
+    const int g = rand() % NGROUP;
 
     PetscCall(SbImportAddMember(&im, d, i, group[g]));
     expected[d][i][g] = PETSC_TRUE;
@@ -64,7 +75,8 @@ static PetscErrorCode test_members(void)
   PetscCall(SbImportJoinGroups(&im));
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < NITEM; i++)
-      for (int g = 0; g <= NGROUP; g++) wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];
+      for (int g = 0; g <= NGROUP; g++)
+        wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];
   }
   SB_CHECK(!wrong, "%d wrong memberships", (int)wrong);
   SB_CHECK(!im.nmember.n, "the list is not empty");
@@ -75,9 +87,12 @@ static PetscErrorCode test_members(void)
 /* Many groups are found again, each with a separate tag set. */
 static PetscErrorCode test_many_groups(void)
 {
-  enum { N = 5000 };
+  enum {
+    N = 5000
+  };
   SbImport im = {0};
-  PetscInt group, tags, again, wrong = 0;
+  PetscInt group, tags, again;
+  PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
@@ -90,17 +105,19 @@ static PetscErrorCode test_many_groups(void)
       wrong += tags != again || tags == 0;
     }
   }
-  SB_CHECK(!wrong && im.ngroup == N && im.ntags == N + 1, "%d wrong; %d groups, %d tag sets", (int)wrong,
-           (int)im.ngroup, (int)im.ntags);
+  SB_CHECK(!wrong && im.ngroup == N && im.ntags == N + 1, "%d wrong; %d groups, %d tag sets",
+           (int)wrong, (int)im.ngroup, (int)im.ntags);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
-                consecutive[] = {-2, -1, 0, 1}, round[] = {INT64_MAX - 1, INT64_MAX, INT64_MIN},
-                twice[] = {1, INT64_MAX, 5, INT64_MAX};
+  const int64_t dense[] = {7, 3, -2, 5, 4};
+  const int64_t far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5};
+  const int64_t consecutive[] = {-2, -1, 0, 1};
+  const int64_t round[] = {INT64_MAX - 1, INT64_MAX, INT64_MIN};
+  const int64_t twice[] = {1, INT64_MAX, 5, INT64_MAX};
   SbNumbers index = {0};
 
   SB_TEST_BEGIN(argc, argv);
@@ -109,8 +126,10 @@ int main(int argc, char **argv)
   PetscCall(test_find(4, consecutive));
   PetscCall(test_find(3, round));
   SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
-  for (int i = 0; i < 4; i++) PetscCall(SbNumbersAdd(&index, twice[i]));
-  SB_CHECK(SbNumbersFind(&index, INT64_MAX) == 3 && SbNumbersFind(&index, 5) == 2, "not the last one");
+  for (int i = 0; i < 4; i++)
+    PetscCall(SbNumbersAdd(&index, twice[i]));
+  SB_CHECK(SbNumbersFind(&index, INT64_MAX) == 3 && SbNumbersFind(&index, 5) == 2,
+           "not the last one");
   PetscCall(SbNumbersDestroy(&index));
   PetscCall(test_members());
   PetscCall(test_many_groups());

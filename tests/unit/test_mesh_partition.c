@@ -3,18 +3,21 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
-/* Partitions a box of rank 0; returns the largest part, the sum over all parts, and the faces between parts, in cells. */
+/* Partitions a box of rank 0; returns the largest part, the sum over all parts, and the faces
+   between parts, in cells. */
 static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, PetscInt *cells,
                           PetscInt *faces)
 {
   SbMergedMesh whole;
   SbBody body = test_body("b", mesh);
   PetscMPIInt *part;
-  PetscInt count[64] = {0}, n[3] = {0, 0, 0};
+  PetscInt count[64] = {0};
+  PetscInt n[3] = {0, 0, 0};
 
   PetscFunctionBeginUser;
   PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 1, &body, 0, NULL, &whole));
-  if (test_rank) whole.nvert = whole.ncell = 0;
+  if (test_rank)
+    whole.nvert = whole.ncell = 0;
   PetscCall(PetscMalloc1(whole.ncell, &part));
   PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
   for (PetscInt c = 0; c < whole.ncell; c++) {
@@ -27,7 +30,8 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
       n[2] += other > c && part[other] != part[c];
     }
   }
-  for (int r = 0; r < test_size; r++) n[0] = PetscMax(n[0], count[r]);
+  for (int r = 0; r < test_size; r++)
+    n[0] = PetscMax(n[0], count[r]);
   PetscCallMPI(MPI_Bcast(n, 3, MPIU_INT, 0, PETSC_COMM_WORLD));
   *most = n[0];
   *cells = n[1];
@@ -38,9 +42,9 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
 }
 
 /*
-  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72
-  faces. METIS promises parts of at most 1 % above the mean, bisection is rougher. No border may be longer
-  than twice the shortest possible one.
+  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each
+  border has 72 faces. METIS promises parts of at most 1 % above the mean, bisection is rougher. No
+  border may be longer than twice the shortest possible one.
 */
 static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
 {
@@ -49,8 +53,8 @@ static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
   PetscFunctionBeginUser;
   PetscCall(cut("box:4,1,1:6", type, &most, &cells, &faces));
   SB_CHECK(cells == 5184, "%d cells", (int)cells);
-  SB_CHECK(most <= (1 + slack) * cells / test_size + 1, "%d of %d cells on one rank of %d", (int)most,
-           (int)cells, (int)test_size);
+  SB_CHECK(most <= (1 + slack) * cells / test_size + 1, "%d of %d cells on one rank of %d",
+           (int)most, (int)cells, (int)test_size);
   SB_CHECK(faces <= 2 * 72 * (test_size - 1), "%d faces between the parts of %d ranks", (int)faces,
            (int)test_size);
   SB_CHECK(faces >= 72 * (test_size - 1), "%d faces between the parts of %d ranks", (int)faces,
@@ -58,11 +62,13 @@ static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives in order, and the answer i + 100 r returns. */
+/* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives in order, and the answer i +
+   100 r returns. */
 static PetscErrorCode test_route(void)
 {
   PetscMPIInt *dest;
-  PetscInt number[16], *got, answer[16], last = -1;
+  PetscInt number[16], *got, answer[16];
+  PetscInt last = -1;
   SbRoute route;
 
   PetscFunctionBeginUser;
@@ -98,6 +104,7 @@ int main(int argc, char **argv)
   PetscCall(test_bar(SB_PARTITION_METIS, 0.01));
   PetscCall(test_bar(SB_PARTITION_AUTO, 0.01));
   PetscCall(test_bar(SB_PARTITION_BISECTION, 0.03));
+
   /* with two cells each of two ranks gets one */
   PetscCall(cut("tests/data/two_tets.msh", SB_PARTITION_METIS, &most, &cells, &faces));
   SB_CHECK(most == (test_size == 1 ? 2 : 1), "%d cells on one rank", (int)most);

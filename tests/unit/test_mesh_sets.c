@@ -20,8 +20,8 @@ static PetscErrorCode test_parse(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_set("s", "plane:0,0,2,0.4", &set));
-  SB_CHECK(set.shape == SB_SET_PLANE && set.p[2] == 1 && set.p[3] == 0.2 && set.p[4] == 0, "plane %g %g %g",
-           set.p[2], set.p[3], set.p[4]);
+  SB_CHECK(set.shape == SB_SET_PLANE && set.p[2] == 1 && set.p[3] == 0.2 && set.p[4] == 0,
+           "plane %g %g %g", set.p[2], set.p[3], set.p[4]);
   PetscCall(test_set("s", "plane:3,0,4,5,0.1", &set));
   SB_CHECK_NEAR(set.p[0], 0.6, 1e-15, "norm");
   SB_CHECK_NEAR(set.p[3], 1, 1e-15, "distance");
@@ -33,7 +33,8 @@ static PetscErrorCode test_parse(void)
   PetscCall(test_set("s", "halfspace:0,-1,0,1", &set));
   SB_CHECK(set.shape == SB_SET_HALFSPACE && set.p[1] == -1, "halfspace");
   PetscCall(test_set("s", "group:liver.both ends", &set));
-  SB_CHECK(set.shape == SB_SET_GROUP && !strcmp(set.group, "liver.both ends"), "group '%s'", set.group);
+  SB_CHECK(set.shape == SB_SET_GROUP && !strcmp(set.group, "liver.both ends"), "group '%s'",
+           set.group);
   PetscCall(test_set("s", "body:liver", &set));
   SB_CHECK(set.shape == SB_SET_BODY && !strcmp(set.group, "liver"), "body '%s'", set.group);
   PetscCall(test_set("s", "boundary", &set));
@@ -54,7 +55,8 @@ static PetscErrorCode test_parse(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One set on two bodies: "a" the two cubes (x from 0 to 2), "b" a unit box of 2 x 2 x 2 cells at x = 5. */
+/* One set on two bodies: "a" the two cubes (x from 0 to 2), "b" a unit box of 2 x 2 x 2 cells at x
+   = 5. */
 static PetscErrorCode build(const char *text, SbSet *set, SbMergedMesh *whole)
 {
   SbBody body[2] = {test_body("a", DATA "two_cubes_41.msh"), test_body("b", "box:1,1,1:2")};
@@ -71,7 +73,8 @@ static PetscBool sees_back(const SbMergedMesh *whole, PetscInt c, PetscInt neigh
 {
   const PetscInt *n = whole->neighbour + 4 * neighbour;
 
-  if (neighbour < 0) return PETSC_TRUE;
+  if (neighbour < 0)
+    return PETSC_TRUE;
   return (PetscBool)(whole->data[neighbour].body == whole->data[c].body &&
                      (n[0] == c || n[1] == c || n[2] == c || n[3] == c));
 }
@@ -85,23 +88,26 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
   PetscFunctionBeginUser;
   PetscCall(build(text, &set, &whole));
   SB_CHECK(set.nvert == nvert && set.nfacet == nfacet && set.ncell == ncell,
-           "%s: %d vertices, %d facets, %d cells", text, (int)set.nvert, (int)set.nfacet, (int)set.ncell);
+           "%s: %d vertices, %d facets, %d cells", text, (int)set.nvert, (int)set.nfacet,
+           (int)set.ncell);
+
   /* The masks agree. */
-  for (PetscInt v = 0; v < whole.nvert; v++) n[0] += !!(whole.vertex[v].set & SB_SET_BIT(0));
+  for (PetscInt v = 0; v < whole.nvert; v++)
+    n[0] += !!(whole.vertex[v].set & SB_SET_BIT(0));
   for (PetscInt c = 0; c < whole.ncell; c++) {
     n[2] += !!(whole.data[c].set & SB_SET_BIT(0));
     for (int f = 0; f < 4; f++) {
       const uint64_t mask = whole.data[c].face[f];
 
       n[1] += (mask & SB_SET_BIT(0)) && (mask & SB_ON_BOUNDARY);
-      SB_CHECK(sees_back(&whole, c, whole.neighbour[4 * c + f]), "cell %d and its neighbour %d", (int)c,
-               (int)whole.neighbour[4 * c + f]);
+      SB_CHECK(sees_back(&whole, c, whole.neighbour[4 * c + f]), "cell %d and its neighbour %d",
+               (int)c, (int)whole.neighbour[4 * c + f]);
       SB_CHECK(!(mask & SB_ON_BOUNDARY) == (whole.neighbour[4 * c + f] >= 0),
                "bit of the boundary on cell %d", (int)c);
     }
   }
-  SB_CHECK(n[0] == nvert && n[1] == nfacet && n[2] == ncell, "%s: masks of %d vertices, %d facets, %d cells",
-           text, (int)n[0], (int)n[1], (int)n[2]);
+  SB_CHECK(n[0] == nvert && n[1] == nfacet && n[2] == ncell,
+           "%s: masks of %d vertices, %d facets, %d cells", text, (int)n[0], (int)n[1], (int)n[2]);
   PetscCall(SbMergedMeshDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -111,7 +117,8 @@ static PetscErrorCode test_inner(void)
 {
   SbMergedMesh whole;
   SbSet set;
-  PetscInt nface = 0, alone = 0;
+  PetscInt nface = 0;
+  PetscInt alone = 0;
 
   PetscFunctionBeginUser;
   PetscCall(build("group:inner", &set, &whole));
@@ -119,7 +126,8 @@ static PetscErrorCode test_inner(void)
     const PetscInt other = whole.neighbour[s];
     PetscBool theirs = PETSC_FALSE;
 
-    if (!(whole.data[s / 4].face[s % 4] & SB_SET_BIT(0))) continue;
+    if (!(whole.data[s / 4].face[s % 4] & SB_SET_BIT(0)))
+      continue;
     nface++;
     for (int f = 0; other >= 0 && f < 4; f++)
       theirs = (PetscBool)(theirs || (whole.neighbour[4 * other + f] == s / 4 &&
@@ -147,7 +155,9 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_parse());
-  /* sides of the gmsh cubes: 5 vertices and 4 triangles each; of the box: 9 vertices and 8 triangles */
+
+  /* sides of the gmsh cubes: 5 vertices and 4 triangles each; of the box: 9 vertices and 8
+     triangles */
   PetscCall(test_counts("group:wall", 5, 4, 0));
   PetscCall(test_counts("group:a.both ends", 10, 8, 0));
   PetscCall(test_counts("group:both_ends", 10, 8, 0));
@@ -165,14 +175,16 @@ int main(int argc, char **argv)
   PetscCall(test_counts("plane:1,0,0,0", 5, 4, 0));
   PetscCall(test_counts("plane:-2,0,0,-12", 9, 8, 0));
   PetscCall(test_counts("plane:1,0,0,4.9,0.11", 9, 8, 0));
-  PetscCall(
-    test_counts("plane:1,0,0,1", 5, 0, 0)); /* the interior square: shapes contain boundary facets only */
+  PetscCall(test_counts("plane:1,0,0,1", 5, 0,
+                        0)); /* the interior square: shapes contain boundary facets only */
   PetscCall(test_counts("box:5,0,0,5.5,1,1", 18, 8 + 4 * 4, 24));
+  PetscCall(test_counts("box:5.0000001,0.1,0.1,5.9999999,1,1", 2 * 2 * 3, 12,
+                        12)); /* within the tolerance of 1e-6 */
   PetscCall(
-    test_counts("box:5.0000001,0.1,0.1,5.9999999,1,1", 2 * 2 * 3, 12, 12)); /* within the tolerance of 1e-6 */
-  PetscCall(test_counts("sphere:5,0,0,0.71", 7, 6, 0)); /* all corners of the cell but the far one */
+    test_counts("sphere:5,0,0,0.71", 7, 6, 0)); /* all corners of the cell but the far one */
   PetscCall(test_counts("halfspace:-1,0,0,-5.5", 18, 8 + 4 * 4, 24));
   PetscCall(test_inner());
+
   /* empty sets */
   SB_CHECK_ERROR(fail("group:wal"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'wal'|wall");
   SB_CHECK_ERROR(fail("group:xmid"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'xmid'|xmin");

@@ -1,10 +1,12 @@
-// A mesh read in slabs by all ranks equals the one read by rank 0 exactly: vertices, tets, curved edges, sets, parts, notes, errors.
-// @ranks 1 2 3 4
+// A mesh read in slabs by all ranks equals the one read by rank 0 exactly: vertices, tets, curved
+// edges, sets, parts, notes, errors. @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 #include <sbsurface.h>
 
-enum { NSET = 8 };
+enum {
+  NSET = 8
+};
 
 /* Shuffles the tets. */
 static PetscErrorCode shuffle(SbImport *im)
@@ -35,7 +37,8 @@ static PetscErrorCode shuffle(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscInt n, const PetscInt vert[])
+static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscInt n,
+                                const PetscInt vert[])
 {
   PetscInt tags;
 
@@ -46,9 +49,9 @@ static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscIn
 }
 
 /*
-  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices
-  between them; an interior triangle and one that is no face; a line, a point; lines and triangles at unused
-  vertices.
+  Two separate boxes with some curved edges, the second one with its first tets inverted; unused
+  vertices between them; an interior triangle and one that is no face; a line, a point; lines and
+  triangles at unused vertices.
 */
 static PetscErrorCode make_mesh(const char *path, PetscBool random)
 {
@@ -61,19 +64,24 @@ static PetscErrorCode make_mesh(const char *path, PetscBool random)
   nvert = im->nvert;
   PetscCall(PetscRealloc(3 * (size_t)(nvert + 3 + other->nvert) * sizeof(PetscReal), &im->x));
   PetscCall(PetscRealloc((size_t)(nvert + 3 + other->nvert) * sizeof(int64_t), &im->vert_number));
-  for (PetscInt i = 0; i < 9; i++) im->x[3 * nvert + i] = 40.;
+  for (PetscInt i = 0; i < 9; i++)
+    im->x[3 * nvert + i] = 40.;
   for (PetscInt i = 0; i < 3 * other->nvert; i++)
     im->x[3 * (nvert + 3) + i] = other->x[i] + (i % 3 ? 0. : 5.);
   im->nvert += 3 + other->nvert;
-  for (PetscInt i = nvert; i < im->nvert; i++) im->vert_number[i] = i + 1;
+  for (PetscInt i = nvert; i < im->nvert; i++)
+    im->vert_number[i] = i + 1;
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   for (PetscInt c = 0; c < other->item[3].n; c++) {
-    for (int a = 0; a < 4; a++) v[a] = other->item[3].vert[4 * c + (c < 5 && a > 1 ? 5 - a : a)] + nvert + 3;
+    for (int a = 0; a < 4; a++)
+      v[a] = other->item[3].vert[4 * c + (c < 5 && a > 1 ? 5 - a : a)] + nvert + 3;
     PetscCall(SbImportAddItem(im, 3, v, none, im->item[3].n + 1));
   }
   PetscCall(SbImportTagsAlone(im, 3, 12, "core", &none));
-  for (PetscInt c = 7; c < im->item[3].n; c += 5) im->item[3].tags[c] = none;
-  if (random) PetscCall(shuffle(im));
+  for (PetscInt c = 7; c < im->item[3].n; c += 5)
+    im->item[3].tags[c] = none;
+  if (random)
+    PetscCall(shuffle(im));
   for (PetscInt c = 3; c < im->item[3].n; c += 11)
     PetscCall(add_group(im, 2, "inner", c, im->item[3].vert + 4 * c));
   PetscCall(add_group(im, 2, "inner", 1, (const PetscInt[]){0, 1, nvert + 5}));
@@ -91,8 +99,9 @@ static PetscErrorCode make_mesh(const char *path, PetscBool random)
 
 static PetscErrorCode make_scene(const char *path, SbBody body[3], SbSet set[NSET])
 {
-  static const char *const text[NSET] = {"group:inner",   "group:edge",       "group:corner", "group:core",
-                                         "plane:1,0,0,0", "sphere:6,0,0,0.7", "boundary",     "group:a.xmax"};
+  static const char *const text[NSET] = {"group:inner", "group:edge",    "group:corner",
+                                         "group:core",  "plane:1,0,0,0", "sphere:6,0,0,0.7",
+                                         "boundary",    "group:a.xmax"};
 
   PetscFunctionBeginUser;
   body[0] = test_body("first", "box:1,1,1:1");
@@ -102,7 +111,8 @@ static PetscErrorCode make_scene(const char *path, SbBody body[3], SbSet set[NSE
   body[2].translate[1] = 3.;
   body[2].rotate[0] = 1.;
   body[2].rotate[3] = 30.;
-  for (int k = 0; k < NSET; k++) PetscCall(test_set("s", text[k], &set[k]));
+  for (int k = 0; k < NSET; k++)
+    PetscCall(test_set("s", text[k], &set[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,16 +141,18 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
 
   PetscFunctionBeginUser;
   PetscCall(test_path_of_all("slab.h5", path));
-  if (!test_rank) PetscCall(make_mesh(path, random));
+  if (!test_rank)
+    PetscCall(make_mesh(path, random));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
   PetscCall(create(path, "rank0", body[0], set[0], &a));
   PetscCall(create(path, "slabs", body[1], set[1], &b));
-  SB_CHECK(a->Nvert == b->Nvert && a->Ncell == b->Ncell && a->nvert == b->nvert && a->ncell == b->ncell &&
-             a->ncell_owned == b->ncell_owned && a->nvert_owned == b->nvert_owned,
-           "%s: %d, %d vertices, %d, %d cells and %d, %d, %d, %d", what, (int)a->nvert_owned, (int)a->nvert,
-           (int)a->ncell_owned, (int)a->ncell, (int)b->nvert_owned, (int)b->nvert, (int)b->ncell_owned,
-           (int)b->ncell);
+  SB_CHECK(a->Nvert == b->Nvert && a->Ncell == b->Ncell && a->nvert == b->nvert &&
+             a->ncell == b->ncell && a->ncell_owned == b->ncell_owned &&
+             a->nvert_owned == b->nvert_owned,
+           "%s: %d, %d vertices, %d, %d cells and %d, %d, %d, %d", what, (int)a->nvert_owned,
+           (int)a->nvert, (int)a->ncell_owned, (int)a->ncell, (int)b->nvert_owned, (int)b->nvert,
+           (int)b->ncell_owned, (int)b->ncell);
   if (a->nvert == b->nvert && a->ncell == b->ncell) {
     SAME(vert_orig, a->nvert);
     SAME(gvert, a->nvert);
@@ -157,21 +169,25 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
     SB_CHECK(set[0][k].nvert == set[1][k].nvert && set[0][k].nfacet == set[1][k].nfacet &&
                set[0][k].ncell == set[1][k].ncell,
              "%s: set %d holds %d, %d, %d and %d, %d, %d", what, k, (int)set[0][k].nvert,
-             (int)set[0][k].nfacet, (int)set[0][k].ncell, (int)set[1][k].nvert, (int)set[1][k].nfacet,
-             (int)set[1][k].ncell);
+             (int)set[0][k].nfacet, (int)set[0][k].ncell, (int)set[1][k].nvert,
+             (int)set[1][k].nfacet, (int)set[1][k].ncell);
   for (int k = 0; k < 3; k++) {
-    const SbBody *p = &body[0][k], *q = &body[1][k];
+    const SbBody *p = &body[0][k];
+    const SbBody *q = &body[1][k];
 
-    SB_CHECK(p->nvert == q->nvert && p->ncell == q->ncell && p->nfacet == q->nfacet && p->npart == q->npart &&
-               p->nsliver == q->nsliver && p->min_dihedral == q->min_dihedral &&
-               p->max_radius_ratio == q->max_radius_ratio && !memcmp(p->bbox, q->bbox, sizeof(p->bbox)),
+    SB_CHECK(p->nvert == q->nvert && p->ncell == q->ncell && p->nfacet == q->nfacet &&
+               p->npart == q->npart && p->nsliver == q->nsliver &&
+               p->min_dihedral == q->min_dihedral && p->max_radius_ratio == q->max_radius_ratio &&
+               !memcmp(p->bbox, q->bbox, sizeof(p->bbox)),
              "%s: other findings of body %d", what, k);
     SB_CHECK(!strcmp(p->note, q->note), "%s: '%s' and '%s'", what, p->note, q->note);
     SB_CHECK_NEAR(q->volume, p->volume, 1e-14 * p->volume, "volume");
   }
-  SB_CHECK(strstr(body[1][1].note, "taken as straight: ") && strstr(body[1][2].note, ", curved tets: "),
+  SB_CHECK(strstr(body[1][1].note, "taken as straight: ") &&
+             strstr(body[1][2].note, ", curved tets: "),
            "'%s', '%s'", body[1][1].note, body[1][2].note);
-  SB_CHECK(body[1][1].npart == 2 && strstr(body[1][1].note, "inverted") && strstr(body[1][1].note, "unused"),
+  SB_CHECK(body[1][1].npart == 2 && strstr(body[1][1].note, "inverted") &&
+             strstr(body[1][1].note, "unused"),
            "%d parts, '%s'", (int)body[1][1].npart, body[1][1].note);
   PetscCall(SbMeshDestroy(&a));
   PetscCall(SbMeshDestroy(&b));
@@ -182,8 +198,10 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
 
 /* ------------------------------------------------------------------ errors */
 
-/* The first `ncell` tets of a box of 48, and one more: all ranks raise the error, whichever ranks read. The last coordinate is moved by x. */
-static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], PetscReal x, const char *words)
+/* The first `ncell` tets of a box of 48, and one more: all ranks raise the error, whichever ranks
+   read. The last coordinate is moved by x. */
+static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], PetscReal x,
+                                   const char *words)
 {
   SbBody body;
   SbMergedMesh whole;
@@ -196,7 +214,8 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
 
     PetscCall(test_read("box:1,1,1:2", 0, &im));
     im->item[3].n = ncell;
-    if (vert) PetscCall(SbImportAddItem(im, 3, vert[0] < 0 ? im->item[3].vert : vert, 0, ncell + 1));
+    if (vert)
+      PetscCall(SbImportAddItem(im, 3, vert[0] < 0 ? im->item[3].vert : vert, 0, ncell + 1));
     im->x[3 * im->nvert - 1] += x;
     PetscCall(SbMeshFileWrite(im, path, SB_MESH_H5));
     PetscCall(test_free(&im));
@@ -204,8 +223,8 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   for (int k = 0; k < 2; k++) {
     body = test_body("b", path);
-    SB_CHECK_ERROR(SbMergedMeshCreate(PETSC_COMM_WORLD, k ? SB_READING_SLABS : SB_READING_RANK0, 1, &body, 0,
-                                      NULL, &whole),
+    SB_CHECK_ERROR(SbMergedMeshCreate(PETSC_COMM_WORLD, k ? SB_READING_SLABS : SB_READING_RANK0, 1,
+                                      &body, 0, NULL, &whole),
                    (isfinite(x) ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED), words);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* all ranks have read the file */

@@ -1,15 +1,17 @@
-// Bodies from closed surfaces: regions, cavities and groups of each file format; notes of repairs; errors name the triangle.
-// @ranks 1 3
+// Bodies from closed surfaces: regions, cavities and groups of each file format; notes of repairs;
+// errors name the triangle. @ranks 1 3
 #include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 
 /*
-  Writes a surface or a text to a file, and reads it on rank 0 as a measured body; with `words` reading must
-  fail with this message. Returns whether there is a mesh, which SbImportDestroy() frees.
+  Writes a surface or a text to a file, and reads it on rank 0 as a measured body; with `words`
+  reading must fail with this message. Returns whether there is a mesh, which SbImportDestroy()
+  frees.
 */
 static PetscErrorCode import(const char *extension, const TestSurface *s, const char *text,
-                             const SbTetOptions *options, const char *words, TestMesh *m, PetscBool *here)
+                             const SbTetOptions *options, const char *words, TestMesh *m,
+                             PetscBool *here)
 {
   const PetscErrorCode code = text ? PETSC_ERR_FILE_UNEXPECTED : PETSC_ERR_USER_INPUT;
   char path[512];
@@ -55,7 +57,8 @@ static PetscReal of_group(const SbImport *im, int dim, const char *name)
   PetscReal sum = -1;
 
   for (PetscInt g = 0; g < im->ngroup; g++) {
-    if (im->group[g].dim != dim || strcmp(im->group[g].name, name)) continue;
+    if (im->group[g].dim != dim || strcmp(im->group[g].name, name))
+      continue;
     sum = 0;
     for (PetscInt i = 0; i < im->item[dim].n; i++) {
       const PetscInt set = im->item[dim].tags[i];
@@ -73,7 +76,9 @@ static PetscReal volume_of(const TestSurface *s)
   PetscReal sum = 0;
 
   for (PetscInt f = 0; f < s->ntri; f++) {
-    const PetscReal *a = s->x[s->tri[f][0]], *b = s->x[s->tri[f][1]], *c = s->x[s->tri[f][2]];
+    const PetscReal *a = s->x[s->tri[f][0]];
+    const PetscReal *b = s->x[s->tri[f][1]];
+    const PetscReal *c = s->x[s->tri[f][2]];
 
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
            a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -89,7 +94,8 @@ static void clear(TestSurface *s)
 
 static void cube_at(PetscReal at, PetscReal side, PetscBool inwards, TestSurface *s)
 {
-  const PetscReal lo[3] = {at, at, at}, hi[3] = {at + side, at + side, at + side};
+  const PetscReal lo[3] = {at, at, at};
+  const PetscReal hi[3] = {at + side, at + side, at + side};
 
   test_surface_box(lo, hi, inwards, s);
 }
@@ -97,7 +103,8 @@ static void cube_at(PetscReal at, PetscReal side, PetscBool inwards, TestSurface
 /* ------------------------------------------------------------------ regions and groups */
 
 /* Appends the triangles first..last-1 of a surface to an STL text as a solid. */
-static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, const char *name, char **text)
+static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, const char *name,
+                         char **text)
 {
   char *grown = (char *)realloc(*text, strlen(*text) + 400 * (size_t)(last - first) + 200);
 
@@ -116,10 +123,12 @@ static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, co
   (void)sprintf(grown, "endsolid %s\n", name);
 }
 
-/* Sphere in a sphere: solids of an STL text name surfaces and regions; a region's volume is that between the surfaces. */
+/* Sphere in a sphere: solids of an STL text name surfaces and regions; a region's volume is that
+   between the surfaces. */
 static PetscErrorCode check_nested(void)
 {
-  TestSurface s = {0}, outer;
+  TestSurface s = {0};
+  TestSurface outer;
   TestMesh m;
   PetscBool here;
   PetscInt n;
@@ -140,8 +149,10 @@ static PetscErrorCode check_nested(void)
     SB_CHECK_NEAR(m.facts.body.volume, all, 1e-12, "all");
     SB_CHECK_NEAR(of_group(&m.im, 3, "skin_of_it_region"), all * 7 / 8, 1e-12, "outer region");
     SB_CHECK_NEAR(of_group(&m.im, 3, "bone_region"), all / 8, 1e-12, "inner region");
-    SB_CHECK_NEAR(of_group(&m.im, 3, "region_1") + of_group(&m.im, 3, "region_2"), all, 1e-12, "regions");
-    SB_CHECK(of_group(&m.im, 2, "skin_of_it") == (PetscReal)n && of_group(&m.im, 2, "bone") == (PetscReal)n,
+    SB_CHECK_NEAR(of_group(&m.im, 3, "region_1") + of_group(&m.im, 3, "region_2"), all, 1e-12,
+                  "regions");
+    SB_CHECK(of_group(&m.im, 2, "skin_of_it") == (PetscReal)n &&
+               of_group(&m.im, 2, "bone") == (PetscReal)n,
              "%g and %g triangles", of_group(&m.im, 2, "skin_of_it"), of_group(&m.im, 2, "bone"));
     SB_CHECK(m.facts.body.nfacet == n && m.facts.body.npart == 1, "%d facets, %d parts",
              (int)m.facts.body.nfacet, (int)m.facts.body.npart);
@@ -153,12 +164,15 @@ static PetscErrorCode check_nested(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Box on a box, each with its own copy of the common face: two regions with an interface; groups of an OBJ. */
+/* Box on a box, each with its own copy of the common face: two regions with an interface; groups of
+   an OBJ. */
 static PetscErrorCode check_wall(void)
 {
   static const char text[] =
-    "o low\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\ng low bottom\nf 4 3 2 1\n"
-    "g low\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\no high\nv 0 0 3\nv 1 0 3\nv 1 1 3\nv 0 1 "
+    "o low\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\ng low "
+    "bottom\nf 4 3 2 1\n"
+    "g low\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\no high\nv 0 0 3\nv 1 0 3\nv 1 1 "
+    "3\nv 0 1 "
     "3\ng\n"
     "f 8 7 6 5\nf 9 10 11 12\nf 5 6 10 9\nf 6 7 11 10\nf 7 8 12 11\nf 8 5 9 12\n";
   SbTetOptions options;
@@ -169,7 +183,8 @@ static PetscErrorCode check_wall(void)
   SbTetDefaults(&options);
   options.surface = SB_TET_KEEP;
   PetscCall(import(".obj", NULL, text, &options, NULL, &m, &here));
-  if (!here) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!here)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SB_CHECK_NEAR(of_group(&m.im, 3, "low_region"), 1, 1e-12, "low");
   SB_CHECK_NEAR(of_group(&m.im, 3, "high_region"), 2, 1e-12, "high");
   SB_CHECK(of_group(&m.im, 2, "bottom") == 2, "bottom: %g", of_group(&m.im, 2, "bottom"));
@@ -201,8 +216,9 @@ static PetscErrorCode check_cavity(PetscBool turned)
   if (here) {
     SB_CHECK_NEAR(m.facts.body.volume, 27 - 1 + 0.125, 1e-12, "with a cavity");
     SB_CHECK(m.facts.body.npart == 2, "%d parts", (int)m.facts.body.npart);
-    SB_CHECK(strstr(m.facts.body.note, "triangles turned to the side of their neighbours: 1, cavities: 1"),
-             "'%s'", m.facts.body.note);
+    SB_CHECK(
+      strstr(m.facts.body.note, "triangles turned to the side of their neighbours: 1, cavities: 1"),
+      "'%s'", m.facts.body.note);
     SB_CHECK(!strstr(m.facts.body.note, "inverted") == !turned, "'%s'", m.facts.body.note);
     PetscCall(SbImportDestroy(&m.im));
   }
@@ -210,49 +226,60 @@ static PetscErrorCode check_cavity(PetscBool turned)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Box in a box, distinguished only by the region and hole points of TetGen's file; numbers from 0 or 1. */
+/* Box in a box, distinguished only by the region and hole points of TetGen's file; numbers from 0
+   or 1. */
 static PetscErrorCode check_smesh(PetscInt first, PetscBool hole)
 {
-  char text[4096] = "# nodes\n16 3 0 0\n", *at = text + strlen(text);
+  char text[4096] = "# nodes\n16 3 0 0\n";
+  char *at = text + strlen(text);
   TestMesh m;
   PetscBool here;
 
   PetscFunctionBeginUser;
   for (int v = 0; v < 16; v++)
-    at += sprintf(at, "%d %d %d %d\n", v + (int)first, v & 1 ? 3 - v / 8 : v / 8, v & 2 ? 3 - v / 8 : v / 8,
-                  v & 4 ? 3 - v / 8 : v / 8);
+    at += sprintf(at, "%d %d %d %d\n", v + (int)first, v & 1 ? 3 - v / 8 : v / 8,
+                  v & 2 ? 3 - v / 8 : v / 8, v & 4 ? 3 - v / 8 : v / 8);
   at += sprintf(at, "12 1 # facets\n");
   for (int f = 0; f < 12; f++) {
     at += sprintf(at, "4");
-    for (int k = 0; k < 4; k++) at += sprintf(at, " %d", test_box_side[f % 6][k] + 8 * (f / 6) + (int)first);
+    for (int k = 0; k < 4; k++)
+      at += sprintf(at, " %d", test_box_side[f % 6][k] + 8 * (f / 6) + (int)first);
     at += sprintf(at, " %d\n", f / 6 ? 7 : f == 4 ? 5 : 0);
   }
   at += sprintf(at, hole ? "1\n1 1.5 1.5 1.5\n1\n1 0.5 0.5 0.5 33 0.1\n"
                          : "0\n2\n1 0.5 0.5 0.5 33\n2 1.5 1.5 1.5 4\n");
   PetscCall(import(".smesh", NULL, text, NULL, NULL, &m, &here));
-  if (!here) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!here)
+    PetscFunctionReturn(PETSC_SUCCESS);
   SB_CHECK_NEAR(m.facts.body.volume, hole ? 26 : 27, 1e-12, "box");
   SB_CHECK_NEAR(of_group(&m.im, 3, "volume_33"), 26, 1e-12, "around");
-  if (!hole) SB_CHECK_NEAR(of_group(&m.im, 3, "volume_4"), 1, 1e-12, "inner box");
+  if (!hole)
+    SB_CHECK_NEAR(of_group(&m.im, 3, "volume_4"), 1, 1e-12, "inner box");
   SB_CHECK(of_group(&m.im, 2, "surface_5") > 0 && of_group(&m.im, 2, "surface_7") > 0, "markers");
   PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Box with a square through hole: two facets have an inner polygon and a hole point; an L-shaped prism. */
+/* Box with a square through hole: two facets have an inner polygon and a hole point; an L-shaped
+   prism. */
 static PetscErrorCode check_poly(void)
 {
   static const char text[] =
-    "16 3\n1 0 0 0\n2 3 0 0\n3 3 3 0\n4 0 3 0\n5 0 0 1\n6 3 0 1\n7 3 3 1\n8 0 3 1\n9 1 1 0\n10 2 1 0\n11 2 2 "
+    "16 3\n1 0 0 0\n2 3 0 0\n3 3 3 0\n4 0 3 0\n5 0 0 1\n6 3 0 1\n7 3 3 1\n8 0 3 1\n9 1 1 0\n10 2 1 "
+    "0\n11 2 2 "
     "0\n"
-    "12 1 2 0\n13 1 1 1\n14 2 1 1\n15 2 2 1\n16 1 2 1\n10 1\n2 1 3\n4 1 2 3 4\n4 9 10 11 12\n1 1.5 1.5 0\n"
-    "2 1 4\n4 5 6 7 8\n4 13 16 15 14\n1 1.5 1.5 1\n1 0 1\n4 1 2 6 5\n1 0 1\n4 2 3 7 6\n1\n4 3 4 8 7\n1\n4 4 "
+    "12 1 2 0\n13 1 1 1\n14 2 1 1\n15 2 2 1\n16 1 2 1\n10 1\n2 1 3\n4 1 2 3 4\n4 9 10 11 12\n1 1.5 "
+    "1.5 0\n"
+    "2 1 4\n4 5 6 7 8\n4 13 16 15 14\n1 1.5 1.5 1\n1 0 1\n4 1 2 6 5\n1 0 1\n4 2 3 7 6\n1\n4 3 4 8 "
+    "7\n1\n4 4 "
     "1 5 8\n"
     "1 0 2\n4 9 10 14 13\n1 0 2\n4 10 11 15 14\n1 0 2\n4 11 12 16 15\n1 0 2\n4 12 9 13 16\n0\n";
   static const char bent[] = /* L-shaped prism with two nonconvex facets */
-    "12 3 0 0\n0 0 0 0\n1 2 0 0\n2 2 1 0\n3 1 1 0\n4 1 2 0\n5 0 2 0\n6 0 0 1\n7 2 0 1\n8 2 1 1\n9 1 1 1\n10 "
+    "12 3 0 0\n0 0 0 0\n1 2 0 0\n2 2 1 0\n3 1 1 0\n4 1 2 0\n5 0 2 0\n6 0 0 1\n7 2 0 1\n8 2 1 1\n9 "
+    "1 1 1\n10 "
     "1 2 1\n11 0 2 1\n"
-    "8 0\n1\n6 0 1 2 3 4 5\n1\n6 6 7 8 9\n10 11\n1\n4 0 1 7 6\n1\n4 1 2 8 7\n1\n4 2 3 9 8\n1\n4 3 4 10 "
+    "8 0\n1\n6 0 1 2 3 4 5\n1\n6 6 7 8 9\n10 11\n1\n4 0 1 7 6\n1\n4 1 2 8 7\n1\n4 2 3 9 8\n1\n4 3 "
+    "4 10 "
     "9\n1\n4 4 5 11 10\n"
     "1\n4 5 0 6 11\n0\n0\n";
   TestMesh m;
@@ -283,7 +310,8 @@ static PetscErrorCode check_poly(void)
 
 static void put(char **at, const void *data, int size, PetscBool turned)
 {
-  for (int i = 0; i < size; i++) *(*at)++ = ((const char *)data)[turned ? size - 1 - i : i];
+  for (int i = 0; i < size; i++)
+    *(*at)++ = ((const char *)data)[turned ? size - 1 - i : i];
 }
 
 /* Cube of six squares with properties that the reader ignores. */
@@ -294,14 +322,15 @@ static size_t write_ply(int kind, char text[])
   const PetscBool turned = (PetscBool)((*(const char *)&one == 1) == (kind == 2));
   char *at = text;
 
-  at +=
-    sprintf(at,
-            "ply\nformat %s 1.0\ncomment by hand\nelement vertex 8\nproperty float x\nproperty double y\n"
-            "property uchar red\nproperty short z\nelement face 6\nproperty list uchar int vertex_indices\n"
-            "property float quality\nend_header\n",
-            kinds[kind]);
+  at += sprintf(
+    at,
+    "ply\nformat %s 1.0\ncomment by hand\nelement vertex 8\nproperty float x\nproperty double y\n"
+    "property uchar red\nproperty short z\nelement face 6\nproperty list uchar int vertex_indices\n"
+    "property float quality\nend_header\n",
+    kinds[kind]);
   for (int v = 0; v < 8; v++) {
-    const float x = (float)(v & 1), quality = 0;
+    const float x = (float)(v & 1);
+    const float quality = 0;
     const double y = v >> 1 & 1;
     const unsigned char red = 200;
     const int16_t z = (int16_t)(v & 4 ? -1 : -2);
@@ -321,12 +350,13 @@ static size_t write_ply(int kind, char text[])
     const float quality = 0.5;
 
     if (!kind) {
-      at += sprintf(at, "4 %d %d %d %d 0.5\n", test_box_side[f][0], test_box_side[f][1], test_box_side[f][2],
-                    test_box_side[f][3]);
+      at += sprintf(at, "4 %d %d %d %d 0.5\n", test_box_side[f][0], test_box_side[f][1],
+                    test_box_side[f][2], test_box_side[f][3]);
       continue;
     }
     put(&at, &n, 1, turned);
-    for (int k = 0; k < 4; k++) put(&at, &test_box_side[f][k], 4, turned);
+    for (int k = 0; k < 4; k++)
+      put(&at, &test_box_side[f][k], 4, turned);
     put(&at, &quality, 4, turned);
   }
   return (size_t)(at - text);
@@ -345,8 +375,10 @@ static PetscErrorCode check_ply(void)
 
     PetscCall(test_file_write(".ply", PETSC_FALSE, NULL, "", path));
     f = test_rank ? NULL : fopen(path, "wb");
-    if (f) (void)fwrite(text, 1, n, f);
-    if (f) (void)fclose(f);
+    if (f)
+      (void)fwrite(text, 1, n, f);
+    if (f)
+      (void)fclose(f);
     PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, (PetscReal[3]){0, 0, 0}, &t));
     SB_CHECK(t.ntri == 12 && t.nvert == 8, "kind %d: %d triangles", kind, (int)t.ntri);
     SB_CHECK_NEAR(t.volume, 1, 1e-14, "cube");
@@ -356,14 +388,16 @@ static PetscErrorCode check_ply(void)
   (void)write_ply(0, text);
   PetscCall(refuse(".ply", NULL, "stl\n", NULL, "line 1|'ply'|'stl'"));
   PetscCall(refuse(".ply", NULL, "ply\nformat text 1.0\n", NULL, "line 2|'text'"));
-  PetscCall(refuse(".ply", NULL, "ply\nelement vertex 3\nproperty word x\n", NULL, "line 3|'word'"));
-  PetscCall(refuse(".ply", NULL, "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nend_header\n",
-                   NULL, "body 'b'|line 5"));
   PetscCall(
-    refuse(".ply", NULL,
-           "ply\nformat binary_little_endian 1.0\nelement vertex 999999\nproperty float x\nproperty float y\n"
-           "property float z\nend_header\n",
-           NULL, "999999 vertex"));
+    refuse(".ply", NULL, "ply\nelement vertex 3\nproperty word x\n", NULL, "line 3|'word'"));
+  PetscCall(refuse(".ply", NULL,
+                   "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nend_header\n", NULL,
+                   "body 'b'|line 5"));
+  PetscCall(refuse(".ply", NULL,
+                   "ply\nformat binary_little_endian 1.0\nelement vertex 999999\nproperty float "
+                   "x\nproperty float y\n"
+                   "property float z\nend_header\n",
+                   NULL, "999999 vertex"));
   *strstr(text, "4 4 5 7 6") = '2';
   PetscCall(refuse(".ply", NULL, text, NULL, "face 6|2 corners"));
   *strstr(text, "2 4 5 7 6") = '4';
@@ -375,7 +409,8 @@ static PetscErrorCode check_ply(void)
 /* ------------------------------------------------------------------ repaired surfaces */
 
 /* A cube with repairable defects has this volume and this note. */
-static PetscErrorCode mend(TestSurface *s, const SbTetOptions *options, PetscReal volume, const char *words)
+static PetscErrorCode mend(TestSurface *s, const SbTetOptions *options, PetscReal volume,
+                           const char *words)
 {
   TestMesh m;
   PetscBool here;
@@ -400,7 +435,8 @@ static PetscErrorCode check_mended(void)
   SbTetDefaults(&options);
   cube_at(0, 1, PETSC_FALSE, &s); /* a duplicate corner, displaced by 1e-6 */
   test_surface_grow(&s, 1, 0);
-  for (int k = 0; k < 3; k++) s.x[8][k] = s.x[7][k] + 1e-6;
+  for (int k = 0; k < 3; k++)
+    s.x[8][k] = s.x[7][k] + 1e-6;
   s.nvert = 9;
   s.tri[3][1] = s.tri[3][1] == 7 ? 8 : s.tri[3][1];
   s.tri[2][2] = s.tri[2][2] == 7 ? 8 : s.tri[2][2];
@@ -416,13 +452,16 @@ static PetscErrorCode check_mended(void)
     s.tri[13][k] = k / 2;
   }
   s.ntri = 14;
-  PetscCall(mend(&s, NULL, 1,
-                 "triangles with two corners at one place left out: 1, triangles given twice left out: 1"));
+  PetscCall(
+    mend(&s, NULL, 1,
+         "triangles with two corners at one place left out: 1, triangles given twice left out: 1"));
   cube_at(0, 1, PETSC_FALSE, &s); /* a face split at an edge, with a triangle of zero area */
   test_surface_grow(&s, 1, 2);
-  for (int k = 0; k < 3; k++) s.x[8][k] = 0.5 * (s.x[s.tri[0][0]][k] + s.x[s.tri[0][1]][k]);
+  for (int k = 0; k < 3; k++)
+    s.x[8][k] = 0.5 * (s.x[s.tri[0][0]][k] + s.x[s.tri[0][1]][k]);
   s.nvert = 9;
-  for (int k = 0; k < 3; k++) s.tri[12][k] = s.tri[13][k] = s.tri[0][k];
+  for (int k = 0; k < 3; k++)
+    s.tri[12][k] = s.tri[13][k] = s.tri[0][k];
   s.tri[12][1] = 8;
   s.tri[13][0] = 8;
   s.tri[0][2] = 8; /* its corners are collinear */
@@ -441,14 +480,17 @@ static void one_sided(TestSurface *s)
   test_surface_grow(s, n * m, 2 * n * m);
   for (PetscInt i = 0; i < n; i++) {
     for (PetscInt j = 0; j < m; j++) {
-      const PetscReal a = 2 * PETSC_PI * (PetscReal)i / (PetscReal)n,
-                      b = 2 * PETSC_PI * (PetscReal)j / (PetscReal)m;
+      const PetscReal a = 2 * PETSC_PI * (PetscReal)i / (PetscReal)n;
+      const PetscReal b = 2 * PETSC_PI * (PetscReal)j / (PetscReal)m;
       const PetscReal r =
         3 + PetscCosReal(a / 2) * PetscSinReal(b) - PetscSinReal(a / 2) * PetscSinReal(2 * b);
-      const PetscInt j1 = (j + 1) % m, i1 = (i + 1) % n;
+      const PetscInt j1 = (j + 1) % m;
+      const PetscInt i1 = (i + 1) % n;
       const PetscInt k = i1 ? j : (m - j) % m,
-                     k1 = i1 ? j1 : (m - j1) % m; /* the seam reverses the direction around the tube */
-      PetscInt *t = s->tri[s->ntri++], *u = s->tri[s->ntri++];
+                     k1 =
+                       i1 ? j1 : (m - j1) % m; /* the seam reverses the direction around the tube */
+      PetscInt *t = s->tri[s->ntri++];
+      PetscInt *u = s->tri[s->ntri++];
       PetscReal *x = s->x[s->nvert++];
 
       x[0] = r * PetscCosReal(a);
@@ -490,28 +532,33 @@ static PetscErrorCode check_refused(void)
   PetscCall(refuse(".off", &s, NULL, NULL, "body 'b'|18 pairs|3 and 13"));
   clear(&s);
   cube_at(0, 1, PETSC_FALSE, &s); /* two nearly coincident sheets */
-  for (int v = 0; v < 8; v++) s.x[v][2] *= 1.5e-10;
+  for (int v = 0; v < 8; v++)
+    s.x[v][2] *= 1.5e-10;
   SbTetDefaults(&options);
   options.merge_tolerance = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "body 'b'"));
   clear(&s);
-  for (int i = 0; i < 1001; i++) cube_at(2 * i, 1, PETSC_FALSE, &s); /* separate parts */
+  for (int i = 0; i < 1001; i++)
+    cube_at(2 * i, 1, PETSC_FALSE, &s); /* separate parts */
   PetscCall(refuse(".off", &s, NULL, NULL, "1001 parts|1000"));
   clear(&s);
   PetscCall(refuse(".obj", NULL, "v 0 0 0\nv 1 0 0\n", NULL, "body 'b'"));
+
   /* one side only: the surface also intersects itself, so only the search for regions is called */
   one_sided(&s);
   t.nvert = s.nvert;
   t.ntri = s.ntri;
   t.x = &s.x[0][0];
   t.tri = &s.tri[0][0];
-  for (int i = 0; i < 1000; i++) number[i] = i + 1;
+  for (int i = 0; i < 1000; i++)
+    number[i] = i + 1;
   SB_CHECK_ERROR(SbSurfaceFindRegions(&file, &mended, &body_surface), PETSC_ERR_USER_INPUT, "test");
   clear(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A small fold of a fine sphere is smoothed; if the untangling distance is zero or too small, the surface is refused. */
+/* A small fold of a fine sphere is smoothed; if the untangling distance is zero or too small, the
+   surface is refused. */
 static PetscErrorCode check_fold(void)
 {
   SbTetOptions options;
@@ -526,7 +573,8 @@ static PetscErrorCode check_fold(void)
   test_surface_sphere(4, &s);
   volume = volume_of(&s);
   v = s.tri[777][0];
-  for (int k = 0; k < 3; k++) s.x[v][k] = 2.2 * s.x[s.tri[777][1]][k] - 1.2 * s.x[s.tri[777][0]][k];
+  for (int k = 0; k < 3; k++)
+    s.x[v][k] = 2.2 * s.x[s.tri[777][1]][k] - 1.2 * s.x[s.tri[777][0]][k];
   options.untangle = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "-body_b_untangle 0"));
   options.untangle = 0.01;
@@ -535,8 +583,8 @@ static PetscErrorCode check_fold(void)
   options.size = 0.4;
   PetscCall(import(".off", &s, NULL, &options, NULL, &m, &here));
   if (here) {
-    SB_CHECK(strstr(m.facts.body.note, "pairs of triangles that cut each other smoothed apart: "), "'%s'",
-             m.facts.body.note);
+    SB_CHECK(strstr(m.facts.body.note, "pairs of triangles that cut each other smoothed apart: "),
+             "'%s'", m.facts.body.note);
     SB_CHECK_NEAR(m.facts.body.volume, volume, 0.1 * volume, "sphere");
     PetscCall(SbImportDestroy(&m.im));
   }

@@ -1,18 +1,21 @@
-// Tets from closed surfaces: exact volumes of nested regions, kept triangles, number of tets by size, both backends, error messages.
-// @ranks 1 3
+// Tets from closed surfaces: exact volumes of nested regions, kept triangles, number of tets by
+// size, both backends, error messages. @ranks 1 3
 #include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 
-/* Surface of one region with counter-clockwise triangles as seen from outside, or of two: the triangles from `inner` on bound the second region. */
+/* Surface of one region with counter-clockwise triangles as seen from outside, or of two: the
+   triangles from `inner` on bound the second region. */
 static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSurface *s)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceCreate(t->nvert, t->ntri, inner < t->ntri ? 2 : 1, s));
   for (PetscInt v = 0; v < t->nvert; v++)
-    for (int k = 0; k < 3; k++) s->x[3 * v + k] = t->x[v][k];
+    for (int k = 0; k < 3; k++)
+      s->x[3 * v + k] = t->x[v][k];
   for (PetscInt f = 0; f < t->ntri; f++) {
-    for (int k = 0; k < 3; k++) s->tri[3 * f + k] = t->tri[f][k];
+    for (int k = 0; k < 3; k++)
+      s->tri[3 * f + k] = t->tri[f][k];
     s->side[2 * f] = f < inner ? -1 : 0;
     s->side[2 * f + 1] = f < inner ? 0 : 1;
     s->number[f] = f + 1;
@@ -23,9 +26,11 @@ static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSurface 
 /* Volume of the tets of each tag set. */
 static void measure(const SbImport *im, PetscInt n, PetscReal volume[])
 {
-  for (PetscInt i = 0; i < n; i++) volume[i] = 0;
+  for (PetscInt i = 0; i < n; i++)
+    volume[i] = 0;
   for (PetscInt c = 0; c < im->item[3].n; c++)
-    volume[im->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
+    volume[im->item[3].tags[c]] +=
+      PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
 }
 
 /* A sphere within a sphere, each a separate region; the triangles are preserved. */
@@ -49,7 +54,8 @@ static PetscErrorCode check_kept(SbTetBackend backend)
     PetscCall(SbImportGroup(&im, 3, r + 1, NULL, &group[r]));
     PetscCall(SbImportTagSet(&im, 1, &group[r], &s.region_tags[r]));
   }
-  for (PetscInt f = nin; f < t.ntri; f++) s.tags[f] = s.region_tags[0];
+  for (PetscInt f = nin; f < t.ntri; f++)
+    s.tags[f] = s.region_tags[0];
   (void)SbSurfaceMeasure(&s, want);
   SbTetDefaults(&options);
   options.backend = backend;
@@ -60,7 +66,8 @@ static PetscErrorCode check_kept(SbTetBackend backend)
   SB_CHECK_NEAR(got[s.region_tags[1]], want[1], 1e-11, "inner region");
   SB_CHECK(im.item[3].n > 400 && im.item[3].n < 8000, "%d tets", (int)im.item[3].n);
   SB_CHECK(im.item[2].n == nin, "%d triangles of groups", (int)im.item[2].n);
-  for (PetscInt i = 0; i < 3 * s.nvert; i++) SB_CHECK(im.x[i] == s.x[i], "vertex %d moved", (int)i / 3);
+  for (PetscInt i = 0; i < 3 * s.nvert; i++)
+    SB_CHECK(im.x[i] == s.x[i], "vertex %d moved", (int)i / 3);
   PetscCall(SbImportCheck(&im, &faces));
   SB_CHECK(faces.nboundary == nin, "%d facets", (int)faces.nboundary);
   for (PetscInt f = 0; f < t.ntri; f++) {
@@ -75,7 +82,8 @@ static PetscErrorCode check_kept(SbTetBackend backend)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unit sphere at three sizes: half the size gives about eight times as many tets, none of them bad. */
+/* The unit sphere at three sizes: half the size gives about eight times as many tets, none of them
+   bad. */
 static PetscErrorCode check_sizes(void)
 {
   const PetscReal sizes[3] = {0.5, 0.35, 0.25};
@@ -102,21 +110,24 @@ static PetscErrorCode check_sizes(void)
     measure(&im, 1, &volume);
     SB_CHECK_NEAR(volume, 4 * PETSC_PI / 3, 0.12 * 4 * PETSC_PI / 3, "sphere");
     per[k] = (PetscReal)im.item[3].n * sizes[k] * sizes[k] * sizes[k];
-    SB_CHECK(per[k] > 3 * PETSC_SQRT2 * volume && per[k] < 12 * PETSC_SQRT2 * volume, "size %g: %d tets",
-             sizes[k], (int)im.item[3].n);
+    SB_CHECK(per[k] > 3 * PETSC_SQRT2 * volume && per[k] < 12 * PETSC_SQRT2 * volume,
+             "size %g: %d tets", sizes[k], (int)im.item[3].n);
     PetscCall(SbMeshFileMeasure(&im, &facts));
-    SB_CHECK(body->min_dihedral > 8, "size %g: smallest dihedral angle %g", sizes[k], body->min_dihedral);
+    SB_CHECK(body->min_dihedral > 8, "size %g: smallest dihedral angle %g", sizes[k],
+             body->min_dihedral);
     SB_CHECK(strstr(body->note, "surface remeshed"), "'%s'", body->note);
     PetscCall(SbImportDestroy(&im));
   }
   for (int k = 1; k < 3; k++)
-    SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, per[0], per[k]);
+    SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, per[0],
+             per[k]);
   PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ring thinner than the size: gmsh's new surface would lose its volume, which is detected; tetgen preserves the triangles, and a note gives the reason. */
+/* A ring thinner than the size: gmsh's new surface would lose its volume, which is detected; tetgen
+   preserves the triangles, and a note gives the reason. */
 static PetscErrorCode check_second_road(void)
 {
   const PetscInt n[2] = {60, 10};
@@ -143,7 +154,8 @@ static PetscErrorCode check_second_road(void)
   SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "region 1");
   options.backend = SB_TET_AUTO;
   options.seconds = 1e-3;
-  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "0.001 s|-seconds");
+  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+                 "0.001 s|-seconds");
   PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -152,7 +164,10 @@ static PetscErrorCode check_second_road(void)
 /* What neither backend supports: two intersecting boxes that bypass the checks. */
 static PetscErrorCode check_failure(void)
 {
-  const PetscReal lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1}, lo2[3] = {0.5, 0.4, 0.3}, hi2[3] = {1.5, 1.6, 1.7};
+  const PetscReal lo[3] = {0, 0, 0};
+  const PetscReal hi[3] = {1, 1, 1};
+  const PetscReal lo2[3] = {0.5, 0.4, 0.3};
+  const PetscReal hi2[3] = {1.5, 1.6, 1.7};
   TestSurface t = {0};
   SbSurface s;
   SbTetOptions options;
@@ -167,9 +182,12 @@ static PetscErrorCode check_failure(void)
   SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "test|gmsh");
   SB_CHECK(!im.x && !im.item[3].n, "something is left");
   options.size = 1e-6;
-  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "1e-06 m|-size");
-  for (PetscInt f = 0; f < t.ntri; f++) s.side[2 * f] = 0, s.side[2 * f + 1] = -1;
-  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "region 1|-2.68");
+  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+                 "1e-06 m|-size");
+  for (PetscInt f = 0; f < t.ntri; f++)
+    s.side[2 * f] = 0, s.side[2 * f + 1] = -1;
+  SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+                 "region 1|-2.68");
   PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);

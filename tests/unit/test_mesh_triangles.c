@@ -1,5 +1,5 @@
-// Surfaces from files: each format gives the same cube on every rank; errors of surfaces without volume name the triangle.
-// @ranks 1 3
+// Surfaces from files: each format gives the same cube on every rank; errors of surfaces without
+// volume name the triangle. @ranks 1 3
 #include "mesh_test.h"
 #include "sbtriangles.h"
 #include "surface_files.h"
@@ -18,7 +18,9 @@ static void check_across(const SbTriangles *t)
   PetscInt bad = 0;
 
   for (PetscInt i = 0; i < 3 * t->ntri; i++) {
-    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1], g = t->across[i];
+    const PetscInt a = t->tri[i];
+    const PetscInt b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
+    const PetscInt g = t->across[i];
     PetscBool found = PETSC_FALSE;
 
     for (int k = 0; k < 3; k++)
@@ -45,7 +47,8 @@ static PetscErrorCode check_cube(const char *extension, PetscBool binary, PetscB
   SB_CHECK_NEAR(t.volume, 8, 1e-14, extension);
   SB_CHECK(t.turned == inwards, "%s: turned %d", extension, (int)t.turned);
   for (PetscInt i = 0; i < 3 * t.nvert; i++)
-    SB_CHECK(t.x[i] == at[i % 3] || t.x[i] == at[i % 3] + 2, "%s: coordinate %g", extension, t.x[i]);
+    SB_CHECK(t.x[i] == at[i % 3] || t.x[i] == at[i % 3] + 2, "%s: coordinate %g", extension,
+             t.x[i]);
   check_across(&t);
   PetscCall(SbTrianglesDestroy(&t));
   test_surface_free(&s);
@@ -55,8 +58,10 @@ static PetscErrorCode check_cube(const char *extension, PetscBool binary, PetscB
 /* Quadrilateral faces; a cavity; two separate parts. */
 static PetscErrorCode check_more(void)
 {
-  const PetscReal lo[3] = {0.25, 0.25, 0.25}, hi[3] = {0.75, 0.75, 0.75}, far[3] = {3, 3, 3},
-                  out[3] = {4, 4, 4};
+  const PetscReal lo[3] = {0.25, 0.25, 0.25};
+  const PetscReal hi[3] = {0.75, 0.75, 0.75};
+  const PetscReal far[3] = {3, 3, 3};
+  const PetscReal out[3] = {4, 4, 4};
   TestSurface s;
   SbTriangles t;
   char path[512];
@@ -82,8 +87,10 @@ static PetscErrorCode check_more(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A tetrahedron of 1/6 m^3 as an STL text: its first and last line, the case of its keywords and its line ends. */
-static PetscErrorCode check_stl(const char *first, const char *last, PetscBool capitals, const char *line_end)
+/* A tetrahedron of 1/6 m^3 as an STL text: its first and last line, the case of its keywords and
+   its line ends. */
+static PetscErrorCode check_stl(const char *first, const char *last, PetscBool capitals,
+                                const char *line_end)
 {
   static const char *const corner[4][3] = {{"0 0 0", "0 1 0", "1 0 0"},
                                            {"0 0 0", "1 0 0", "0 0 1"},
@@ -96,20 +103,22 @@ static PetscErrorCode check_stl(const char *first, const char *last, PetscBool c
   PetscFunctionBeginUser;
   n = (size_t)snprintf(text, sizeof(text), "%s%s", first, line_end);
   for (int f = 0; f < 4; f++) {
-    n +=
-      (size_t)snprintf(text + n, sizeof(text) - n, "\tfacet normal 0 0 1%souter loop%s", line_end, line_end);
+    n += (size_t)snprintf(text + n, sizeof(text) - n, "\tfacet normal 0 0 1%souter loop%s",
+                          line_end, line_end);
     for (int k = 0; k < 3; k++)
       n += (size_t)snprintf(text + n, sizeof(text) - n, "vertex   %s%s", corner[f][k], line_end);
-    n += (size_t)snprintf(text + n, sizeof(text) - n, f % 2 ? "endloop%sendfacet%s" : "end loop%send facet%s",
-                          line_end, line_end);
+    n +=
+      (size_t)snprintf(text + n, sizeof(text) - n,
+                       f % 2 ? "endloop%sendfacet%s" : "end loop%send facet%s", line_end, line_end);
   }
   (void)snprintf(text + n, sizeof(text) - n, "%s", last);
   for (char *c = text; *c && capitals; c++)
-    if (*c >= 'a' && *c <= 'z') *c = (char)(*c - 'a' + 'A');
+    if (*c >= 'a' && *c <= 'z')
+      *c = (char)(*c - 'a' + 'A');
   PetscCall(test_file_write(".stl", PETSC_FALSE, NULL, text, path));
   PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, zero, &t));
-  SB_CHECK(t.ntri == 4 && t.nvert == 4, "'%s' ... '%s': %d triangles, %d vertices", first, last, (int)t.ntri,
-           (int)t.nvert);
+  SB_CHECK(t.ntri == 4 && t.nvert == 4, "'%s' ... '%s': %d triangles, %d vertices", first, last,
+           (int)t.ntri, (int)t.nvert);
   SB_CHECK_NEAR(t.volume, 1. / 6, 1e-14, last);
   PetscCall(SbTrianglesDestroy(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -131,9 +140,11 @@ static PetscErrorCode check_stl_variants(void)
   PetscCall(check_stl("solid name", "EndSolid other name\r\n\r\n\x1a", PETSC_FALSE, "\r\n"));
   PetscCall(check_stl("solid name", "endsolid name\n", PETSC_TRUE, "\n\n \n"));
   PetscCall(check_stl("\xef\xbb\xbfsolid name", "end solid\n\n", PETSC_FALSE, "\n"));
+
   /* several solids; the last one is empty */
-  PetscCall(check_stl("solid none\nend solid\nsolid name", "endsolid name\nsolid more\nend solid more\n",
-                      PETSC_FALSE, "\n"));
+  PetscCall(check_stl("solid none\nend solid\nsolid name",
+                      "endsolid name\nsolid more\nend solid more\n", PETSC_FALSE, "\n"));
+
   /* a binary file with data after its triangles; its header begins with `solid` */
   cube(PETSC_FALSE, &s);
   PetscCall(test_file_open(".stl", path, &file));
@@ -157,7 +168,8 @@ static PetscErrorCode refuse_file(const char *path, PetscErrorCode code, const c
   SbTriangles t;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbTrianglesRead(PETSC_COMM_WORLD, "-effect_tool_obstacle", path, 1, zero, &t), code, words);
+  SB_CHECK_ERROR(SbTrianglesRead(PETSC_COMM_WORLD, "-effect_tool_obstacle", path, 1, zero, &t),
+                 code, words);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,8 +213,10 @@ static PetscErrorCode accept(TestSurface *s, PetscInt ntri, PetscReal volume, co
 
 static PetscErrorCode check_surfaces(void)
 {
-  const PetscReal lo[3] = {0.25, 0.25, 0.25}, hi[3] = {0.75, 0.75, 0.75}, beside[3] = {1, 0, 0},
-                  end[3] = {2, 2, 1};
+  const PetscReal lo[3] = {0.25, 0.25, 0.25};
+  const PetscReal hi[3] = {0.75, 0.75, 0.75};
+  const PetscReal beside[3] = {1, 0, 0};
+  const PetscReal end[3] = {2, 2, 1};
   TestSurface s;
 
   PetscFunctionBeginUser;
@@ -215,7 +229,8 @@ static PetscErrorCode check_surfaces(void)
   PetscCall(accept(&s, 12, 1, "one triangle turned"));
   cube(PETSC_FALSE, &s); /* a duplicate triangle */
   test_surface_grow(&s, 0, 1);
-  for (int k = 0; k < 3; k++) s.tri[12][k] = s.tri[3][k];
+  for (int k = 0; k < 3; k++)
+    s.tri[12][k] = s.tri[3][k];
   s.ntri = 13;
   PetscCall(accept(&s, 12, 1, "one triangle twice"));
   cube(PETSC_FALSE, &s); /* a repeated corner, and therefore a hole */
@@ -234,7 +249,8 @@ static PetscErrorCode check_surfaces(void)
   test_surface_box((PetscReal[3]){3, 3, 3}, (PetscReal[3]){3.5, 3.5, 3.5}, PETSC_TRUE, &s);
   PetscCall(accept(&s, 24, 1.125, "a part inverted"));
   cube(PETSC_FALSE, &s); /* flat: the side faces collapse, top and bottom coincide */
-  for (int v = 0; v < 8; v++) s.x[v][2] = 0;
+  for (int v = 0; v < 8; v++)
+    s.x[v][2] = 0;
   PetscCall(refuse(&s, "4 edges"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,25 +264,31 @@ static PetscErrorCode check_files(void)
   PetscCall(refuse_file("no/such/file.stl", PETSC_ERR_FILE_OPEN, "no/such/file.stl"));
   PetscCall(refuse_file("Makefile", PETSC_ERR_USER_INPUT, "-effect_tool_obstacle"));
   PetscCall(refuse_text(".stl", "hello\n", "line 1|'solid'"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex",
+                        "line 5|'vertex'"));
   PetscCall(
-    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex", "line 5|'vertex'"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n", "'vertex'"));
-  PetscCall(
-    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1,5 2,5 3,5\n", "line 4|1,5"));
+    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n", "'vertex'"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1,5 2,5 3,5\n",
+                        "line 4|1,5"));
   PetscCall(refuse_text(".stl", "solid a\nend facet\n", "'facet'|'endsolid'|'endfacet'"));
   PetscCall(refuse_text(".stl", "solid a\n", "'endsolid'"));
   PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "-effect_tool_obstacle"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n", "line 4"));
+  PetscCall(
+    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n", "line 4"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n", "line 3|face 1|2"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3|face 1|2 corners"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nf 1 x 2\n", "line 2"));
   PetscCall(refuse_text(".obj", "v 0 0\nf 1 2 3\n", "line 2|'f'"));
   PetscCall(refuse_text(".off", "COFF\n1 1 1\n", "line 1|'OFF'|'COFF'"));
   PetscCall(refuse_text(".off", "OFF\n9999999 3 0\n", "9999999 vertices"));
-  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "-effect_tool_obstacle|line 7"));
-  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6|face 1|2 corners"));
-  PetscCall(refuse_text(".msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",
+  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
+                        "-effect_tool_obstacle|line 7"));
+  PetscCall(
+    refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6|face 1|2 corners"));
+  PetscCall(refuse_text(".msh",
+                        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",
                         "-effect_tool_obstacle"));
+
   /* a truncated binary file is read as text, and is invalid */
   cube(PETSC_FALSE, &s);
   s.ntri = 11;
@@ -287,8 +309,10 @@ int main(int argc, char **argv)
     PetscCall(check_cube(kinds[k], PETSC_FALSE, PETSC_TRUE));
   }
   PetscCall(check_cube(".stl", PETSC_TRUE, PETSC_FALSE));
+
   /* surface of a mesh of tets: two unit cubes side by side, without the triangles between them */
-  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", "tests/data/two_cubes_41_bin.msh", 1, zero, &t));
+  PetscCall(
+    SbTrianglesRead(PETSC_COMM_WORLD, "-o", "tests/data/two_cubes_41_bin.msh", 1, zero, &t));
   SB_CHECK(t.ntri == 40, "%d triangles", (int)t.ntri);
   SB_CHECK_NEAR(t.volume, 2, 1e-14, "two cubes");
   check_across(&t);

@@ -21,13 +21,16 @@ static PetscErrorCode test_formats(const char *path, PetscBool curved)
 
   PetscFunctionBeginUser;
   PetscCall(test_read(path, 0, &im));
-  if (curved) PetscCall(test_curve(im));
+  if (curved)
+    PetscCall(test_curve(im));
   SB_CHECK(im->nmiddle.n > 0 || !curved, "no curved edges");
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(formats); i++) {
     char what[128];
 
-    (void)snprintf(what, sizeof(what), "%s%s as %s", path, curved ? ", curved," : "", formats[i].name);
+    (void)snprintf(what, sizeof(what), "%s%s as %s", path, curved ? ", curved," : "",
+                   formats[i].name);
     PetscCall(test_round(im, formats[i].name, formats[i].format, &again));
+
     /* version 2.2 repeats items of several groups; the reader merges tets and repairs the others */
     if (formats[i].format == SB_MESH_MSH22 || formats[i].format == SB_MESH_MSH22_BINARY)
       PetscCall(SbMeshFileRepair(again, 0, &done));
@@ -94,6 +97,7 @@ int main(int argc, char **argv)
   }
   PetscCall(test_as_it_is());
   PetscCall(test_numbers());
+
   /* files that cannot be written */
   PetscCall(test_read("box:1,1,1:1", 0, &im));
   SB_CHECK_ERROR(SbMeshFileWrite(im, "mesh.stl", SB_MESH_AUTO), PETSC_ERR_USER_INPUT, "mesh.stl");

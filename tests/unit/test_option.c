@@ -1,6 +1,6 @@
 /*
-  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the
-  manual.
+  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario,
+  the manual.
 */
 // @ranks 1 3
 #include "file.h"
@@ -47,7 +47,8 @@ static PetscErrorCode begin(const char *options)
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
   PetscCall(SbOptionsRegister("body", "corotated", PETSC_STATIC_ARRAY_LENGTH(law_rows), law_rows));
-  PetscCall(SbOptionsRegister("body", "fibrous", PETSC_STATIC_ARRAY_LENGTH(other_law_rows), other_law_rows));
+  PetscCall(SbOptionsRegister("body", "fibrous", PETSC_STATIC_ARRAY_LENGTH(other_law_rows),
+                              other_law_rows));
   SbScopeSet(&run_scope, "", "", "");
   SbScopeSet(&body_scope, "body", "corotated", "liver");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -87,13 +88,17 @@ static PetscErrorCode test_refused_numbers(void)
   PetscCall(refused_real("-body_liver_young 5e3x", "young", "-body_liver_young 5e3x"));
   PetscCall(refused_real("", "young", "-body_liver_young|(0, inf)"));
   PetscCall(refused_real("-body_liver_poisson 0.5", "poisson", "-body_liver_poisson 0.5|[0, 0.5)"));
-  PetscCall(refused_real("-body_liver_poisson -1e-9", "poisson", "-body_liver_poisson -1e-9|[0, 0.5)"));
-  PetscCall(refused_real("-body_liver_closed 0", "closed", "-body_liver_closed 0|(0, 1]"));
-  PetscCall(refused_real("-body_liver_closed 1.0001", "closed", "-body_liver_closed 1.0001|(0, 1]"));
-  PetscCall(refused_real("-body_liver_translate 1,2", "translate", "-body_liver_translate 1,2|2 numbers|3"));
   PetscCall(
-    refused_real("-body_liver_translate 1,2,3,4", "translate", "-body_liver_translate 1,2,3,4|4 numbers"));
-  PetscCall(refused_real("-body_liver_translate 1,,3", "translate", "-body_liver_translate 1,,3|entry 2"));
+    refused_real("-body_liver_poisson -1e-9", "poisson", "-body_liver_poisson -1e-9|[0, 0.5)"));
+  PetscCall(refused_real("-body_liver_closed 0", "closed", "-body_liver_closed 0|(0, 1]"));
+  PetscCall(
+    refused_real("-body_liver_closed 1.0001", "closed", "-body_liver_closed 1.0001|(0, 1]"));
+  PetscCall(refused_real("-body_liver_translate 1,2", "translate",
+                         "-body_liver_translate 1,2|2 numbers|3"));
+  PetscCall(refused_real("-body_liver_translate 1,2,3,4", "translate",
+                         "-body_liver_translate 1,2,3,4|4 numbers"));
+  PetscCall(
+    refused_real("-body_liver_translate 1,,3", "translate", "-body_liver_translate 1,,3|entry 2"));
   PetscCall(refused_real("-body_liver_translate 1,nan,3", "translate",
                          "-body_liver_translate 1,nan,3 m|(-inf, inf) m"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,10 +134,12 @@ static PetscErrorCode test_refused_words(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads every option of the table, as a program would, and checks the values of the user or the presets. */
+/* Reads every option of the table, as a program would, and checks the values of the user or the
+   presets. */
 static PetscErrorCode read_all(PetscBool given)
 {
-  PetscReal x[3], limit = 77;
+  PetscReal x[3];
+  PetscReal limit = 77;
   PetscBool b;
   PetscInt n, repeat;
   int choice;
@@ -165,9 +172,12 @@ static PetscErrorCode read_all(PetscBool given)
   PetscCall(PetscFree(names));
   PetscCall(SbOptionFormulas(&body_scope, "pull", f));
   x[0] = 7, x[1] = 8, x[2] = 9;
-  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", SbFormulaEval(f[0], 3, x));
-  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", SbFormulaEval(f[2], 3, x));
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&f[i]));
+  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g",
+           SbFormulaEval(f[0], 3, x));
+  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g",
+           SbFormulaEval(f[2], 3, x));
+  for (int i = 0; i < 3; i++)
+    PetscCall(SbFormulaDestroy(&f[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +210,8 @@ static const char as_yaml[] = "# a comment\n"
                               "    pull: -x ; 0 ; t + -3 + 2*(2 + 3)\n"
                               "ksp_nothing: 1e-7\n";
 
-/* Option file, YAML, and the scenario printed from each give the same values; presets are not the user's. */
+/* Option file, YAML, and the scenario printed from each give the same values; presets are not the
+   user's. */
 static PetscErrorCode test_files(const char *folder)
 {
   const char *const source[2] = {as_opts, as_yaml};
@@ -242,7 +253,8 @@ static PetscErrorCode test_files(const char *folder)
     SB_CHECK(!set, "a preset of the program was printed as the user's");
     PetscCall(end());
   }
-  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
+  PetscCall(
+    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(read_all(PETSC_FALSE));
   PetscCall(SbOptionsCheck());
   PetscCall(end());
@@ -273,20 +285,24 @@ static PetscErrorCode test_view_text(const char *folder)
     while (f && fgets(line, sizeof(line), f)) {
       if (!strncmp(line, "-body_liver_poisson 0.3 ", 24) && strstr(line, "# default; Poisson"))
         preset = PETSC_TRUE;
-      if (!strncmp(line, "-body_liver_scale 0.123456789012345678", 38) && !strstr(line, "default")) given++;
+      if (!strncmp(line, "-body_liver_scale 0.123456789012345678", 38) && !strstr(line, "default"))
+        given++;
     }
-    if (f) (void)fclose(f);
+    if (f)
+      (void)fclose(f);
     SB_CHECK(preset, "the preset is not in the printed scenario");
     SB_CHECK(given == 1, "the given value is %d times in the printed scenario", given);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks `options` beside two valid ones; all but "other" are read; the check fails with `message` (NULL: it succeeds). */
+/* Checks `options` beside two valid ones; all but "other" are read; the check fails with `message`
+   (NULL: it succeeds). */
 static PetscErrorCode unread(const char *options, const char *message)
 {
   PetscFunctionBeginUser;
-  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
+  PetscCall(
+    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(read_all(PETSC_FALSE));
   if (message)
@@ -306,20 +322,25 @@ static PetscErrorCode test_check(void)
   PetscCall(unread("-integratr 3", "-integratr|-integrator"));
   PetscCall(unread("-body_liver_colour red", "-body_liver_colour|body liver"));
   PetscCall(unread("-body_spleen_mesh a.msh", "-body_spleen_mesh"));
+
   /* valid but not used by this run: a warning */
   PetscCall(unread("-other 2", NULL));
-  PetscCall(unread("-body_liver_yuong 3 -body_liver_yung 4", "-body_liver_yung|-body_liver_young|1"));
+  PetscCall(
+    unread("-body_liver_yuong 3 -body_liver_yung 4", "-body_liver_yung|-body_liver_young|1"));
   PetscCall(unread("-ksp_rtoll 1e-3", "-ksp_rtoll|-ksp_rtol"));
   PetscCall(unread("-ts_dtt 3", "-ts_dtt|-ts_dt"));
+
   /* option of a class without its prefix, or with the first word of a program-wide option */
   PetscCall(unread("-young 3", "-young|-body_NAME_young"));
   PetscCall(unread("-write_nothing 3", "-write_nothing"));
+
   /* PETSc's options, and names that resemble no option */
   PetscCall(unread("-ksp_nothing 1e-3 -frobnicate 2 -ts_view 3 -write_ksp_type cg", NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of instances that only a scenario file lists are valid, unless the key is misspelt or no list names the instance. */
+/* Options of instances that only a scenario file lists are valid, unless the key is misspelt or no
+   list names the instance. */
 static PetscErrorCode test_left_out(const char *folder)
 {
   static const struct {
@@ -337,7 +358,8 @@ static PetscErrorCode test_left_out(const char *folder)
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/lists.opts", folder));
   PetscCall(test_file_put(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
-    PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
+    PetscCall(
+      begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
     PetscCall(SbOptionsFile(PETSC_COMM_WORLD, file));
     PetscCall(PetscOptionsInsertString(NULL, of[i].options));
     PetscCall(read_all(PETSC_FALSE));
@@ -350,7 +372,8 @@ static PetscErrorCode test_left_out(const char *folder)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A required option is missing and a misspelling of it is in the database: the message names the misspelling. */
+/* A required option is missing and a misspelling of it is in the database: the message names the
+   misspelling. */
 static PetscErrorCode test_missing(void)
 {
   PetscReal x;
@@ -363,9 +386,11 @@ static PetscErrorCode test_missing(void)
                  "-body_liver_yuong|-body_liver_young");
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodis|-bodies");
   PetscCall(end());
+
   /* the same key of another instance is not a misspelling */
   PetscCall(begin("-body_livre_young 3"));
-  SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER, "-body_liver_young|(0, inf)");
+  SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER,
+                 "-body_liver_young|(0, inf)");
   PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -377,10 +402,12 @@ static PetscErrorCode test_ahead(void)
   SbScope linear;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static"));
-  for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
-  for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
+  PetscCall(begin(
+    "-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static"));
+  for (int i = 0; i < 5; i++)
+    PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
+  for (int i = 1; i < 4; i++)
+    PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
   SB_CHECK(SbOptionFind(&body_scope, "young"), "young exists");
   SB_CHECK(!SbOptionFind(&run_scope, "young"), "a run has no young");
@@ -388,7 +415,8 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(!SbOptionFind(&linear, "young"), "young belongs to another type");
   PetscCall(end());
   PetscCall(begin("-body_liver_scale -1"));
-  SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");
+  SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER,
+                 "-body_liver_scale -1|(0, inf)");
   PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -436,7 +464,9 @@ static PetscErrorCode test_nearest(void)
 static PetscErrorCode test_manual(const char *folder)
 {
   char file[PETSC_MAX_PATH_LEN], line[1024];
-  int rows = 0, required = 0, tabs = 0;
+  int rows = 0;
+  int required = 0;
+  int tabs = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/options.tsv", folder));
@@ -447,16 +477,19 @@ static PetscErrorCode test_manual(const char *folder)
 
     while (f && fgets(line, sizeof(line), f)) {
       rows++;
-      for (const char *c = line; *c; c++) tabs += *c == '\t';
-      if (strstr(line, "\t-body_<name>_young\treal\t1\tPa\tyes\t\t(0, inf)\t")) required++;
+      for (const char *c = line; *c; c++)
+        tabs += *c == '\t';
+      if (strstr(line, "\t-body_<name>_young\treal\t1\tPa\tyes\t\t(0, inf)\t"))
+        required++;
     }
-    if (f) (void)fclose(f);
+    if (f)
+      (void)fclose(f);
     SB_CHECK(rows == 1 + 17, "%d lines in the table", rows);
     SB_CHECK(tabs == 9 * rows, "%d tabs in the table", tabs);
     SB_CHECK(required == 1, "young is not marked as required");
   }
-  SB_CHECK_ERROR(SbOptionsTable(PETSC_COMM_WORLD, "/nonexistent/folder/options.tsv"), PETSC_ERR_FILE_OPEN,
-                 "/nonexistent/folder/options.tsv");
+  SB_CHECK_ERROR(SbOptionsTable(PETSC_COMM_WORLD, "/nonexistent/folder/options.tsv"),
+                 PETSC_ERR_FILE_OPEN, "/nonexistent/folder/options.tsv");
   PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -470,6 +503,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(folder));
   PetscCall(test_refused_numbers());
+
   /* values at the ends of intervals */
   PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1"));
   PetscCall(SbOptionReal(&body_scope, "closed", &x));

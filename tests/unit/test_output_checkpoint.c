@@ -1,5 +1,5 @@
-// Checkpoints: every bit is restored, on any number of ranks; which ones are kept; errors of incompatible ones.
-// @ranks 1 2 3
+// Checkpoints: every bit is restored, on any number of ranks; which ones are kept; errors of
+// incompatible ones. @ranks 1 2 3
 #include "output_fixture.h"
 
 #define HASH_OF_BOX 0x1e14294dea8e2209u
@@ -14,15 +14,18 @@ static PetscReal difference(TestScene *scene, PetscReal t)
   PetscReal worst = 0.;
   Vec vec[3] = {scene->run->U, scene->run->V, scene->run->A};
 
-  for (int k = 0; k < 3; k++) (void)VecGetArrayRead(vec[k], &state[k]);
+  for (int k = 0; k < 3; k++)
+    (void)VecGetArrayRead(vec[k], &state[k]);
   for (PetscInt i = 0; i < space->nnode_owned; i++) {
     PetscReal m[3][3];
 
     motion(space->node_x + 3 * i, t, m[0], m[1], m[2]);
     for (int k = 0; k < 3; k++)
-      for (int c = 0; c < 3; c++) worst = PetscMax(worst, PetscAbsReal(state[k][3 * i + c] - m[k][c]));
+      for (int c = 0; c < 3; c++)
+        worst = PetscMax(worst, PetscAbsReal(state[k][3 * i + c] - m[k][c]));
   }
-  for (int k = 0; k < 3; k++) (void)VecRestoreArrayRead(vec[k], &state[k]);
+  for (int k = 0; k < 3; k++)
+    (void)VecRestoreArrayRead(vec[k], &state[k]);
   return worst;
 }
 
@@ -31,18 +34,22 @@ static PetscErrorCode test_round_trip(void)
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_in(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
+  PetscCall(
+    test_scene_open_in(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
   SB_CHECK(scene.run->want_energies, "works and losses are part of the state");
   scene.run->energy_start = 1. / 7.;
-  for (PetscInt k = 0; k <= 9; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  for (PetscInt k = 0; k <= 9; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
+
   // due at 0.3, 0.5, 0.8; the two newest are kept
-  SB_CHECK(!fixture_exists(dir, "checkpoint_000003.h5") && fixture_exists(dir, "checkpoint_000005.h5") &&
+  SB_CHECK(!fixture_exists(dir, "checkpoint_000003.h5") &&
+             fixture_exists(dir, "checkpoint_000005.h5") &&
              fixture_exists(dir, "checkpoint_000008.h5"),
            "other checkpoints than 5 and 8 are kept");
   SB_CHECK(!fixture_exists(dir, "checkpoint.tmp"), "a temporary file is left");
-  PetscCall(
-    test_open_in(dir, &scene, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir));
+  PetscCall(test_open_in(dir, &scene,
+                         HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir));
   SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
            (int)scene.run->step0, scene.run->t0);
   SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", difference(&scene, 0.5));
@@ -73,7 +80,8 @@ static PetscErrorCode test_elements(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     PetscCall(test_open_in(dir, &scene, HELD EULER "%s %s -checkpoint_every_steps 1",
                            i >= 3 ? more : "-output_fields none", elements[i]));
-    for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+    for (PetscInt k = 0; k <= 1; k++)
+      PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
     PetscCall(test_open_in(dir, &scene, HELD EULER "%s %s -restart latest",
                            i >= 3 ? more : "-output_fields none", elements[i]));
@@ -89,25 +97,30 @@ static PetscErrorCode test_elements(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Length of the next step: that of the interrupted run, unless the new run has a different step or end. */
+/* Length of the next step: that of the interrupted run, unless the new run has a different step or
+   end. */
 static PetscErrorCode test_next_step(void)
 {
   static const struct {
     const char *more;
     PetscReal dt;
-  } cases[] = {
-    {"", 0.025}, {" -ts_dt 0.05", 0.05}, {" -ts_max_time 2", 0.1}, {" -ts_adapt_type basic", 0.025}};
+  } cases[] = {{"", 0.025},
+               {" -ts_dt 0.05", 0.05},
+               {" -ts_max_time 2", 0.1},
+               {" -ts_adapt_type basic", 0.025}};
   TestScene scene;
   PetscReal dt;
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+    PetscCall(
+      test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
     PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
     PetscCall(TSSetTimeStep(scene.run->ts, 0.025));
     PetscCall(fixture_step(&scene, 1, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    PetscCall(test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", cases[i].more));
+    PetscCall(
+      test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", cases[i].more));
     PetscCall(TSGetTimeStep(scene.run->ts, &dt));
     SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, dt, cases[i].dt);
     PetscCall(test_scene_close(&scene));
@@ -115,7 +128,8 @@ static PetscErrorCode test_next_step(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The hash of the mesh is independent of the partition, and depends on every coordinate and cell. */
+/* The hash of the mesh is independent of the partition, and depends on every coordinate and
+   cell. */
 static PetscErrorCode test_hash(void)
 {
   static const struct {
@@ -129,11 +143,13 @@ static PetscErrorCode test_hash(void)
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    PetscCall(test_open_in(dir, &scene, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh));
+    PetscCall(
+      test_open_in(dir, &scene, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh));
     hash[i] = ((SbOutput)scene.run->output)->mesh_hash;
     SB_CHECK((hash[i] == hash[0]) == (cases[i].same != PETSC_FALSE), "hash of '%s'", cases[i].mesh);
     PetscCall(test_scene_close(&scene));
   }
+
   // found once on one rank: the same on any number
   SB_CHECK(hash[0] == HASH_OF_BOX, "hash 0x%llx", (unsigned long long)hash[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -142,20 +158,24 @@ static PetscErrorCode test_hash(void)
 /* Writes a folder with a checkpoint of step 1; a scene that restarts from it must fail. */
 static PetscErrorCode test_refused(void)
 {
-  static const char *const others[] = {" -body_a_young 1001", " -body_a_material stvk", " -mass consistent",
-                                       " -body_a_mesh box:0.4,0.1,0.2:4,2,2", " -restart nowhere.h5"};
+  static const char *const others[] = {" -body_a_young 1001", " -body_a_material stvk",
+                                       " -mass consistent", " -body_a_mesh box:0.4,0.1,0.2:4,2,2",
+                                       " -restart nowhere.h5"};
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
-  for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  PetscCall(
+    test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+  for (PetscInt k = 0; k <= 1; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
-    SB_CHECK_ERROR(test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", others[i]),
-                   i < 4 ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_READ,
-                   i < 4 ? "checkpoint_000001.h5" : "nowhere.h5");
-    SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"), "'%s': refused, but the folder was cleared",
-             others[i]);
+    SB_CHECK_ERROR(
+      test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", others[i]),
+      i < 4 ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_READ,
+      i < 4 ? "checkpoint_000001.h5" : "nowhere.h5");
+    SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"),
+             "'%s': refused, but the folder was cleared", others[i]);
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

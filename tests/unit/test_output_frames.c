@@ -1,16 +1,19 @@
-// fields.h5 and fields.xmf: values in original order, which frames are written, paths of the arrays, continuation after a
-// restart.
+// fields.h5 and fields.xmf: values in original order, which frames are written, paths of the
+// arrays, continuation after a restart.
 // @ranks 1 2 3 4
 #include "output_fixture.h"
 
 static char dir[512];
 
-/* Vertex fields against the formula at the reference positions in the file; cell fields against the constant state. */
-static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t, PetscReal tolerance)
+/* Vertex fields against the formula at the reference positions in the file; cell fields against the
+   constant state. */
+static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t,
+                                   PetscReal tolerance)
 {
   const PetscReal mu = 400., lambda = 400.;                            // E = 1000, nu = 1/4
   const PetscReal e[6] = {t * G00, 0., t * G02 / 2., t * G11, 0., 0.}; // xx xy xz yy yz zz
-  PetscReal *x, *field, s[6], worst = 0.;
+  PetscReal *x, *field, s[6];
+  PetscReal worst = 0.;
   PetscBool ok;
   char name[128];
 
@@ -29,7 +32,8 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
       PetscReal m[3][3];
 
       motion(x + 3 * i, t, m[0], m[1], m[2]);
-      for (int c = 0; c < 3; c++) worst = PetscMax(worst, PetscAbsReal(field[3 * i + c] - m[k][c]));
+      for (int c = 0; c < 3; c++)
+        worst = PetscMax(worst, PetscAbsReal(field[3 * i + c] - m[k][c]));
     }
     SB_CHECK_NEAR(worst, 0., 0.2 * tolerance, name); // the largest value is below 0.2
   }
@@ -39,7 +43,8 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
   for (int k = 0; k < 6; k++)
     s[k] = 2. * mu * e[k] + (k == 0 || k == 3 || k == 5 ? lambda * (e[0] + e[3] + e[5]) : 0.);
   worst = 0.;
-  for (PetscInt i = 0; i < 6 * out->cell.n; i++) worst = PetscMax(worst, PetscAbsReal(field[i] - s[i % 6]));
+  for (PetscInt i = 0; i < 6 * out->cell.n; i++)
+    worst = PetscMax(worst, PetscAbsReal(field[i] - s[i % 6]));
   SB_CHECK_NEAR(worst, 0., 20. * tolerance, "stress");
   SbFormat(sizeof(name), name, "%s/von_mises", group);
   PetscCall(SbH5ReadSlice(h, name, &out->cell, 1, field, &ok));
@@ -62,7 +67,9 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
 {
   const PetscInt nvert = out->point.N;
   SbOrder all = out->point; // every rank reads all vertices
-  PetscReal *x, *cell, *body, sum = 0., least = 1.;
+  PetscReal *x, *cell, *body;
+  PetscReal sum = 0.;
+  PetscReal least = 1.;
   PetscBool ok[3];
 
   PetscFunctionBeginUser;
@@ -84,12 +91,14 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
           d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
     sum += det / 6.;
     least = PetscMin(least, det);
+
     // bodies in scenario order: the cells of the first one come first
     SB_CHECK(body[c] == (PetscReal)(out->cell.start + c >= 48), "cell %d is in body %g",
              (int)(out->cell.start + c), body[c]);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK_NEAR(sum, volume, 1e-13, "volume of the cells of the file"); // rounding of 48 volumes near 1e-4
+  SB_CHECK_NEAR(sum, volume, 1e-13,
+                "volume of the cells of the file"); // rounding of 48 volumes near 1e-4
   SB_CHECK(least > 0., "a cell of the file is negatively oriented: %g", least);
   PetscCall(PetscFree3(x, cell, body));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,12 +108,14 @@ static PetscInt count(const char *text, const char *word)
 {
   PetscInt n = 0;
 
-  for (; (text = strstr(text, word)); text += strlen(word)) n++;
+  for (; (text = strstr(text, word)); text += strlen(word))
+    n++;
   return n;
 }
 
-#define ALL \
-  " -output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank,sets"
+#define ALL          \
+  " -output_fields " \
+  "displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank,sets"
 
 static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 {
@@ -114,7 +125,8 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 
   PetscFunctionBeginUser;
   PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -output_precision %s", precision));
-  for (PetscInt k = 0; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
+  for (PetscInt k = 0; k <= 3; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
   PetscCall(fixture_fields(dir, &h));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, tolerance));
@@ -136,7 +148,8 @@ static PetscErrorCode test_reaction(void)
   SbOutput out;
   SbH5 h;
   PetscReal *x, *r;
-  PetscBool ok, fine = PETSC_TRUE;
+  PetscBool ok;
+  PetscBool fine = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER " -output_fields reaction", &scene));
@@ -157,24 +170,28 @@ static PetscErrorCode test_reaction(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The field of a set is 1 at its points, and in its tets if it has any; also with separate points per cell. */
+/* The field of a set is 1 at its points, and in its tets if it has any; also with separate points
+   per cell. */
 static PetscErrorCode check_sets(const char *more)
 {
   TestScene scene;
   SbOutput out;
   SbH5 h;
-  PetscReal *x, *left, *half, *tets, volume = 0.;
-  PetscBool ok[4], fine = PETSC_TRUE;
+  PetscReal *x, *left, *half, *tets;
+  PetscReal volume = 0.;
+  PetscBool ok[4];
+  PetscBool fine = PETSC_TRUE;
   char *xmf;
 
   PetscFunctionBeginUser;
   PetscCall(test_open_in(
-    dir, &scene, HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s",
-    more));
+    dir, &scene,
+    HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s", more));
   out = (SbOutput)scene.run->output;
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
   PetscCall(fixture_fields(dir, &h));
-  PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half, out->cell.n, &tets));
+  PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half,
+                         out->cell.n, &tets));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok[0]));
   PetscCall(SbH5ReadSlice(&h, "/mesh/set_left", &out->point, 1, left, &ok[1]));
   PetscCall(SbH5ReadSlice(&h, "/mesh/set_half", &out->point, 1, half, &ok[2]));
@@ -184,7 +201,8 @@ static PetscErrorCode check_sets(const char *more)
   for (PetscInt i = 0; i < out->point.n; i++)
     fine = (PetscBool)(fine && left[i] == (x[3 * i] < 1e-9) && half[i] == (x[3 * i] < 0.2 + 1e-9));
   SB_CHECK(fine, "points of the sets%s", more);
-  for (PetscInt c = 0; c < out->cell.n; c++) volume += tets[c];
+  for (PetscInt c = 0; c < out->cell.n; c++)
+    volume += tets[c];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", volume, (int)out->cell.N);
   PetscCall(PetscFree4(x, left, half, tets));
@@ -215,8 +233,10 @@ static PetscErrorCode test_two_bodies(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(
     dir,
-    "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
-    "0,0,1 -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
+    "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 "
+    "-body_b_translate "
+    "0,0,1 -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL
+      EULER,
     &scene));
   PetscCall(fixture_fields(dir, &h));
   PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));
@@ -233,7 +253,8 @@ static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char
 
   PetscFunctionBeginUser;
   PetscCall(test_open_in(dir, &scene, BOX EULER "-output_fields displacement %s", more));
-  for (PetscInt k = 0; k <= n; k++) PetscCall(fixture_step(&scene, k, dt, (PetscBool)(k == n)));
+  for (PetscInt k = 0; k <= n; k++)
+    PetscCall(fixture_step(&scene, k, dt, (PetscBool)(k == n)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   for (PetscInt k = 0; k <= n; k++) {
     SbFormat(sizeof(name), name, "/%06d/displacement", (int)k);
@@ -263,8 +284,8 @@ static PetscErrorCode test_which_frames(void)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     PetscCall(frames_of(cases[i].options, 10, cases[i].dt, frames));
-    SB_CHECK(!strcmp(frames, cases[i].frames), "'%s' gives frames %s, expected %s", cases[i].options, frames,
-             cases[i].frames);
+    SB_CHECK(!strcmp(frames, cases[i].frames), "'%s' gives frames %s, expected %s",
+             cases[i].options, frames, cases[i].frames);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -282,7 +303,8 @@ static void header_of(hid_t file, const char *name, unsigned long *address, unsi
 
     if (H5Oget_info3(group, &info, H5O_INFO_BASIC) >= 0 &&
         H5Oget_native_info(group, &native, H5O_NATIVE_INFO_HDR) >= 0) {
-      memcpy(address, &info.token, sizeof(*address)); // the token of the native format is the address
+      memcpy(address, &info.token,
+             sizeof(*address)); // the token of the native format is the address
       *size = (unsigned long)native.hdr.space.total;
     }
   }
@@ -295,7 +317,8 @@ static void header_of(hid_t file, const char *name, unsigned long *address, unsi
   (void)H5Oclose(group);
 }
 
-/* More than a hundred frames; the links of each hundred fit in one page of the file, so that a name is added atomically. */
+/* More than a hundred frames; the links of each hundred fit in one page of the file, so that a name
+   is added atomically. */
 static PetscErrorCode test_hundreds(void)
 {
   TestScene scene;
@@ -305,23 +328,24 @@ static PetscErrorCode test_hundreds(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
-  for (PetscInt k = 0; k <= 230; k++) PetscCall(fixture_step(&scene, k, 0.001, (PetscBool)(k == 230)));
+  for (PetscInt k = 0; k <= 230; k++)
+    PetscCall(fixture_step(&scene, k, 0.001, (PetscBool)(k == 230)));
   PetscCall(fixture_fields(dir, &h));
   for (int i = 0; i < 3; i++) {
     char name[32];
 
     SbFormat(sizeof(name), name, "/step/%04d", i);
     header_of(h.file, name, &address, &size);
-    SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "%s lies at %lu and takes %lu bytes", name,
-             address, size);
+    SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "%s lies at %lu and takes %lu bytes",
+             name, address, size);
   }
   header_of(h.file, "/step", &address, &size);
-  SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "/step lies at %lu and takes %lu bytes", address,
-           size);
+  SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "/step lies at %lu and takes %lu bytes",
+           address, size);
   PetscCall(SbH5Close(&h));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
-  SB_CHECK(count(xmf, "<Time ") == 231 && strstr(xmf, "/step/0002/000230/J"), "%d frames in fields.xmf",
-           (int)count(xmf, "<Time "));
+  SB_CHECK(count(xmf, "<Time ") == 231 && strstr(xmf, "/step/0002/000230/J"),
+           "%d frames in fields.xmf", (int)count(xmf, "<Time "));
   PetscCall(PetscFree(xmf));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -336,7 +360,8 @@ static PetscErrorCode test_restart(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
-  for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  for (PetscInt k = 0; k <= 6; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir));
   SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
@@ -344,14 +369,17 @@ static PetscErrorCode test_restart(void)
   SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
            (int)count(xmf, "<Time "));
   PetscCall(PetscFree(xmf));
-  for (PetscInt k = 4; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 6)));
+  for (PetscInt k = 4; k <= 6; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 6)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 7, "at the end: %d frames", (int)count(xmf, "<Time "));
-  SB_CHECK(count(xmf, "\"set_left\"") == 7 && count(xmf, "\"rank\"") == 7, "arrays of the mesh in the index");
+  SB_CHECK(count(xmf, "\"set_left\"") == 7 && count(xmf, "\"rank\"") == 7,
+           "arrays of the mesh in the index");
   SB_CHECK(strstr(xmf, "/step/0001/000006/"), "the frames after the restart begin a new hundred");
   PetscCall(PetscFree(xmf));
   PetscCall(fixture_fields(dir, &h));
-  SB_CHECK(H5Lexists(h.file, "/step/0000/000005", H5P_DEFAULT) <= 0, "the old step 5 is still there");
+  SB_CHECK(H5Lexists(h.file, "/step/0000/000005", H5P_DEFAULT) <= 0,
+           "the old step 5 is still there");
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, 1e-6));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0001/000005", 0.5, 1e-6));
   PetscCall(SbH5Close(&h));
@@ -364,10 +392,11 @@ static PetscErrorCode test_nothing(void)
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    test_scene_open_in(dir, BOX EULER "-output_fields none -output_history false -progress false", &scene));
+  PetscCall(test_scene_open_in(
+    dir, BOX EULER "-output_fields none -output_history false -progress false", &scene));
   SB_CHECK(scene.run->nmonitor == 0, "%d monitors", (int)scene.run->nmonitor);
-  SB_CHECK(!scene.run->want_energies && !scene.run->want_residual, "energies or residual are asked for");
+  SB_CHECK(!scene.run->want_energies && !scene.run->want_residual,
+           "energies or residual are asked for");
   PetscCall(test_scene_close(&scene));
   SB_CHECK(!fixture_exists(dir, "fields.h5") && !fixture_exists(dir, "history.csv"),
            "files that nobody asked for");

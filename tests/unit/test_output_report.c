@@ -1,4 +1,5 @@
-// Printed report: header, progress, final table within 80 columns; run.json at the start, at the end, after a failure.
+// Printed report: header, progress, final table within 80 columns; run.json at the start, at the
+// end, after a failure.
 #include "output_fixture.h"
 
 static char dir[512];
@@ -27,7 +28,8 @@ static void check_width(const char *text, const char *what)
 static PetscErrorCode run_steps(TestScene *scene)
 {
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k <= 10; k++) PetscCall(fixture_step(scene, k, 0.1, (PetscBool)(k == 10)));
+  for (PetscInt k = 0; k <= 10; k++)
+    PetscCall(fixture_step(scene, k, 0.1, (PetscBool)(k == 10)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -39,7 +41,8 @@ static PetscErrorCode test_report(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(
-    dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -probes p -probe_p_at 0,0,0", &scene));
+    dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -probes p -probe_p_at 0,0,0",
+    &scene));
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"running\"") && strstr(json, "\"petsc\": \"3."),
            "run.json at the start: %s", json);
@@ -57,9 +60,9 @@ static PetscErrorCode test_report(void)
                                             "euler_implicit",
                                             "solver     ",
                                             "probe      p at vertex"};
-    static const char *const in_summary[] = {"mesh ",         "set-up ",    "residual ",   "tangent ",
-                                             "linear solve ", "output ",    "other ",      "total ",
-                                             "memory ",       "fields.h5 ", "history.csv "};
+    static const char *const in_summary[] = {
+      "mesh ",  "set-up ", "residual ", "tangent ",   "linear solve ", "output ",
+      "other ", "total ",  "memory ",   "fields.h5 ", "history.csv "};
 
     check_width(header, "header");
     check_width(progress, "progress");
@@ -67,10 +70,13 @@ static PetscErrorCode test_report(void)
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(in_header); i++)
       SB_CHECK(strstr(header, in_header[i]), "no '%s' in the header:\n%s", in_header[i], header);
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(in_summary); i++)
-      SB_CHECK(strstr(summary, in_summary[i]), "no '%s' in the summary:\n%s", in_summary[i], summary);
+      SB_CHECK(strstr(summary, in_summary[i]), "no '%s' in the summary:\n%s", in_summary[i],
+               summary);
+
     // the first and the last step: the others follow within two seconds
     SB_CHECK(strstr(progress, "0/10 ") && strstr(progress, "10/10 "), "progress:\n%s", progress);
-    SB_CHECK(strstr(progress, " 2.0 ") && strstr(progress, "30.0"), "iterations per step:\n%s", progress);
+    SB_CHECK(strstr(progress, " 2.0 ") && strstr(progress, "30.0"), "iterations per step:\n%s",
+             progress);
   } else
     SB_CHECK(!header[0] && !progress[0] && !summary[0], "rank %d prints", (int)test_rank);
   PetscCall(fixture_read(dir, "run.json", &json));
@@ -78,7 +84,8 @@ static PetscErrorCode test_report(void)
              strstr(json, "\"linear solve\": "),
            "run.json at the end: %s", json);
   cpu = strstr(json, "\"cpu_seconds_max\": ");
-  SB_CHECK(cpu && strtod(strchr(cpu, ':') + 1, NULL) > 0, "CPU seconds in run.json: %s", cpu ? cpu : "none");
+  SB_CHECK(cpu && strtod(strchr(cpu, ':') + 1, NULL) > 0, "CPU seconds in run.json: %s",
+           cpu ? cpu : "none");
   PetscCall(PetscFree(json));
   free(header);
   free(progress);
@@ -87,7 +94,8 @@ static PetscErrorCode test_report(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers of nodes and unknowns depend on the element: 30 vertices, 124 faces, 48 cells with four each. */
+/* Numbers of nodes and unknowns depend on the element: 30 vertices, 124 faces, 48 cells with four
+   each. */
 static PetscErrorCode test_elements(void)
 {
   static const struct {
@@ -103,7 +111,8 @@ static PetscErrorCode test_elements(void)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     PetscCall(test_open_in(
-      dir, &scene, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
+      dir, &scene,
+      BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
       cases[i].element));
     CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
     SB_CHECK(test_rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s",
@@ -124,10 +133,11 @@ static PetscErrorCode test_early_end(void)
   char *summary, *json;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    test_scene_open_in(dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
+  PetscCall(test_scene_open_in(
+    dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
   SB_CHECK(scene.run->nmonitor == 2, "%d monitors without progress", (int)scene.run->nmonitor);
-  PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup", sizeof(scene.run->stop_reason)));
+  PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup",
+                         sizeof(scene.run->stop_reason)));
   CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
   SB_CHECK(test_rank || strstr(summary, "stopped    the \"solver\""), "summary:\n%s", summary);
   PetscCall(fixture_read(dir, "run.json", &json));
@@ -136,7 +146,8 @@ static PetscErrorCode test_early_end(void)
            "run.json: %s", json);
   PetscCall(PetscFree(json));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!test_rank) PetscCall(SbReportFailure(scene.run, "disk full"));
+  if (!test_rank)
+    PetscCall(SbReportFailure(scene.run, "disk full"));
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"failed\"") && strstr(json, "\"reason\": \"disk full\""),
            "run.json: %s", json);

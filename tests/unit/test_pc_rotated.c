@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one of the rigidly
-  rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
+  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one of the
+  rigidly rotated body; few iterations in a bent body; independence of the number of ranks; every
+  kind of operator.
 */
 #include "sbsolver.h"
 #include "../scene.h"
@@ -21,7 +22,8 @@ static PetscReal turn_angle, bend_angle; /* of the states below, rad */
 /* Rigid rotation of the bar about the y axis. */
 static void turned(const PetscReal x[3], PetscReal u[3])
 {
-  const PetscReal c = PetscCosReal(turn_angle), s = PetscSinReal(turn_angle);
+  const PetscReal c = PetscCosReal(turn_angle);
+  const PetscReal s = PetscSinReal(turn_angle);
 
   u[0] = (c - 1.) * x[0] + s * x[2];
   u[1] = 0.;
@@ -31,7 +33,9 @@ static void turned(const PetscReal x[3], PetscReal u[3])
 /* Bar bent to an arc of bend_angle, with constant length of its axis. */
 static void bent(const PetscReal x[3], PetscReal u[3])
 {
-  const PetscReal radius = 0.4 / bend_angle, phi = x[0] / radius, z = x[2] - 0.05;
+  const PetscReal radius = 0.4 / bend_angle;
+  const PetscReal phi = x[0] / radius;
+  const PetscReal z = x[2] - 0.05;
 
   u[0] = (radius + z) * PetscSinReal(phi) - x[0];
   u[1] = 0.;
@@ -92,8 +96,8 @@ static PetscErrorCode close_case(Case *c)
 }
 
 /* Iterations at a state for h = 1/60 s; the true residual is checked. -1 if the solve failed. */
-static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscReal u[3]), PetscReal rtol,
-                            PetscInt *its)
+static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscReal u[3]),
+                            PetscReal rtol, PetscInt *its)
 {
   SbModel m = c->t.model;
   SbStage stage = {.shift_a = 3600., .shift_v = 60., .shift_k = 1.};
@@ -114,11 +118,13 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
     PetscCall(SbModelTangent(m, 0., stage.shift_v, stage.shift_a, 1., c->U, c->U, c->A));
   PetscCall(test_fill(m, push, c->b));
   PetscCall(KSPSetTolerances(c->ksp, rtol, PETSC_DEFAULT, PETSC_DEFAULT, 300));
-  PetscCall(KSPSetOperators(c->ksp, c->A, c->A)); /* signals a change of A to the solver, as SNES does */
+  PetscCall(
+    KSPSetOperators(c->ksp, c->A, c->A)); /* signals a change of A to the solver, as SNES does */
   PetscCall(KSPSolve(c->ksp, c->b, c->x));
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscCall(KSPGetConvergedReason(c->ksp, &reason));
-  if (reason < 0) *its = -1;
+  if (reason < 0)
+    *its = -1;
   PetscCall(VecDuplicate(c->b, &r));
   PetscCall(MatMult(c->A, c->x, r));
   PetscCall(VecAYPX(r, -1., c->b));
@@ -140,13 +146,13 @@ static PetscErrorCode check_turn(const char *law, PetscBool frames)
   PetscFunctionBeginUser;
   PetscCall(open_case(law, "", frames, &c));
   PetscCall(solve(&c, NULL, 1e-8, &fresh));
-  SB_CHECK(fresh > 0 && fresh <= 4, "%s: %" PetscInt_FMT " iterations with the operator that was factored",
-           law, fresh);
+  SB_CHECK(fresh > 0 && fresh <= 4,
+           "%s: %" PetscInt_FMT " iterations with the operator that was factored", law, fresh);
   for (turn_angle = 0.5; turn_angle < 3.2; turn_angle += 0.85) {
     PetscCall(solve(&c, turned, 1e-8, &its));
     SB_CHECK(its > 0 && its <= fresh + 1,
-             "%s: %" PetscInt_FMT " iterations turned by %g, %" PetscInt_FMT " before", law, its, turn_angle,
-             fresh);
+             "%s: %" PetscInt_FMT " iterations turned by %g, %" PetscInt_FMT " before", law, its,
+             turn_angle, fresh);
   }
   PetscCall(KSPGetPC(c.ksp, &pc));
   PetscCall(test_pc_number(pc, "turned with the nodes: ", &nfactor));
@@ -155,9 +161,10 @@ static PetscErrorCode check_turn(const char *law, PetscBool frames)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clamped bar bent to an arc. Without rotation of the factor it needs three times as many iterations. */
-static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool frames, PetscReal angle,
-                                 PetscInt most, PetscInt *its)
+/* Clamped bar bent to an arc. Without rotation of the factor it needs three times as many
+   iterations. */
+static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool frames,
+                                 PetscReal angle, PetscInt most, PetscInt *its)
 {
   PetscInt fresh;
   double nfactor;
@@ -169,9 +176,12 @@ static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool f
   bend_angle = angle;
   PetscCall(solve(&c, NULL, 1e-4, &fresh));
   PetscCall(solve(&c, bent, 1e-4, its));
-  SB_CHECK(*its > 0 && *its <= most, "%s%s: %" PetscInt_FMT " iterations bent, allowed %" PetscInt_FMT, law,
-           extra, *its, most);
-  /* a failed solve renews the factor: then one or two iterations suffice; one more factorisation was made */
+  SB_CHECK(*its > 0 && *its <= most,
+           "%s%s: %" PetscInt_FMT " iterations bent, allowed %" PetscInt_FMT, law, extra, *its,
+           most);
+
+  /* a failed solve renews the factor: then one or two iterations suffice; one more factorisation
+     was made */
   PetscCall(KSPSetTolerances(c.ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, 1));
   PetscCall(KSPSolve(c.ksp, c.b, c.x));
   PetscCall(KSPGetPC(c.ksp, &pc));
@@ -204,12 +214,17 @@ static PetscErrorCode check_indefinite(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The work of an application is distributed: all ranks together read little more than a single rank, and none much more than its share. */
+/* The work of an application is distributed: all ranks together read little more than a single
+   rank, and none much more than its share. */
 static PetscErrorCode check_work(PetscMPIInt size)
 {
-  const char *options = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear "
-                        "-body_bar_young 5e4 -body_bar_poisson 0.4 -body_bar_density 1000";
-  double alone = 0., all = 0., most = 0., nface;
+  const char *options =
+    "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear "
+    "-body_bar_young 5e4 -body_bar_poisson 0.4 -body_bar_density 1000";
+  double alone = 0.;
+  double all = 0.;
+  double most = 0.;
+  double nface;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
@@ -237,7 +252,8 @@ static PetscErrorCode check_work(PetscMPIInt size)
   test_print("work on %d ranks: %.3f of that on one, busiest rank %.3f\n", (int)size, all / alone,
              most / alone);
   SB_CHECK(all <= 1.15 * alone, "%d ranks read %g times what one reads", (int)size, all / alone);
-  SB_CHECK(most <= 1.3 * alone / size, "the busiest of %d ranks has %g of the work", (int)size, most / alone);
+  SB_CHECK(most <= 1.3 * alone / size, "the busiest of %d ranks has %g of the work", (int)size,
+           most / alone);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,7 +275,8 @@ int main(int argc, char **argv)
            "%" PetscInt_FMT " iterations without, %" PetscInt_FMT " with a matrix", its[0], its[1]);
   test_print("bent bar on %d ranks: %" PetscInt_FMT " iterations\n", (int)test_size, its[0]);
   PetscCall(check_bent(WARPED, guided, PETSC_TRUE, 2., 13, &its[0]));
-  PetscCall(check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* exact tangent, projected */
+  PetscCall(
+    check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* exact tangent, projected */
   PetscCall(check_bent("neohookean", held, PETSC_FALSE, 0.5, 15, &its[0]));
   PetscCall(check_indefinite());
   PetscCall(check_work(test_size));

@@ -1,13 +1,15 @@
 /*
-  Products with block matrices: agreement with AIJ, after changes of the values, and after a copy of the
-  matrix. The same for the symmetric diagonal block of this rank.
+  Products with block matrices: agreement with AIJ, after changes of the values, and after a copy of
+  the matrix. The same for the symmetric diagonal block of this rank.
 */
 #include "../scene.h"
 #include "sbassembly.h"
 
 static const char *const scene_text =
-  "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 -body_a_poisson 0.3 "
-  "-body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material linear "
+  "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 "
+  "-body_a_poisson 0.3 "
+  "-body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material "
+  "linear "
   "-body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 -sets left -set_left_at plane:1,0,0,0 "
   "-effects clamp -effect_clamp_type fixed -effect_clamp_on left -solver cg_pbjacobi";
 
@@ -33,9 +35,11 @@ static PetscErrorCode compare(Mat A, Mat B, Vec x, const char *what)
   PetscCall(VecNorm(z, NORM_2, &size));
   PetscCall(VecAXPY(y, -1., z));
   PetscCall(VecNorm(y, NORM_2, &difference));
-  /* sums of some 45 products: rounding is below 1e-14 of the largest product, and the result is not small */
-  SB_CHECK(size > 1. && difference < 1e-13 * size, "%s: the products differ by %g of %g", what, difference,
-           size);
+
+  /* sums of some 45 products: rounding is below 1e-14 of the largest product, and the result is not
+     small */
+  SB_CHECK(size > 1. && difference < 1e-13 * size, "%s: the products differ by %g of %g", what,
+           difference, size);
   PetscCall(VecDestroy(&y));
   PetscCall(VecDestroy(&z));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,7 +99,8 @@ int main(int argc, char **argv)
   PetscCall(SbSpaceCreateVec(t.model->space, &x));
   PetscCall(test_fill(t.model, wave, x));
   PetscCall(one_storage(&t, SB_MATRIX_BAIJ, "BAIJ", x));
-  if (test_size == 1) PetscCall(one_storage(&t, SB_MATRIX_SBAIJ, "SBAIJ", x));
+  if (test_size == 1)
+    PetscCall(one_storage(&t, SB_MATRIX_SBAIJ, "SBAIJ", x));
   PetscCall(VecDestroy(&x));
   PetscCall(test_scene_close(&t));
   SB_TEST_END();

@@ -1,5 +1,5 @@
-// The mesher of re-meshing: results independent of the last bits, surface vertices first, exact positions where rounded ones cannot be meshed.
-// @ranks 1
+// The mesher of re-meshing: results independent of the last bits, surface vertices first, exact
+// positions where rounded ones cannot be meshed. @ranks 1
 #include "../test.h"
 #include "sbremesh.h"
 #include "sbtet.h"
@@ -17,17 +17,21 @@ static PetscInt number_of(const PetscInt at[3])
     const PetscInt p[3] = {i % (N + 1), i / (N + 1) % (N + 1), i / ((N + 1) * (N + 1))};
     PetscBool outer = PETSC_FALSE;
 
-    for (int k = 0; k < 3; k++) outer = (PetscBool)(outer || p[k] == 0 || p[k] == N);
-    if (p[0] == at[0] && p[1] == at[1] && p[2] == at[2]) return outer ? n : -1;
+    for (int k = 0; k < 3; k++)
+      outer = (PetscBool)(outer || p[k] == 0 || p[k] == N);
+    if (p[0] == at[0] && p[1] == at[1] && p[2] == at[2])
+      return outer ? n : -1;
     n += outer;
   }
   return -1;
 }
 
-/* A box whose sides have N x N squares of two triangles; vertices are moved by up to twice `bits`. */
+/* A box whose sides have N x N squares of two triangles; vertices are moved by up to twice
+   `bits`. */
 static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbSurface *hull)
 {
-  PetscInt at[3], n = 0;
+  PetscInt at[3];
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceCreate(NVERT, NTRI, 1, hull));
@@ -37,13 +41,16 @@ static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbSurfa
         const PetscInt v = number_of(at);
 
         for (int k = 0; k < 3 && v >= 0; k++)
-          hull->x[3 * v + k] = size[k] * (PetscReal)at[k] / N + bits * (PetscReal)((7 * (3 * v + k)) % 5 - 2);
+          hull->x[3 * v + k] =
+            size[k] * (PetscReal)at[k] / N + bits * (PetscReal)((7 * (3 * v + k)) % 5 - 2);
       }
     }
   }
   for (int side = 0; side < 6; side++) {
     for (PetscInt square = 0; square < N * N; square++) {
-      const int d = side % 3, a = (d + 1) % 3, b = (d + 2) % 3;
+      const int d = side % 3;
+      const int a = (d + 1) % 3;
+      const int b = (d + 2) % 3;
       PetscInt v[4];
 
       for (int k = 0; k < 4; k++) {
@@ -52,7 +59,8 @@ static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbSurfa
         at[b] = square / N + (k > 1);
         v[side < 3 ? 3 - k : k] = number_of(at);
       }
-      for (int k = 0; k < 6; k++) hull->tri[3 * n + k] = v[k < 3 ? k : k == 3 ? 0 : k - 2];
+      for (int k = 0; k < 6; k++)
+        hull->tri[3 * n + k] = v[k < 3 ? k : k == 3 ? 0 : k - 2];
       n += 2;
     }
   }
@@ -78,8 +86,8 @@ static PetscErrorCode fill(const PetscReal size[3], PetscReal bits, PetscReal *v
     *volume += six / 6.;
   }
   for (int i = 0; i < 3 * NVERT; i++)
-    SB_CHECK(PetscAbsReal(tets->x[i] - hull.x[i]) < 1e-3, "coordinate %d of the hull is %g, was %g", i,
-             tets->x[i], hull.x[i]);
+    SB_CHECK(PetscAbsReal(tets->x[i] - hull.x[i]) < 1e-3, "coordinate %d of the hull is %g, was %g",
+             i, tets->x[i], hull.x[i]);
   PetscCall(SbSurfaceDestroy(&hull));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,11 +12,14 @@
 static const char two_bodies[] =
   "-bodies liver,big_stone -body_liver_mesh box:1,1,1:2" LAW
   " -body_liver_rotate 1,0,0,90 -body_liver_translate 0,0,2 -body_liver_scale 0.1 "
-  "-body_liver_angular_velocity 0,0,3 -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material linear "
+  "-body_liver_angular_velocity 0,0,3 -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material "
+  "linear "
   "-body_big_stone_young 1e6 -body_big_stone_poisson 0.2 -body_big_stone_density 2500 "
-  "-body_big_stone_velocity 1,2,3 -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at sphere:1,1,1,0.5 "
+  "-body_big_stone_velocity 1,2,3 -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at "
+  "sphere:1,1,1,0.5 "
   "-effects gravity,hold,press,damp -effect_gravity_vector 0,0,-1 -effect_hold_type fixed "
-  "-effect_hold_on left,big_stone,liver.xmin -effect_press_type pressure -effect_press_on boundary,left,zmax "
+  "-effect_hold_on left,big_stone,liver.xmin -effect_press_type pressure -effect_press_on "
+  "boundary,left,zmax "
   "-effect_press_value 100*t -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
 
 static PetscOptions database;
@@ -44,7 +47,8 @@ static PetscErrorCode end(SbModel *model)
 /* The model of two_bodies; `where` names the source of the options. */
 static void check_two_bodies(SbModel m, const char *where)
 {
-  const SbBody *liver = &m->body[0], *stone = &m->body[1];
+  const SbBody *liver = &m->body[0];
+  const SbBody *stone = &m->body[1];
   static const struct {
     const char *name, *group;
     SbSetShape shape;
@@ -62,22 +66,27 @@ static void check_two_bodies(SbModel m, const char *where)
            (int)m->neffect);
   SB_CHECK(!strcmp(liver->name, "liver") && !strcmp(stone->name, "big_stone"), "%s: names", where);
   SB_CHECK(!strcmp(liver->mesh, "box:1,1,1:2") && liver->scale == 0.1, "%s: mesh and scale", where);
-  SB_CHECK(liver->rotate[0] == 1 && liver->rotate[3] == 90 && liver->translate[2] == 2, "%s: placement",
-           where);
-  SB_CHECK(liver->angular_velocity[2] == 3 && stone->velocity[1] == 2 && stone->angular_velocity[0] == 0,
+  SB_CHECK(liver->rotate[0] == 1 && liver->rotate[3] == 90 && liver->translate[2] == 2,
+           "%s: placement", where);
+  SB_CHECK(liver->angular_velocity[2] == 3 && stone->velocity[1] == 2 &&
+             stone->angular_velocity[0] == 0,
            "%s: motion", where);
   SB_CHECK(liver->density == 1000 && stone->density == 2500, "%s: density", where);
-  SB_CHECK(!strcmp(m->material[0]->law, "corotated") && m->material[0]->E == 5e3, "%s: material", where);
-  SB_CHECK(!strcmp(stone->material, "linear") && m->material[1]->nu == 0.2, "%s: second material", where);
-  SB_CHECK(!strcmp(liver->element, "p1") && m->element[1], "%s: elements", where);
-  SB_CHECK(!strcmp(m->effect[2]->name, "press") && !strcmp(m->effect[2]->type, "pressure"), "%s: effects",
+  SB_CHECK(!strcmp(m->material[0]->law, "corotated") && m->material[0]->E == 5e3, "%s: material",
            where);
+  SB_CHECK(!strcmp(stone->material, "linear") && m->material[1]->nu == 0.2, "%s: second material",
+           where);
+  SB_CHECK(!strcmp(liver->element, "p1") && m->element[1], "%s: elements", where);
+  SB_CHECK(!strcmp(m->effect[2]->name, "press") && !strcmp(m->effect[2]->type, "pressure"),
+           "%s: effects", where);
   SB_CHECK(m->nset == 7, "%s: %d sets", where, (int)m->nset);
   for (PetscInt i = 0; i < PetscMin(m->nset, 7); i++) {
     const SbSet *s = &m->set[i];
 
-    SB_CHECK(!strcmp(s->name, sets[i].name) && s->shape == sets[i].shape && !strcmp(s->group, sets[i].group),
-             "%s: set %d is %s, shape %d, group %s", where, (int)i, s->name, (int)s->shape, s->group);
+    SB_CHECK(!strcmp(s->name, sets[i].name) && s->shape == sets[i].shape &&
+               !strcmp(s->group, sets[i].group),
+             "%s: set %d is %s, shape %d, group %s", where, (int)i, s->name, (int)s->shape,
+             s->group);
   }
   SB_CHECK(!m->mesh && !m->space, "%s: something was computed", where);
 }
@@ -85,26 +94,27 @@ static void check_two_bodies(SbModel m, const char *where)
 /* The model from options, from the scenario printed from them, and from YAML. */
 static PetscErrorCode test_model(const char *folder)
 {
-  static const char yaml[] = "bodies: [liver, big_stone]\n"
-                             "body:\n"
-                             "  liver: {mesh: \"box:1,1,1:2\", material: corotated, young: 5e3, poisson: "
-                             "0.45, rotate: [1, 0, 0, 90],\n"
-                             "          translate: [0, 0, 2], scale: 0.1, angular_velocity: [0, 0, 3]}\n"
-                             "  big_stone:\n"
-                             "    mesh: box:1,1,1:3\n"
-                             "    material: linear\n"
-                             "    young: 1e6\n"
-                             "    poisson: 0.2\n"
-                             "    density: 2500\n"
-                             "    velocity: 1,2,3\n"
-                             "sets: [left, tip]\n"
-                             "set: {left: {at: \"plane:2,0,0,1\"}, tip: {at: \"sphere:1,1,1,0.5\"}}\n"
-                             "effects: [gravity, hold, press, damp]\n"
-                             "effect:\n"
-                             "  gravity: {vector: [0, 0, -1]}\n"
-                             "  hold: {type: fixed, on: [left, big_stone, liver.xmin]}\n"
-                             "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
-                             "  damp: {type: damping, on: all, alpha: 0.1}\n";
+  static const char yaml[] =
+    "bodies: [liver, big_stone]\n"
+    "body:\n"
+    "  liver: {mesh: \"box:1,1,1:2\", material: corotated, young: 5e3, poisson: "
+    "0.45, rotate: [1, 0, 0, 90],\n"
+    "          translate: [0, 0, 2], scale: 0.1, angular_velocity: [0, 0, 3]}\n"
+    "  big_stone:\n"
+    "    mesh: box:1,1,1:3\n"
+    "    material: linear\n"
+    "    young: 1e6\n"
+    "    poisson: 0.2\n"
+    "    density: 2500\n"
+    "    velocity: 1,2,3\n"
+    "sets: [left, tip]\n"
+    "set: {left: {at: \"plane:2,0,0,1\"}, tip: {at: \"sphere:1,1,1,0.5\"}}\n"
+    "effects: [gravity, hold, press, damp]\n"
+    "effect:\n"
+    "  gravity: {vector: [0, 0, -1]}\n"
+    "  hold: {type: fixed, on: [left, big_stone, liver.xmin]}\n"
+    "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
+    "  damp: {type: damping, on: all, alpha: 0.1}\n";
   char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
   PetscViewer viewer;
   SbModel model;
@@ -170,8 +180,8 @@ static PetscErrorCode test_names(void)
   PetscCall(refused("-bodies a__b", "-bodies|name 'a__b'"));
   PetscCall(refused("-bodies liver_1", "-bodies|name 'liver_1'"));
   PetscCall(refused("-bodies a_12_b", "-bodies|name 'a_12_b'"));
-  PetscCall(
-    refused("-bodies a23456789_123456789_123456789_12", "-bodies|name 'a23456789_123456789_123456789_12'"));
+  PetscCall(refused("-bodies a23456789_123456789_123456789_12",
+                    "-bodies|name 'a23456789_123456789_123456789_12'"));
   PetscCall(refused("-bodies all", "-bodies|name 'all'"));
   PetscCall(refused(LIVER " -effects gravity,gravity", "-effects|'gravity'"));
   PetscCall(refused(LIVER " -sets boundary", "-sets|name 'boundary'"));
@@ -191,15 +201,18 @@ static PetscErrorCode test_check(const char *folder)
   if (!test_rank) {
     FILE *f = fopen(options, "w");
 
-    if (f) (void)fclose(f);
+    if (f)
+      (void)fclose(f);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(
-    PetscSNPrintf(options, sizeof(options), "-bodies liver -body_liver_mesh %s/livr.msh" LAW, folder));
-  PetscCall(
-    PetscSNPrintf(message, sizeof(message), "-body_liver_mesh %s/livr.msh|%s/liver.msh", folder, folder));
+  PetscCall(PetscSNPrintf(options, sizeof(options),
+                          "-bodies liver -body_liver_mesh %s/livr.msh" LAW, folder));
+  PetscCall(PetscSNPrintf(message, sizeof(message), "-body_liver_mesh %s/livr.msh|%s/liver.msh",
+                          folder, folder));
   PetscCall(refused(options, message));
-  PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
+  PetscCall(
+    refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
+
   /* a static run of a body without supports */
   PetscCall(refused(LIVER " -effects gravity", "-time static"));
   PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin"));
@@ -212,11 +225,25 @@ static PetscErrorCode test_check(const char *folder)
 
 static PetscErrorCode test_command(void)
 {
-  char *argv[] = {
-    "supple", "nix.opts", "-ts_dt", "-1", "-Help", "-version", "-scenario_view", "v.opts",
-    "-flag",  "-vector",  "0,",     "0,", "-help", "petsc",    "-options_file",  "/nonexistent/a.yml",
-    NULL};
-  const char *const expected[] = {"supple", "nix.opts", "-ts_dt", "-1", "-flag", "-vector", "0,", "-help"};
+  char *argv[] = {"supple",
+                  "nix.opts",
+                  "-ts_dt",
+                  "-1",
+                  "-Help",
+                  "-version",
+                  "-scenario_view",
+                  "v.opts",
+                  "-flag",
+                  "-vector",
+                  "0,",
+                  "0,",
+                  "-help",
+                  "petsc",
+                  "-options_file",
+                  "/nonexistent/a.yml",
+                  NULL};
+  const char *const expected[] = {"supple", "nix.opts", "-ts_dt", "-1",
+                                  "-flag",  "-vector",  "0,",     "-help"};
   char *only[] = {"supple", "-options_table", NULL};
   int argc = 16;
   SbCommand command;
@@ -226,10 +253,12 @@ static PetscErrorCode test_command(void)
   SB_CHECK(argc == 8 && !argv[8], "%d words are left", argc);
   for (int i = 0; i < PetscMin(argc, 8); i++)
     SB_CHECK(!strcmp(argv[i], expected[i]), "word %d is %s", i, argv[i]);
-  SB_CHECK(command.help && command.version && command.view && !strcmp(command.view, "v.opts"), "requests");
+  SB_CHECK(command.help && command.version && command.view && !strcmp(command.view, "v.opts"),
+           "requests");
   SB_CHECK(!command.scenario && !command.table, "a scenario or a table nobody asked for");
-  SB_CHECK(!strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"), "%s",
-           command.problem);
+  SB_CHECK(
+    !strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"),
+    "%s", command.problem);
   argc = 2;
   PetscCall(SbCommandLine(&argc, only, &command));
   SB_CHECK(argc == 1 && !strcmp(command.table, "-") && !command.problem[0], "-options_table alone");
@@ -239,7 +268,8 @@ static PetscErrorCode test_command(void)
 int main(int argc, char **argv)
 {
   char folder[512];
-  char options[4096] = LIVER " -effects hold -effect_hold_type fixed -effect_hold_on s0", name[8];
+  char options[4096] = LIVER " -effects hold -effect_hold_type fixed -effect_hold_on s0";
+  char name[8];
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(folder));
@@ -247,16 +277,19 @@ int main(int argc, char **argv)
   PetscCall(test_names());
   PetscCall(refused("-bodies liver", "-body_liver_mesh"));
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
-  PetscCall(refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
+  PetscCall(
+    refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
   PetscCall(refused(LIVER " -body_liver_element p7", "-body_liver_element p7|p1"));
   PetscCall(refused(LIVER " -body_liver_scale 0", "-body_liver_scale 0|(0, inf)"));
   PetscCall(refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate|0,0,0"));
   PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa|(0, inf) Pa"));
   PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5|(-1, 0.5)"));
-  PetscCall(refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3|(0, inf) kg/m^3"));
+  PetscCall(
+    refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3|(0, inf) kg/m^3"));
   PetscCall(refused(LIVER " -mass lump", "-mass lump|lumped"));
   PetscCall(refused(LIVER " -body_stone_young 1", "-body_stone_young"));
   PetscCall(test_check(folder));
+
   /* 70 sets are more than one bit each; they must not be written beyond the array. */
   for (int i = 1; i < 70; i++) {
     (void)snprintf(name, sizeof(name), ",s%d", i);

@@ -1,6 +1,7 @@
 /*
-  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere
-  against the exact ones, of non-convex shapes against all triangles and the winding number; the note; errors.
+  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine
+  sphere against the exact ones, of non-convex shapes against all triangles and the winding number;
+  the note; errors.
 */
 // @ranks 1 3
 #include "mesh_test.h"
@@ -29,11 +30,13 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
 /* Same distances as the box. */
 static PetscErrorCode check_cube(void)
 {
-  const PetscReal lo[3] = {-0.5, -0.4, -0.3}, hi[3] = {0.6, 0.5, 0.7};
+  const PetscReal lo[3] = {-0.5, -0.4, -0.3};
+  const PetscReal hi[3] = {0.6, 0.5, 0.7};
   TestSurface s = {0};
   SbObstacle o, box;
   PetscInt inside = 0;
-  PetscReal off = 0, turned = 0;
+  PetscReal off = 0;
+  PetscReal turned = 0;
   unsigned state = 5;
   char note[256] = "";
 
@@ -44,12 +47,14 @@ static PetscErrorCode check_cube(void)
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], m[3], d, exact;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.5 * test_random(&state);
+    for (int k = 0; k < 3; k++)
+      x[k] = 1.5 * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     exact = SbObstacleDistance(box, x, m);
     inside += exact < 0;
     off = PetscMax(off, PetscAbsReal(d - exact));
-    if (PetscAbsReal(exact) > 1e-3) turned = PetscMax(turned, 1 - SbDot3(n, m));
+    if (PetscAbsReal(exact) > 1e-3)
+      turned = PetscMax(turned, 1 - SbDot3(n, m));
   }
   SB_CHECK(inside > 200, "%d inside", (int)inside);
   SB_CHECK(off < 1e-14, "distances from the cube are off by %g", off);
@@ -61,7 +66,8 @@ static PetscErrorCode check_cube(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At a corner, on an edge and on a face: zero distance, and a normal between those of the adjacent faces. */
+/* At a corner, on an edge and on a face: zero distance, and a normal between those of the adjacent
+   faces. */
 static PetscErrorCode check_on(void)
 {
   static const PetscReal at[4][3] = {{1, 1, 1}, {1, 1, 0.3}, {1, 0.2, 0.3}, {1 - 1e-13, 0.2, 0.3}};
@@ -74,13 +80,17 @@ static PetscErrorCode check_on(void)
   test_surface_box(zero, unit, PETSC_FALSE, &s);
   PetscCall(make(&s, &o, sizeof(note), note));
   for (int i = 0; i < 4; i++) {
-    PetscReal n[3], d = SbObstacleDistance(o, at[i], n);
+    PetscReal n[3];
+    PetscReal d = SbObstacleDistance(o, at[i], n);
 
     SB_CHECK_NEAR(d, i < 3 ? 0 : -1e-13, 1e-15, "on the surface");
     SB_CHECK_NEAR(SbDot3(n, n), 1, 1e-14, "length of the normal");
     for (int k = 0; k < 3; k++) {
-      /* normals of the triangles at a corner are weighted by their angles: the three faces count equally */
-      const PetscReal exact = i == 0 ? 1 / PetscSqrtReal(3.) : i == 1 ? (k < 2) / PETSC_SQRT2 : k == 0;
+      /* normals of the triangles at a corner are weighted by their angles: the three faces count
+         equally */
+      const PetscReal exact = i == 0   ? 1 / PetscSqrtReal(3.)
+                              : i == 1 ? (k < 2) / PETSC_SQRT2
+                                       : k == 0;
 
       SB_CHECK_NEAR(n[k], exact, 1e-14, "normal on the surface");
     }
@@ -97,7 +107,8 @@ static PetscReal solid_angle(const TestSurface *s, PetscInt f, const PetscReal x
   PetscReal a[3][3], l[3], c[3];
 
   for (int k = 0; k < 3; k++) {
-    for (int i = 0; i < 3; i++) a[k][i] = s->x[s->tri[f][k]][i] - x[i];
+    for (int i = 0; i < 3; i++)
+      a[k][i] = s->x[s->tri[f][k]][i] - x[i];
     l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
   }
   SbCross(a[0], a[1], c);
@@ -109,7 +120,8 @@ static PetscReal solid_angle(const TestSurface *s, PetscInt f, const PetscReal x
 static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal x[3])
 {
   const PetscReal *p[3] = {s->x[s->tri[f][0]], s->x[s->tri[f][1]], s->x[s->tri[f][2]]};
-  PetscReal best = PETSC_MAX_REAL, n[3], a[3], b[3], area, h, w[3];
+  PetscReal best = PETSC_MAX_REAL;
+  PetscReal n[3], a[3], b[3], area, h, w[3];
   PetscBool over = PETSC_TRUE;
 
   for (int i = 0; i < 3; i++) {
@@ -119,21 +131,25 @@ static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal
   SbCross(a, b, n);
   area = SbDot3(n, n);
   for (int k = 0; k < 3; k++) {
-    PetscReal e[3], r[3], c[3], t, d2 = 0;
+    PetscReal e[3], r[3], c[3], t;
+    PetscReal d2 = 0;
 
     for (int i = 0; i < 3; i++) {
       e[i] = p[(k + 1) % 3][i] - p[k][i];
       r[i] = x[i] - p[k][i];
     }
     t = PetscMax(0, PetscMin(1, SbDot3(e, r) / SbDot3(e, e)));
-    for (int i = 0; i < 3; i++) d2 += PetscSqr(r[i] - t * e[i]);
+    for (int i = 0; i < 3; i++)
+      d2 += PetscSqr(r[i] - t * e[i]);
     best = PetscMin(best, PetscSqrtReal(d2));
     SbCross(e, r, c);
     w[k] = SbDot3(c, n) / area;
-    if (w[k] < 0) over = PETSC_FALSE;
+    if (w[k] < 0)
+      over = PETSC_FALSE;
   }
   h = 0;
-  for (int i = 0; i < 3; i++) h += (x[i] - p[0][i]) * n[i] / PetscSqrtReal(area);
+  for (int i = 0; i < 3; i++)
+    h += (x[i] - p[0][i]) * n[i] / PetscSqrtReal(area);
   return over ? PetscMin(best, PetscAbsReal(h)) : best;
 }
 
@@ -141,17 +157,22 @@ static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal
 static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const char *what)
 {
   SbObstacle o;
-  PetscInt wrong = 0, inside = 0;
-  PetscReal off = 0, foot = 0;
+  PetscInt wrong = 0;
+  PetscInt inside = 0;
+  PetscReal off = 0;
+  PetscReal foot = 0;
   unsigned state = 11;
   char note[256];
 
   PetscFunctionBeginUser;
   PetscCall(make(s, &o, sizeof(note), note));
   for (int i = 0; i < 1500; i++) {
-    PetscReal x[3], n[3], y[3], m[3], d, exact = PETSC_MAX_REAL, around = 0;
+    PetscReal x[3], n[3], y[3], m[3], d;
+    PetscReal exact = PETSC_MAX_REAL;
+    PetscReal around = 0;
 
-    for (int k = 0; k < 3; k++) x[k] = box * test_random(&state);
+    for (int k = 0; k < 3; k++)
+      x[k] = box * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     for (PetscInt f = 0; f < s->ntri; f++) {
       exact = PetscMin(exact, from_triangle(s, f, x));
@@ -160,10 +181,12 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
     wrong += (around > 2 * PETSC_PI) != (d < 0);
     inside += d < 0;
     off = PetscMax(off, PetscAbsReal(PetscAbsReal(d) - exact));
-    for (int k = 0; k < 3; k++) y[k] = x[k] - d * n[k];
+    for (int k = 0; k < 3; k++)
+      y[k] = x[k] - d * n[k];
     foot = PetscMax(foot, PetscAbsReal(SbObstacleDistance(o, y, m)));
   }
-  SB_CHECK(inside > 50 && !wrong, "%s: %d inside, %d on the wrong side", what, (int)inside, (int)wrong);
+  SB_CHECK(inside > 50 && !wrong, "%s: %d inside, %d on the wrong side", what, (int)inside,
+           (int)wrong);
   SB_CHECK(off < 1e-13, "%s: distances are off by %g", what, off);
   SB_CHECK(foot < 1e-13, "%s: the nearest point is off the surface by %g", what, foot);
   PetscCall(SbObstacleDestroy(&o));
@@ -173,9 +196,12 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
 /* A cube with a cavity and a separate thin plate. */
 static PetscErrorCode check_parts(void)
 {
-  const PetscReal a[3] = {-0.5, -0.5, -0.5}, b[3] = {0.5, 0.5, 0.5}, c[3] = {-0.3, -0.3, -0.3},
-                  d[3] = {0.4, 0.4, 0.4};
-  const PetscReal p[3] = {-0.8, -0.8, 0.7}, q[3] = {0.8, 0.8, 0.72};
+  const PetscReal a[3] = {-0.5, -0.5, -0.5};
+  const PetscReal b[3] = {0.5, 0.5, 0.5};
+  const PetscReal c[3] = {-0.3, -0.3, -0.3};
+  const PetscReal d[3] = {0.4, 0.4, 0.4};
+  const PetscReal p[3] = {-0.8, -0.8, 0.7};
+  const PetscReal q[3] = {0.8, 0.8, 0.72};
   TestSurface s = {0};
 
   PetscFunctionBeginUser;
@@ -192,7 +218,8 @@ static PetscReal longest_edge(const TestSurface *s)
   PetscReal longest = 0;
 
   for (PetscInt i = 0; i < 3 * s->ntri; i++) {
-    const PetscReal *a = s->x[s->tri[i / 3][i % 3]], *b = s->x[s->tri[i / 3][(i + 1) % 3]];
+    const PetscReal *a = s->x[s->tri[i / 3][i % 3]];
+    const PetscReal *b = s->x[s->tri[i / 3][(i + 1) % 3]];
     const PetscReal e[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 
     longest = PetscMax(longest, PetscSqrtReal(SbDot3(e, e)));
@@ -200,13 +227,17 @@ static PetscReal longest_edge(const TestSurface *s)
   return longest;
 }
 
-/* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal deviates by less than h. */
+/* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal
+   deviates by less than h. */
 static PetscErrorCode check_sphere(int split)
 {
   TestSurface s = {0};
   SbObstacle o;
-  PetscReal off = 0, turned = 0, h;
-  PetscInt near = 0, inside = 0;
+  PetscReal off = 0;
+  PetscReal turned = 0;
+  PetscReal h;
+  PetscInt near = 0;
+  PetscInt inside = 0;
   unsigned state = 3;
   char note[256];
 
@@ -217,9 +248,11 @@ static PetscErrorCode check_sphere(int split)
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], d, r;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.2 * test_random(&state);
+    for (int k = 0; k < 3; k++)
+      x[k] = 1.2 * test_random(&state);
     r = PetscSqrtReal(SbDot3(x, x));
-    if (PetscAbsReal(r - 1) > 0.7 * h) continue;
+    if (PetscAbsReal(r - 1) > 0.7 * h)
+      continue;
     d = SbObstacleDistance(o, x, n);
     near++;
     inside += d < 0;
@@ -254,9 +287,11 @@ static PetscErrorCode measure(void)
   for (int i = 0; i < 200000; i++) {
     PetscReal x[3], n[3], r;
 
-    for (int k = 0; k < 3; k++) x[k] = test_random(&state);
+    for (int k = 0; k < 3; k++)
+      x[k] = test_random(&state);
     r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * test_random(&state));
-    for (int k = 0; k < 3; k++) x[k] /= r;
+    for (int k = 0; k < 3; k++)
+      x[k] /= r;
     sum += SbObstacleDistance(o, x, n);
   }
   PetscCall(PetscTime(&t2));
@@ -286,8 +321,8 @@ int main(int argc, char **argv)
   SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
-  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
-                 "-o|no,such.stl");
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, 1, zero, sizeof(note), note),
+                 PETSC_ERR_FILE_OPEN, "-o|no,such.stl");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(measure());
   SB_TEST_END();

@@ -1,13 +1,15 @@
 // @ranks 1 2 3
-/* Every row of the solver table solves the same linear bar; a matrix that is not positive definite fails with CHOLMOD and with no other package; the
-   choice by `auto` has a reason; a solve at its limit fails. */
+/* Every row of the solver table solves the same linear bar; a matrix that is not positive definite
+   fails with CHOLMOD and with no other package; the choice by `auto` has a reason; a solve at its
+   limit fails. */
 #include "sbsolver.h"
 #include "../scene.h"
 
-#define BAR                                                                                     \
-  "-bodies bar -body_bar_mesh box:0.3,0.1,0.1:3 -body_bar_material linear -body_bar_young 1e4 " \
-  "-body_bar_poisson 0.3 -body_bar_density 1000 "                                               \
-  "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time static -ksp_rtol 1e-10 "
+#define BAR                                                                                       \
+  "-bodies bar -body_bar_mesh box:0.3,0.1,0.1:3 -body_bar_material linear -body_bar_young 1e4 "   \
+  "-body_bar_poisson 0.3 -body_bar_density 1000 "                                                 \
+  "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time static -ksp_rtol " \
+  "1e-10 "
 
 static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], PetscInt *iterations)
 {
@@ -54,8 +56,9 @@ static PetscErrorCode solve(KSP ksp, Mat A, KSPConvergedReason *reason, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Factorises an indefinite matrix, a definite one, and both again; then a zero matrix, which no package factorises, and a definite one. Only CHOLMOD fails
-   on indefinite matrices, on all ranks. */
+/* Factorises an indefinite matrix, a definite one, and both again; then a zero matrix, which no
+   package factorises, and a definite one. Only CHOLMOD fails on indefinite matrices, on all
+   ranks. */
 static PetscErrorCode check_indefinite(const char *package, KSPType type)
 {
   /* 1/s^2; the lowest natural frequency of the bar is about 40 rad/s */
@@ -69,7 +72,8 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
 
   PetscFunctionBeginUser;
   PetscCall(SbHasPackage(package, &has));
-  if (!has) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!has)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(test_scene_open(BAR "-time euler_implicit -ts_dt 0.01", &t));
   PetscCall(SbSpaceCreateMatrix(t.model->space, SB_MATRIX_AIJ, &A));
   PetscCall(KSPCreate(PETSC_COMM_WORLD, &ksp));
@@ -85,12 +89,14 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
     PetscReal residual;
 
     PetscCall(SbModelTangent(t.model, 0., 0., shift[k], 1., t.run->U, NULL, A));
-    if (k == 4) PetscCall(MatZeroEntries(A));
+    if (k == 4)
+      PetscCall(MatZeroEntries(A));
     PetscCall(solve(ksp, A, &reason, &residual));
     if (k == 4)
       SB_CHECK(reason < 0, "%s, zeros: %s", package, KSPConvergedReasons[reason]);
     else if (fails && shift[k] < 0.)
-      SB_CHECK(reason == KSP_DIVERGED_PC_FAILED, "%s, indefinite: %s", package, KSPConvergedReasons[reason]);
+      SB_CHECK(reason == KSP_DIVERGED_PC_FAILED, "%s, indefinite: %s", package,
+               KSPConvergedReasons[reason]);
     else
       SB_CHECK(reason > 0 && residual < 1e-10, "%s, matrix %d: %s, residual %g", package, k,
                KSPConvergedReasons[reason], residual);
@@ -101,18 +107,20 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A rotated factorisation serves up to near nu = 1/2; close to it DG took hundreds of times the iterations of other solvers. */
+/* A rotated factorisation serves up to near nu = 1/2; close to it DG took hundreds of times the
+   iterations of other solvers. */
 static PetscErrorCode check_choice(const char *element, const char *nu, PetscBool turns)
 {
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_young 1e6 -body_a_poisson %s "
-                      "-body_a_element %s -body_a_material corotated -ts_dt 0.02 -solver auto",
-                      nu, element));
-  SB_CHECK((PetscBool)!strcmp(t.run->solver, "rotated") == turns, "%s, nu %s: auto took %s", element, nu,
-           t.run->solver);
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_young 1e6 -body_a_poisson %s "
+              "-body_a_element %s -body_a_material corotated -ts_dt 0.02 -solver auto",
+              nu, element));
+  SB_CHECK((PetscBool)!strcmp(t.run->solver, "rotated") == turns, "%s, nu %s: auto took %s",
+           element, nu, t.run->solver);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,16 +131,20 @@ static PetscErrorCode check_meeting(const char *solver, const char *most, PetscB
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e6 -body_a_poisson 0.3 "
-                      "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
-                      "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
-                      solver, most));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e6 -body_a_poisson 0.3 "
+              "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
+              "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
+              solver, most));
   SB_CHECK((PetscBool)!strcmp(t.run->solver, strcmp(solver, "auto") ? solver : "rotated") == turns,
-           "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver, t.run->solver_reason);
-  SB_CHECK(turns || !strcmp(t.run->solver, "cg_two_level"), "with many ranks %s was taken", t.run->solver);
+           "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver,
+           t.run->solver_reason);
+  SB_CHECK(turns || !strcmp(t.run->solver, "cg_two_level"), "with many ranks %s was taken",
+           t.run->solver);
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == 1, "%s: %s", t.run->solver, t.run->stop_reason);
+  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == 1, "%s: %s", t.run->solver,
+           t.run->stop_reason);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,24 +156,26 @@ static PetscErrorCode swing(const char *element, const char *options, PetscReal 
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    test_open(&t,
-              "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated -body_bar_tangent "
-              "warped -body_bar_young 2e4 -body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s "
-              "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt "
-              "0.04 -ts_max_time 0.24 -snes_rtol 1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
-              element, options));
+  PetscCall(test_open(
+    &t,
+    "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated -body_bar_tangent "
+    "warped -body_bar_young 2e4 -body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s "
+    "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt "
+    "0.04 -ts_max_time 0.24 -snes_rtol 1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
+    element, options));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0], "%s, %s: %s", element, options, t.run->stop_reason);
   PetscCall(test_value_at(t.model, t.run->U, at, x));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "swing, %s, %s: %.9f, %" PetscInt_FMT " Newton, %" PetscInt_FMT " linear iterations\n",
-    element, options, x[2], t.run->newton_total, t.run->linear_total));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "swing, %s, %s: %.9f, %" PetscInt_FMT " Newton, %" PetscInt_FMT
+                        " linear iterations\n",
+                        element, options, x[2], t.run->newton_total, t.run->linear_total));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix-free operator and its rotated factor give the same state as an assembled matrix and a factorisation. */
+/* The matrix-free operator and its rotated factor give the same state as an assembled matrix and a
+   factorisation. */
 static PetscErrorCode check_realtime(const char *element)
 {
   PetscReal exact[3], x[3];
@@ -170,7 +184,8 @@ static PetscErrorCode check_realtime(const char *element)
   PetscCall(swing(element, "-solver direct", exact));
   PetscCall(swing(element, "-solver realtime", x));
   SB_CHECK(exact[2] < -0.1, "%s: the bar fell by %g only", element, exact[2]);
-  for (int c = 0; c < 3; c += 2) SB_CHECK_NEAR(x[c], exact[c], 1e-7 * PetscAbsReal(exact[2]), element);
+  for (int c = 0; c < 3; c += 2)
+    SB_CHECK_NEAR(x[c], exact[c], 1e-7 * PetscAbsReal(exact[2]), element);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,22 +195,23 @@ static PetscErrorCode check_faces(const char *element)
   TestScene t;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(test_open(&t,
-                           "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
-                           "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
-                           "-ts_dt 0.1 -solver realtime",
-                           element),
-                 PETSC_ERR_USER, "-solver realtime");
+  SB_CHECK_ERROR(
+    test_open(&t,
+              "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
+              "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
+              "-ts_dt 0.1 -solver realtime",
+              element),
+    PETSC_ERR_USER, "-solver realtime");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  static const char *const solvers[] = {"auto",    "cg",           "cg_jacobi", "cg_pbjacobi", "cg_icc",
-                                        "cg_ssor", "cg_two_level", "cg_gamg",   "cg_hypre",    "gauss_seidel",
-                                        "sor",     "cholmod",      "umfpack",   "mumps",       "direct",
-                                        "rotated", "realtime"};
+  static const char *const solvers[] = {
+    "auto",         "cg",      "cg_jacobi", "cg_pbjacobi",  "cg_icc",  "cg_ssor",
+    "cg_two_level", "cg_gamg", "cg_hypre",  "gauss_seidel", "sor",     "cholmod",
+    "umfpack",      "mumps",   "direct",    "rotated",      "realtime"};
   PetscReal z, exact;
   PetscInt iterations;
   char stop[512], text[128];
@@ -208,16 +224,20 @@ int main(int argc, char **argv)
     PetscBool has = PETSC_TRUE;
 
     for (size_t p = 0; p < PETSC_STATIC_ARRAY_LENGTH(packages); p++)
-      if (strstr(solvers[k], packages[p])) PetscCall(SbHasPackage(packages[p], &has));
-    if (!has) continue;
+      if (strstr(solvers[k], packages[p]))
+        PetscCall(SbHasPackage(packages[p], &has));
+    if (!has)
+      continue;
     PetscCall(PetscSNPrintf(text, sizeof(text), "-solver %s", solvers[k]));
     PetscCall(tip(text, &z, stop, &iterations));
     SB_CHECK(!stop[0], "%s: %s", solvers[k], stop);
+
     /* residual 1e-10; the condition number of this bar is about 1e4 */
     SB_CHECK_NEAR(z, exact, 1e-6 * PetscAbsReal(exact), solvers[k]);
     test_print("%-14s %" PetscInt_FMT " iterations\n", solvers[k], iterations);
   }
-  PetscCall(tip("-solver cg_jacobi -ksp_type cg -ksp_max_it 3 -time_max_halvings 2", &z, stop, &iterations));
+  PetscCall(tip("-solver cg_jacobi -ksp_type cg -ksp_max_it 3 -time_max_halvings 2", &z, stop,
+                &iterations));
   SB_CHECK(stop[0], "three iterations passed as a solution");
   SB_CHECK(strstr(stop, "DIVERGED_ITS"), "the reason does not name the limit: %s", stop);
   PetscCall(check_indefinite(MATSOLVERCHOLMOD, KSPPREONLY));

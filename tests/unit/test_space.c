@@ -1,13 +1,14 @@
 // @ranks 1 2 3 4
 /*
-  Residual, tangent and matrices of a space, for every element and material: the three storage formats agree,
-  the tangent is symmetric and the derivative of the residual, which is that of the energy; forces balance,
-  mass is complete.
+  Residual, tangent and matrices of a space, for every element and material: the three storage
+  formats agree, the tangent is symmetric and the derivative of the residual, which is that of the
+  energy; forces balance, mass is complete.
 */
 #include "../scene.h"
 
 static const char *const scene_text =
-  "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material %s -body_a_young 1e3 -body_a_poisson 0.3 "
+  "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material %s -body_a_young 1e3 -body_a_poisson "
+  "0.3 "
   "-body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s "
   "-body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 -sets left -set_left_at plane:1,0,0,0 "
   "-effects clamp,damping -effect_clamp_type fixed -effect_clamp_on left -effect_damping_alpha 0.3 "
@@ -34,19 +35,23 @@ static PetscErrorCode storage(TestScene *t, SbMatrixKind kind, Vec U, Vec V, Vec
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateMatrix(t->model->space, kind, &A));
-  for (int twice = 0; twice < 2; twice++) PetscCall(SbModelTangent(t->model, 0., 10., 100., 1., U, V, A));
+  for (int twice = 0; twice < 2; twice++)
+    PetscCall(SbModelTangent(t->model, 0., 10., 100., 1., U, V, A));
   PetscCall(MatMult(A, W, Y));
   PetscCall(MatDestroy(&A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |F(u + h w) - F(u) - h J w| must decrease as h^2; the shifts define the change of velocity and acceleration */
+/* |F(u + h w) - F(u) - h J w| must decrease as h^2; the shifts define the change of velocity and
+   acceleration */
 static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
 {
-  const PetscReal shift_v = 10., shift_a = 100.;
+  const PetscReal shift_v = 10.;
+  const PetscReal shift_a = 100.;
   Vec F0, F1, X, Vx, A, JW;
   Mat J;
-  PetscReal error[2] = {0., 0.}, scale;
+  PetscReal error[2] = {0., 0.};
+  PetscReal scale;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &F0));
@@ -86,7 +91,8 @@ static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w . F(u) = dE/dh at u + h w, by central differences: their error decreases as h^2, rounding grows as 1/h */
+/* w . F(u) = dE/dh at u + h w, by central differences: their error decreases as h^2, rounding grows
+   as 1/h */
 static PetscErrorCode energy_slope(TestScene *t, const char *what, Vec U, Vec W)
 {
   const PetscReal h = 1e-5;
@@ -136,7 +142,8 @@ static PetscErrorCode symmetry(TestScene *t, const char *what, Vec U, Vec V, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Internal forces of free bodies balance, also with jumps: the sum over all nodes of one component. */
+/* Internal forces of free bodies balance, also with jumps: the sum over all nodes of one
+   component. */
 static PetscErrorCode balance(TestScene *t, const char *what, Vec U, Vec F)
 {
   PetscReal norm, total;
@@ -157,12 +164,14 @@ static PetscErrorCode total_mass(TestScene *t, const char *what, Vec A, Vec F)
 {
   const SbSpace s = t->model->space;
   const PetscReal exact = 10. * 0.2 + 7. * 0.06;
-  PetscReal sum = 0., force;
+  PetscReal sum = 0.;
+  PetscReal force;
   SbStage stage = {.shift_k = 1.};
   PetscScalar *f;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode_owned; i++) sum += s->node_mass[i];
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    sum += s->node_mass[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(sum, exact, 1e-13 * exact, what);
   PetscCall(VecSet(A, 1.));
@@ -177,7 +186,8 @@ static PetscErrorCode total_mass(TestScene *t, const char *what, Vec A, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode one_scene(const char *law, const char *mass, const char *extra, PetscBool exact)
+static PetscErrorCode one_scene(const char *law, const char *mass, const char *extra,
+                                PetscBool exact)
 {
   TestScene t;
   char text[2048];
@@ -192,15 +202,18 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscCall(test_fill(t.model, wave, U));
   PetscCall(test_fill(t.model, shear, V));
   PetscCall(test_fill(t.model, shear, W));
-  for (int k = 0; k < 3; k++) PetscCall(SbSpaceCreateVec(t.model->space, &Y[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(SbSpaceCreateVec(t.model->space, &Y[k]));
   PetscCall(storage(&t, SB_MATRIX_BAIJ, U, V, W, Y[0]));
   PetscCall(storage(&t, SB_MATRIX_AIJ, U, V, W, Y[1]));
   PetscCall(VecNorm(Y[0], NORM_2, &norm));
+
   /* partition-independent vectors: the norm is the same on any number of ranks */
   test_print("%s %s %s: |J w| = %.12g\n", law, mass, extra, norm);
   PetscCall(VecAXPY(Y[1], -1., Y[0]));
   PetscCall(VecNorm(Y[1], NORM_2, &diff));
-  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, diff, norm);
+  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, diff,
+           norm);
   if (test_size == 1) {
     PetscCall(storage(&t, SB_MATRIX_SBAIJ, U, V, W, Y[2]));
     PetscCall(VecAXPY(Y[2], -1., Y[0]));
@@ -208,7 +221,9 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
     SB_CHECK(diff < 1e-13 * norm, "%s: SBAIJ and BAIJ differ by %g of %g", law, diff, norm);
   }
   PetscCall(taylor(&t, exact, U, V, W));
-  /* at zero velocity the tangent of damping is complete too: it omits only the dependence of damping on the displacement */
+
+  /* at zero velocity the tangent of damping is complete too: it omits only the dependence of
+     damping on the displacement */
   PetscCall(VecZeroEntries(V));
   PetscCall(taylor(&t, strcmp(law, "corotated") || strstr(extra, "exact"), U, V, W));
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s, %s mass %s", law, mass, extra));
@@ -219,12 +234,14 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&W));
-  for (int k = 0; k < 3; k++) PetscCall(VecDestroy(&Y[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(VecDestroy(&Y[k]));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each element with each material, beside a body of P1 or of the other element. `exact`: the tangent is complete. */
+/* Each element with each material, beside a body of P1 or of the other element. `exact`: the
+   tangent is complete. */
 static PetscErrorCode one_element(const char *a, const char *b)
 {
   const char *const exact = " -body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0";
@@ -239,8 +256,10 @@ static PetscErrorCode one_element(const char *a, const char *b)
   PetscCall(one_scene("corotated", "lumped", text, PETSC_TRUE));
   PetscCall(one_scene("stvk", "consistent", text, PETSC_TRUE));
   PetscCall(one_scene("neohookean", "lumped", text, PETSC_TRUE));
+
   /* beta K v: the tangent omits dK/du, so the exact check runs without damping */
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -body_a_tangent exact -body_b_tangent exact", bodies));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), "%s -body_a_tangent exact -body_b_tangent exact", bodies));
   PetscCall(one_scene("corotated", "lumped", text, PETSC_FALSE));
   PetscCall(one_scene("neohookean", "lumped", text, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);

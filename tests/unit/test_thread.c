@@ -1,12 +1,13 @@
 /*
-  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after
-  it, and no library reports that it would use more than one.
+  test_thread.c - a factorisation creates no threads: the threads of the process are counted before
+  and after it, and no library reports that it would use more than one.
 */
 #include <sbbase.h>
 #include <stdio.h>
 #include "test.h"
 
-#define SIDE 24 /* unknowns along an edge of the cube: supernodes large enough for CHOLMOD's parallel loops */
+#define SIDE \
+  24 /* unknowns along an edge of the cube: supernodes large enough for CHOLMOD's parallel loops */
 
 /* Number of threads of this process, -1 if the system does not report it. */
 static int count_threads(void)
@@ -15,15 +16,18 @@ static int count_threads(void)
   char line[256];
   int n = -1;
 
-  while (f && n < 0 && fgets(line, sizeof(line), f)) (void)sscanf(line, "Threads: %d", &n);
-  if (f) (void)fclose(f);
+  while (f && n < 0 && fgets(line, sizeof(line), f))
+    (void)sscanf(line, "Threads: %d", &n);
+  if (f)
+    (void)fclose(f);
   return n;
 }
 
 /* Solves Laplace's equation on a cube of points with CHOLMOD. */
 static PetscErrorCode factor_and_solve(PetscReal *residual)
 {
-  const PetscInt n = SIDE * SIDE * SIDE, step[3] = {1, SIDE, SIDE * SIDE};
+  const PetscInt n = SIDE * SIDE * SIDE;
+  const PetscInt step[3] = {1, SIDE, SIDE * SIDE};
   Mat A;
   Vec x, b;
   KSP ksp;
@@ -34,7 +38,8 @@ static PetscErrorCode factor_and_solve(PetscReal *residual)
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(MatSetValue(A, i, i, 6.1, INSERT_VALUES));
     for (int k = 0; k < 3; k++) {
-      if ((i / step[k]) % SIDE == 0) continue;
+      if ((i / step[k]) % SIDE == 0)
+        continue;
       PetscCall(MatSetValue(A, i, i - step[k], -1., INSERT_VALUES));
       PetscCall(MatSetValue(A, i - step[k], i, -1., INSERT_VALUES));
     }

@@ -1,6 +1,6 @@
 /*
-  contact.h - common functions of the verification of contact: history columns by name, sums over each body,
-  the history as a table, balls made of boxes.
+  contact.h - common functions of the verification of contact: history columns by name, sums over
+  each body, the history as a table, balls made of boxes.
 */
 #pragma once
 #include "verify.h"
@@ -10,25 +10,32 @@
 static inline SbEffect contact_effect(SbModel m, const char *name)
 {
   for (PetscInt e = 0; e < m->neffect; e++)
-    if (!strcmp(m->effect[e]->name, name)) return m->effect[e];
+    if (!strcmp(m->effect[e]->name, name))
+      return m->effect[e];
   return NULL;
 }
 
-/* History columns of an effect for the residual R (N, without constraints; NULL: none), on every rank: value[ncolumn]. */
-static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e, PetscReal value[])
+/* History columns of an effect for the residual R (N, without constraints; NULL: none), on every
+   rank: value[ncolumn]. */
+static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e,
+                                             PetscReal value[])
 {
   SbModel m = run->model;
   SbStage stage = {.t = t, .shift_k = 1};
   const PetscReal *r = NULL;
 
   PetscFunctionBeginUser;
-  if (R) PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  if (R)
+    PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  if (R && m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
+  if (R && m->space->constraints)
+    SbConstraintsComputeForces(m->space, stage.u, r);
   PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  if (R) PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)e->ncolumn, MPIU_REAL, MPI_SUM, m->comm));
+  if (R)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)e->ncolumn, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,23 +49,26 @@ static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, co
 
   PetscFunctionBeginUser;
   *value = 0;
-  for (PetscInt k = 0; k < e->ncolumn; k++) at = strcmp(e->column[k], column) ? at : k;
+  for (PetscInt k = 0; k < e->ncolumn; k++)
+    at = strcmp(e->column[k], column) ? at : k;
   PetscCheck(at >= 0 && R, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No column %s_%s", effect, column);
   PetscCall(contact_columns(run, t, R, e, values));
   *value = values[at];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The value of a column in history.csv after a step: for monitors of a run with want_energies, and after it. */
-static inline PetscErrorCode contact_column(SbRun run, PetscReal t, const char *effect, const char *column,
-                                            PetscReal *value)
+/* The value of a column in history.csv after a step: for monitors of a run with want_energies, and
+   after it. */
+static inline PetscErrorCode contact_column(SbRun run, PetscReal t, const char *effect,
+                                            const char *column, PetscReal *value)
 {
   PetscFunctionBeginUser;
   PetscCall(contact_column_of(run, t, run->reaction, effect, column, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of a vector over the nodes of each body, weighted by nodal mass (kg) if `weigh`: sum[nbody][3] on every rank. */
+/* Sum of a vector over the nodes of each body, weighted by nodal mass (kg) if `weigh`:
+   sum[nbody][3] on every rank. */
 static inline PetscErrorCode contact_body_sums(SbModel m, Vec V, PetscBool weigh, PetscReal sum[])
 {
   const SbSpace s = m->space;
@@ -70,7 +80,8 @@ static inline PetscErrorCode contact_body_sums(SbModel m, Vec V, PetscBool weigh
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     sum[3 * s->node_body[i / 3] + i % 3] += (weigh ? s->node_mass[i / 3] : 1) * v[i];
   PetscCall(VecRestoreArrayRead(V, &v));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(3 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(3 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,13 +90,16 @@ static inline PetscErrorCode contact_body_masses(SbModel m, PetscReal mass[])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(mass, m->nbody));
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass[m->space->node_body[i]] += m->space->node_mass[i];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    mass[m->space->node_body[i]] += m->space->node_mass[i];
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Largest deviation of the stress from a uniaxial pressure along z (Pa), relative to it. */
-static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressure, PetscReal *worst)
+static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressure,
+                                                  PetscReal *worst)
 {
   SbSpace s = t->model->space;
   PetscReal *sigma;
@@ -104,7 +118,8 @@ static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Net contact force on each body after the last step, N: force[nbody][3] on every rank. For a run with want_energies. */
+/* Net contact force on each body after the last step, N: force[nbody][3] on every rank. For a run
+   with want_energies. */
 static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscReal force[])
 {
   Vec F;
@@ -118,22 +133,24 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy
-  (total with the potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x,
-  volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the contact effects, missing (largest
-  component of the change of momentum in the step less that by weight and obstacle forces, kg m/s), and, if
-  requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
+  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic,
+  strain, energy (total with the potential of gravity g along -z and the barrier energy),
+  momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of
+  the contact effects, missing (largest component of the change of momentum in the step less that by
+  weight and obstacle forces, kg m/s), and, if requested, net (likewise of the sum of contact forces
+  on all bodies) and push (on the first body), N.
 */
 typedef struct {
-  PetscReal g;                      /* set before the run, m/s^2 */
-  PetscBool forces;                 /* set before the run: record net and push */
-  PetscReal from;                   /* record_max, record_min, record_gain ignore rows up to this time, s */
-  PetscReal mass, lowest;           /* kg; lowest node at rest, z, m */
+  PetscReal g;            /* set before the run, m/s^2 */
+  PetscBool forces;       /* set before the run: record net and push */
+  PetscReal from;         /* record_max, record_min, record_gain ignore rows up to this time, s */
+  PetscReal mass, lowest; /* kg; lowest node at rest, z, m */
   PetscInt newton, steps, rejected; /* totals of the run */
-  PetscInt n, ncolumn, room, at;    /* numbers of rows and columns, allocated values, next column to be set */
-  size_t kept;                      /* place in record_kept, from 1 */
-  char (*name)[2 * SB_NAME_MAX];    /* [ncolumn] */
-  PetscReal *value;                 /* [n][ncolumn] */
+  PetscInt n, ncolumn, room,
+    at;        /* numbers of rows and columns, allocated values, next column to be set */
+  size_t kept; /* place in record_kept, from 1 */
+  char (*name)[2 * SB_NAME_MAX]; /* [ncolumn] */
+  PetscReal *value;              /* [n][ncolumn] */
 } Record;
 
 /* Arrays of all records, which are freed when the program ends. */
@@ -158,7 +175,8 @@ static inline const PetscReal *record_column(const Record *r, const char *name)
   static PetscReal none = NAN;
 
   for (PetscInt c = 0; c < r->ncolumn; c++)
-    if (!strcmp(r->name[c], name)) return r->value + c;
+    if (!strcmp(r->name[c], name))
+      return r->value + c;
   SB_CHECK(0, "the run has no column %s", name);
   return &none;
 }
@@ -176,13 +194,16 @@ static inline PetscReal record_last(const Record *r, const char *name)
 }
 
 /* Extreme of sign times a column, or of its change in a step. */
-static inline PetscReal record_extreme(const Record *r, const char *name, PetscReal sign, PetscBool change)
+static inline PetscReal record_extreme(const Record *r, const char *name, PetscReal sign,
+                                       PetscBool change)
 {
-  const PetscReal *v = record_column(r, name), *t = record_column(r, "t");
+  const PetscReal *v = record_column(r, name);
+  const PetscReal *t = record_column(r, "t");
   PetscReal most = -PETSC_MAX_REAL;
 
   for (PetscInt i = change; i < r->n && !isnan(*v); i++) {
-    if (r->from > 0 && t[i * r->ncolumn] <= r->from) continue;
+    if (r->from > 0 && t[i * r->ncolumn] <= r->from)
+      continue;
     most = PetscMax(most, sign * (v[i * r->ncolumn] - (change ? v[(i - 1) * r->ncolumn] : 0)));
   }
   return isnan(*v) ? *v : sign * most;
@@ -200,8 +221,8 @@ static inline PetscReal record_size(const Record *r, const char *name, PetscBool
     char column[SB_NAME_MAX];
 
     (void)snprintf(column, sizeof(column), "%s_%c", name, "xyz"[k]);
-    most =
-      PetscMax(most, PetscMax(record_extreme(r, column, 1, change), -record_extreme(r, column, -1, change)));
+    most = PetscMax(
+      most, PetscMax(record_extreme(r, column, 1, change), -record_extreme(r, column, -1, change)));
   }
   return most;
 }
@@ -211,7 +232,8 @@ static inline PetscReal record_impulse(const Record *r, const char *name)
 {
   PetscReal sum = 0;
 
-  for (PetscInt i = 1; i < r->n; i++) sum += record_at(r, "dt", i) * record_at(r, name, i);
+  for (PetscInt i = 1; i < r->n; i++)
+    sum += record_at(r, "dt", i) * record_at(r, name, i);
   return sum;
 }
 
@@ -225,32 +247,37 @@ static inline PetscInt record_starts(const Record *r, const char *name)
   return starts;
 }
 
-/* Beginning of the first and end of the last step in which a column is above `least`, s; 0 if there is none. */
+/* Beginning of the first and end of the last step in which a column is above `least`, s; 0 if there
+   is none. */
 static inline void record_span(const Record *r, const char *name, PetscReal least, PetscReal *first,
                                PetscReal *last)
 {
   *first = *last = 0;
   for (PetscInt i = 0; i < r->n; i++) {
-    if (!(record_at(r, name, i) > least)) continue;
-    if (*last == 0) *first = i ? record_at(r, "t", i - 1) : 0;
+    if (!(record_at(r, name, i) > least))
+      continue;
+    if (*last == 0)
+      *first = i ? record_at(r, "t", i - 1) : 0;
     *last = record_at(r, "t", i);
   }
 }
 
 /* Appends the next value of a row; the first row defines the columns. */
-static inline PetscErrorCode record_put(Record *r, const char *first, const char *second, const char *third,
-                                        PetscReal value)
+static inline PetscErrorCode record_put(Record *r, const char *first, const char *second,
+                                        const char *third, PetscReal value)
 {
   PetscFunctionBeginUser;
   if (!r->kept) {
-    PetscCheck(record_count < PETSC_STATIC_ARRAY_LENGTH(record_kept), PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "more records");
-    if (!record_count) PetscCall(PetscRegisterFinalize(record_free_all));
+    PetscCheck(record_count < PETSC_STATIC_ARRAY_LENGTH(record_kept), PETSC_COMM_SELF,
+               PETSC_ERR_PLIB, "more records");
+    if (!record_count)
+      PetscCall(PetscRegisterFinalize(record_free_all));
     r->kept = ++record_count;
   }
   if (r->n == 0) {
     PetscCall(PetscRealloc((size_t)(r->ncolumn + 1) * sizeof(*r->name), &r->name));
-    PetscCall(PetscSNPrintf(r->name[r->ncolumn++], sizeof(*r->name), "%s%s%s", first, second, third));
+    PetscCall(
+      PetscSNPrintf(r->name[r->ncolumn++], sizeof(*r->name), "%s%s%s", first, second, third));
   }
   if (r->n * r->ncolumn + r->at >= r->room) {
     r->room = 2 * r->room + 256;
@@ -268,7 +295,9 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
   Record *r = (Record *)ctx;
   const SbModel m = run->model;
   const SbEnergies *e = &step->energies;
-  PetscReal force[3] = {0, 0, -m->mass * r->g}, missing = 0, sum[3 * CONTACT_BODIES], mass[CONTACT_BODIES];
+  PetscReal force[3] = {0, 0, -m->mass * r->g};
+  PetscReal missing = 0;
+  PetscReal sum[3 * CONTACT_BODIES], mass[CONTACT_BODIES];
   PetscReal energy = e->kinetic + e->strain + m->mass * r->g * e->centre[2];
 
   PetscFunctionBeginUser;
@@ -277,9 +306,12 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
   PetscCall(record_put(r, "dt", "", "", step->dt));
   PetscCall(record_put(r, "kinetic", "", "", e->kinetic));
   PetscCall(record_put(r, "strain", "", "", e->strain));
-  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "momentum_", xyz[k], "", e->momentum[k]));
-  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "angular_", xyz[k], "", e->angular[k]));
-  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "centre_", xyz[k], "", e->centre[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(record_put(r, "momentum_", xyz[k], "", e->momentum[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(record_put(r, "angular_", xyz[k], "", e->angular[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(record_put(r, "centre_", xyz[k], "", e->centre[k]));
   PetscCall(record_put(r, "volume", "", "", e->volume));
   PetscCall(record_put(r, "min_J", "", "", e->min_J));
   PetscCall(record_put(r, "speed", "", "", e->max_speed));
@@ -295,13 +327,17 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
     const SbEffect f = m->effect[i];
     PetscReal value[64] = {0};
 
-    if (!f->ops.begin_step && !f->ops.potential) continue;
-    if (run->reaction) PetscCall(contact_columns(run, step->t, run->reaction, f, value));
+    if (!f->ops.begin_step && !f->ops.potential)
+      continue;
+    if (run->reaction)
+      PetscCall(contact_columns(run, step->t, run->reaction, f, value));
     for (PetscInt c = 0; c < f->ncolumn; c++) {
       PetscCall(record_put(r, f->name, "_", f->column[c], value[c]));
-      if (!strcmp(f->column[c], "energy")) energy += value[c];
+      if (!strcmp(f->column[c], "energy"))
+        energy += value[c];
       for (int k = 0; k < 3; k++)
-        force[k] += !strncmp(f->column[c], "force_", 6) && f->column[c][6] == xyz[k][0] ? value[c] : 0;
+        force[k] +=
+          !strncmp(f->column[c], "force_", 6) && f->column[c][6] == xyz[k][0] ? value[c] : 0;
     }
   }
   PetscCall(record_put(r, "energy", "", "", energy));
@@ -313,18 +349,21 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &r->lowest, 1, MPIU_REAL, MPI_MIN, m->comm));
   }
   for (int k = 0; k < 3 && r->n; k++) {
-    const PetscReal before = r->value[(r->n - 1) * r->ncolumn + 4 + k]; // momentum_x and the two behind it
+    const PetscReal before =
+      r->value[(r->n - 1) * r->ncolumn + 4 + k]; // momentum_x and the two behind it
 
     missing = PetscMax(missing, PetscAbsReal(e->momentum[k] - before - step->dt * force[k]));
   }
   PetscCall(record_put(r, "missing", "", "", missing));
   if (r->forces) {
-    PetscReal push = 0, net = 0;
+    PetscReal push = 0;
+    PetscReal net = 0;
 
     PetscCall(contact_body_forces(run, step->t, sum));
     for (int k = 0; k < 3; k++) {
       push = PetscMax(push, PetscAbsReal(sum[k]));
-      for (PetscInt b = 1; b < m->nbody; b++) sum[k] += sum[3 * b + k];
+      for (PetscInt b = 1; b < m->nbody; b++)
+        sum[k] += sum[3 * b + k];
       net = PetscMax(net, PetscAbsReal(sum[k]));
     }
     PetscCall(record_put(r, "push", "", "", push));
@@ -355,7 +394,8 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
 }
 
 /* Solves and closes the scene of these options. */
-static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3) record_run(Record *r, const char *format, ...)
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3)
+  record_run(Record *r, const char *format, ...)
 {
   TestScene t;
   va_list args;
@@ -378,14 +418,17 @@ typedef struct {
 static inline void contact_ball(const VerifyPlace *place, PetscReal x[3])
 {
   const ContactBall *b = (const ContactBall *)place->ctx;
-  PetscReal layer = 0, length;
+  PetscReal layer = 0;
+  PetscReal length;
 
   for (int k = 0; k < 3; k++) {
-    if (!b->quarter || k == 2) x[k] = 2 * x[k] - 1;
+    if (!b->quarter || k == 2)
+      x[k] = 2 * x[k] - 1;
     layer = PetscMax(layer, PetscAbsReal(x[k]));
   }
   length = PetscSqrtReal(SbDot3(x, x));
-  for (int k = 0; k < 3; k++) x[k] *= length > 0 ? b->radius * layer / length : 0;
+  for (int k = 0; k < 3; k++)
+    x[k] *= length > 0 ? b->radius * layer / length : 0;
 }
 
 /* Writes a ball of n layers of cells across. */

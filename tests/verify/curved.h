@@ -1,6 +1,6 @@
 /*
-  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell,
-  mapped at all ten nodes of each tet (curved) or at the four vertices only (straight).
+  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets
+  per cell, mapped at all ten nodes of each tet (curved) or at the four vertices only (straight).
 */
 #pragma once
 #include "verify.h"
@@ -16,12 +16,14 @@ static inline PetscInt curved_number(PetscInt n, const PetscInt at[3])
   return at[2] * row * (row + 1) / 2 + at[1] * row - at[1] * (at[1] - 1) / 2 + at[0];
 }
 
-/* Writes tet w of the prism over base[3], ascending, from layer k; positively oriented if the base is counter-clockwise. */
+/* Writes tet w of the prism over base[3], ascending, from layer k; positively oriented if the base
+   is counter-clockwise. */
 static inline void curved_tet(FILE *f, PetscInt n, const PetscInt base[3][2], PetscInt k, int w,
                               PetscInt number, PetscBool second)
 {
-  static const int vertex[3][4][2] = {
-    {{0, 0}, {1, 0}, {2, 0}, {2, 1}}, {{0, 0}, {1, 0}, {2, 1}, {1, 1}}, {{0, 0}, {1, 1}, {2, 1}, {0, 1}}};
+  static const int vertex[3][4][2] = {{{0, 0}, {1, 0}, {2, 0}, {2, 1}},
+                                      {{0, 0}, {1, 0}, {2, 1}, {1, 1}},
+                                      {{0, 0}, {1, 1}, {2, 1}, {0, 1}}};
   static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}}; /* gmsh's order */
   PetscInt at[4][3];
 
@@ -35,17 +37,19 @@ static inline void curved_tet(FILE *f, PetscInt n, const PetscInt base[3][2], Pe
   for (int e = 0; e < 6 && second; e++) {
     PetscInt middle[3];
 
-    for (int i = 0; i < 3; i++) middle[i] = (at[edge[e][0]][i] + at[edge[e][1]][i]) / 2;
+    for (int i = 0; i < 3; i++)
+      middle[i] = (at[edge[e][0]][i] + at[edge[e][1]][i]) / 2;
     fprintf(f, " %d", (int)curved_number(n, middle) + 1);
   }
   fprintf(f, "\n");
 }
 
 /* See verify_mesh_write(). */
-static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap map, PetscBool second,
-                                               char path[512])
+static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap map,
+                                               PetscBool second, char path[512])
 {
-  PetscInt number = 0, at[3];
+  PetscInt number = 0;
+  PetscInt at[3];
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -56,7 +60,8 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
     for (at[2] = 0; at[2] <= 2 * m; at[2]++) {
       for (at[1] = 0; at[1] <= 2 * n; at[1]++) {
         for (at[0] = 0; at[0] <= 2 * n - at[1]; at[0]++) {
-          PetscReal x[3] = {0.5 * (PetscReal)at[0] / (PetscReal)n, 0.5 * (PetscReal)at[1] / (PetscReal)n,
+          PetscReal x[3] = {0.5 * (PetscReal)at[0] / (PetscReal)n,
+                            0.5 * (PetscReal)at[1] / (PetscReal)n,
                             0.5 * (PetscReal)at[2] / (PetscReal)m};
 
           map(x);
@@ -69,10 +74,11 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
       for (PetscInt j = 0; j < n; j++) {
         for (PetscInt i = 0; i < n - j; i++) {
           for (int w = 0; w < 6; w++) {
-            const PetscInt up[3][2] = {{i, j}, {i + 1, j}, {i, j + 1}},
-                           down[3][2] = {{i + 1, j}, {i, j + 1}, {i + 1, j + 1}};
+            const PetscInt up[3][2] = {{i, j}, {i + 1, j}, {i, j + 1}};
+            const PetscInt down[3][2] = {{i + 1, j}, {i, j + 1}, {i + 1, j + 1}};
 
-            if (w >= 3 && i == n - j - 1) continue;
+            if (w >= 3 && i == n - j - 1)
+              continue;
             curved_tet(f, n, w < 3 ? up : down, k, w % 3, ++number, second);
           }
         }
@@ -87,7 +93,9 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
 /* Map without any straight edge. */
 static inline void curved_wobble(PetscReal x[3])
 {
-  const PetscReal s = x[0], t = x[1], h = x[2];
+  const PetscReal s = x[0];
+  const PetscReal t = x[1];
+  const PetscReal h = x[2];
 
   x[0] += 0.06 * PetscSinReal(3. * t + 2. * h) + 0.1 * h * h;
   x[1] += 0.05 * PetscSinReal(4. * s - 3. * h);
@@ -97,9 +105,12 @@ static inline void curved_wobble(PetscReal x[3])
 /* Map to an eighth of the hollow sphere of radii 1 and 2. */
 static inline void curved_shell(PetscReal x[3])
 {
-  PetscReal d[3] = {x[0], x[1], 1. - x[0] - x[1]}, length;
+  PetscReal d[3] = {x[0], x[1], 1. - x[0] - x[1]};
+  PetscReal length;
 
   length = PetscSqrtReal(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  for (int k = 0; k < 3; k++) d[k] *= (1. + x[2]) / length;
-  for (int k = 0; k < 3; k++) x[k] = d[k];
+  for (int k = 0; k < 3; k++)
+    d[k] *= (1. + x[2]) / length;
+  for (int k = 0; k < 3; k++)
+    x[k] = d[k];
 }

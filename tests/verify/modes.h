@@ -1,6 +1,6 @@
 /*
-  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's stiffness and
-  mass matrices, also for free bodies: the factorised matrix is K + shift M.
+  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's
+  stiffness and mass matrices, also for free bodies: the factorised matrix is K + shift M.
 */
 #pragma once
 #include "verify.h"
@@ -38,7 +38,8 @@ static inline PetscErrorCode modes_factor(SbModel m, PetscReal shift, Vec U, KSP
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
-  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
+  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP,
+             "This PETSc has neither SuiteSparse nor MUMPS");
   PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
   PetscCall(PCSetFromOptions(pc));
   PetscCall(SbPCCheckPivots(pc));
@@ -46,17 +47,24 @@ static inline PetscErrorCode modes_factor(SbModel m, PetscReal shift, Vec U, KSP
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rayleigh-Ritz procedure: X, MX = M X_old, Z = A^-1 MX become the next X; value = eigenvalues of A, ascending. */
-static inline PetscErrorCode modes_ritz(SbSpace s, Vec X[], Vec MX[], Vec Z[], PetscReal value[MODES_BLOCK])
+/* Rayleigh-Ritz procedure: X, MX = M X_old, Z = A^-1 MX become the next X; value = eigenvalues of
+   A, ascending. */
+static inline PetscErrorCode modes_ritz(SbSpace s, Vec X[], Vec MX[], Vec Z[],
+                                        PetscReal value[MODES_BLOCK])
 {
-  const PetscBLASInt n = MODES_BLOCK, lwork = 4 * MODES_BLOCK;
+  const PetscBLASInt n = MODES_BLOCK;
+  const PetscBLASInt lwork = 4 * MODES_BLOCK;
   PetscScalar a[MODES_BLOCK * MODES_BLOCK], b[MODES_BLOCK * MODES_BLOCK], work[4 * MODES_BLOCK];
-  PetscBLASInt type = 1, info;
+  PetscBLASInt type = 1;
+  PetscBLASInt info;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecMDot(MX[i], MODES_BLOCK, Z, a + MODES_BLOCK * i));
-  for (int i = 0; i < MODES_BLOCK; i++) PetscCall(modes_times_mass(s, Z[i], MX[i]));
-  for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecMDot(MX[i], MODES_BLOCK, Z, b + MODES_BLOCK * i));
+  for (int i = 0; i < MODES_BLOCK; i++)
+    PetscCall(VecMDot(MX[i], MODES_BLOCK, Z, a + MODES_BLOCK * i));
+  for (int i = 0; i < MODES_BLOCK; i++)
+    PetscCall(modes_times_mass(s, Z[i], MX[i]));
+  for (int i = 0; i < MODES_BLOCK; i++)
+    PetscCall(VecMDot(MX[i], MODES_BLOCK, Z, b + MODES_BLOCK * i));
   LAPACKsygv_(&type, "V", "U", &n, a, &n, b, &n, value, work, &lwork, &info);
   PetscCheck(!info, PETSC_COMM_WORLD, PETSC_ERR_LIB, "LAPACK's sygv fails with %d", (int)info);
   for (int i = 0; i < MODES_BLOCK; i++) {
@@ -66,7 +74,8 @@ static inline PetscErrorCode modes_ritz(SbSpace s, Vec X[], Vec MX[], Vec Z[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lowest MODES_BLOCK eigenvalues, 1/s^2, the first half of them to 1e-6; `shift` (1/s^2) is of the same magnitude. Collective. */
+/* Lowest MODES_BLOCK eigenvalues, 1/s^2, the first half of them to 1e-6; `shift` (1/s^2) is of the
+   same magnitude. Collective. */
 static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal value[MODES_BLOCK])
 {
   PetscReal last = 0.;
@@ -81,7 +90,8 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
   PetscCall(VecDuplicateVecs(U, MODES_BLOCK, &Z));
   PetscCall(modes_factor(m, shift, U, &ksp));
   PetscCall(PetscRandomCreate(PETSC_COMM_WORLD, &random));
-  for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecSetRandom(X[i], random));
+  for (int i = 0; i < MODES_BLOCK; i++)
+    PetscCall(VecSetRandom(X[i], random));
   PetscCall(PetscRandomDestroy(&random));
   for (int k = 0; k < 60; k++) {
     for (int i = 0; i < MODES_BLOCK; i++) {
@@ -89,10 +99,12 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
       PetscCall(KSPSolve(ksp, MX[i], Z[i]));
     }
     PetscCall(modes_ritz(m->space, X, MX, Z, value));
-    if (PetscAbsReal(value[MODES_BLOCK / 2] - last) < 1e-6 * value[MODES_BLOCK / 2]) break;
+    if (PetscAbsReal(value[MODES_BLOCK / 2] - last) < 1e-6 * value[MODES_BLOCK / 2])
+      break;
     last = value[MODES_BLOCK / 2];
   }
-  for (int i = 0; i < MODES_BLOCK; i++) value[i] -= shift;
+  for (int i = 0; i < MODES_BLOCK; i++)
+    value[i] -= shift;
   PetscCall(VecDestroyVecs(MODES_BLOCK, &X));
   PetscCall(VecDestroyVecs(MODES_BLOCK, &MX));
   PetscCall(VecDestroyVecs(MODES_BLOCK, &Z));

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and Cook's
-  membrane (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a compromise between
-  both problems and verify_locking.c; docs/reports/locking.md has finer meshes.
+  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and
+  Cook's membrane (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a
+  compromise between both problems and verify_locking.c; docs/reports/locking.md has finer meshes.
 */
 #include "locking.h"
 
@@ -23,10 +23,11 @@ static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
 
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver cholmod", element));
     PetscCall(locking_bar(n, nu, more, value, &cost));
-    test_print("  bar, nu %-6g %s n %d: %.6f (%.2f %%), %.5f J (%.2f %%)\n", nu, element, (int)n, value[0],
-               100. * (value[0] / tip - 1.), value[1], 100. * (value[1] / energy - 1.));
+    test_print("  bar, nu %-6g %s n %d: %.6f (%.2f %%), %.5f J (%.2f %%)\n", nu, element, (int)n,
+               value[0], 100. * (value[0] / tip - 1.), value[1], 100. * (value[1] / energy - 1.));
     if (e == 0) {
-      SB_CHECK(value[0] / tip < (nu > 0.4 ? 0.8 : 0.9), "P1 bends by %g: too much for this test", value[0]);
+      SB_CHECK(value[0] / tip < (nu > 0.4 ? 0.8 : 0.9), "P1 bends by %g: too much for this test",
+               value[0]);
     } else {
       SB_CHECK_NEAR(value[0], tip, (n == 4 ? 0.02 : 0.01) * PetscAbsReal(tip), element);
       SB_CHECK_NEAR(value[1], energy, (n == 4 ? 0.03 : 0.01) * energy, element);

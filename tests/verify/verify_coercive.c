@@ -1,20 +1,23 @@
 // @ranks 1
 /*
-  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties.
-  All eigenvalues of D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly
-  six are zero, the rigid modes, none is negative. The scaling removes mesh size: the largest eigenvalue is
-  between 1 and the number of entries of a row.
+  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and
+  penalties. All eigenvalues of D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes
+  by LAPACK: exactly six are zero, the rigid modes, none is negative. The scaling removes mesh size:
+  the largest eigenvalue is between 1 and the number of entries of a row.
 
-    meshes    random perturbations of vertices; size ratios of tets of 1000 to 1; tets with angles of 0.06 degrees
-    gammas    CR and DG with default penalties, and DG with both gammas at 0.01: positive for every positive gamma
-    state     at rest, where all materials are linear elastic, and rotated by two rad, where K is the rotated one at rest
-    pressed   nu = 0.499, uniformly compressed or stretched to a pressure of half the shear modulus, with fixed boundary: still
-              positive. Face terms are as stiff as the shear modulus, so that CR and DG are unstable at a larger pressure where
-              the solid is stable, as neo-Hookean P2; the limits are printed
+    meshes    random perturbations of vertices; size ratios of tets of 1000 to 1; tets with angles
+    of 0.06 degrees gammas    CR and DG with default penalties, and DG with both gammas at 0.01:
+    positive for every positive gamma state     at rest, where all materials are linear elastic, and
+    rotated by two rad, where K is the rotated one at rest
+    pressed   nu = 0.499, uniformly compressed or stretched to a pressure of half the shear modulus,
+    with fixed boundary: still
+              positive. Face terms are as stiff as the shear modulus, so that CR and DG are unstable
+              at a larger pressure where the solid is stable, as neo-Hookean P2; the limits are
+              printed
     not so    with gamma1 = 1e-12 CR has many zero-energy modes (Falk 1991): the test detects them
 
-  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the
-  largest one.
+  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14
+  of the largest one.
 */
 #include "verify.h"
 
@@ -22,7 +25,11 @@
 
 #define ROUNDING 1e-13
 
-typedef enum { MOVED, GRADED, SLIVERS } Shape;
+typedef enum {
+  MOVED,
+  GRADED,
+  SLIVERS
+} Shape;
 static const char *const shapes[] = {"moved", "graded", "slivers"};
 
 typedef struct {
@@ -35,9 +42,11 @@ static void place_vertex(const VerifyPlace *place, PetscReal x[3])
   const MeshContext *m = (const MeshContext *)place->ctx;
   PetscReal r[3];
 
-  for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
+  for (int k = 0; k < 3; k++)
+    (void)PetscRandomGetValueReal(m->random, &r[k]);
   if (m->shape == MOVED) {
-    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)place->n[k];
+    for (int k = 0; k < 3; k++)
+      x[k] += (0.5 * r[k] - 0.25) / (PetscReal)place->n[k];
   } else if (m->shape == GRADED) {
     /* a cone truncated at a thousandth of its length */
     const PetscReal size = PetscPowReal(10., 3. * (x[0] - 1.));
@@ -72,9 +81,12 @@ static PetscErrorCode spectrum(TestScene *t, PetscInt *count, PetscReal **w)
   PetscCall(PetscMalloc1(*count, w));
   PetscCall(PetscMalloc2(*count, &d, lwork, &work));
   PetscCall(MatDenseGetArray(dense, &a));
+
   /* a negative diagonal entry keeps its sign, and so does the lowest eigenvalue */
-  for (PetscInt i = 0; i < *count; i++) d[i] = PetscSqrtReal(PetscAbsReal(a[i + *count * i]));
-  for (PetscInt i = 0; i < *count * *count; i++) a[i] /= d[i % *count] * d[i / *count];
+  for (PetscInt i = 0; i < *count; i++)
+    d[i] = PetscSqrtReal(PetscAbsReal(a[i + *count * i]));
+  for (PetscInt i = 0; i < *count * *count; i++)
+    a[i] /= d[i % *count] * d[i / *count];
   PetscCallBLAS("LAPACKsyev", LAPACKsyev_("N", "U", &n, a, &n, *w, work, &lwork, &info));
   SB_CHECK(info == 0, "LAPACK: %d", (int)info);
   PetscCall(MatDenseRestoreArray(dense, &a));
@@ -89,47 +101,55 @@ typedef struct {
   PetscReal nu, angle;
 } Case;
 
-/* Zero eigenvalues are those at the level of rounding; spurious modes add more of them, or hardly stiffer ones. */
+/* Zero eigenvalues are those at the level of rounding; spurious modes add more of them, or hardly
+   stiffer ones. */
 static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, PetscBool sound)
 {
   TestScene t;
-  PetscInt n, zeros = 0, soft = 0;
+  PetscInt n;
+  PetscInt zeros = 0;
+  PetscInt soft = 0;
   PetscReal *w;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
-                      "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
-                      path, c->element, c->law, c->nu, c->gammas));
-  PetscCall(verify_turn(&t, (const PetscReal[3]){1., 2., 3.}, c->angle, (const PetscReal[3]){0., 0., 0.}));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
+              "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
+              path, c->element, c->law, c->nu, c->gammas));
+  PetscCall(
+    verify_turn(&t, (const PetscReal[3]){1., 2., 3.}, c->angle, (const PetscReal[3]){0., 0., 0.}));
   PetscCall(spectrum(&t, &n, &w));
   for (PetscInt i = 0; i < n; i++) {
     zeros += w[i] <= ROUNDING * w[n - 1];
     soft += w[i] <= 1e-9 * w[n - 1];
   }
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s %-10s %-7s nu %-8g %s: %4d unknowns, eigenvalues %9.1e .. %8.1e | %.3e .. %.2f, %d zero\n",
-    c->element, c->law, shapes[shape], c->nu, c->gammas, (int)n, w[0], w[5], w[6], w[n - 1], (int)zeros));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %s %-10s %-7s nu %-8g %s: %4d unknowns, eigenvalues %9.1e .. %8.1e | "
+                        "%.3e .. %.2f, %d zero\n",
+                        c->element, c->law, shapes[shape], c->nu, c->gammas, (int)n, w[0], w[5],
+                        w[6], w[n - 1], (int)zeros));
   if (shape == SLIVERS)
     SB_CHECK(t.model->body[0].min_dihedral < 1., "the flattest tet has %g degrees",
              t.model->body[0].min_dihedral);
   if (sound) {
-    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape], c->nu,
-             c->gammas, w[0]);
-    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape], c->nu,
-             c->gammas, (int)zeros);
+    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element,
+             shapes[shape], c->nu, c->gammas, w[0]);
+    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape],
+             c->nu, c->gammas, (int)zeros);
   } else {
-    SB_CHECK(soft > 30, "%s, %s %s: %d soft motions, which the test should see", c->element, shapes[shape],
-             c->gammas, (int)soft);
+    SB_CHECK(soft > 30, "%s, %s %s: %d soft motions, which the test should see", c->element,
+             shapes[shape], c->gammas, (int)soft);
   }
   PetscCall(PetscFree(w));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smallest eigenvalue, relative to the largest, of a cube under a uniform pressure of `ratio` times mu. */
-static PetscErrorCode pressed(const char *element, const char *law, PetscReal ratio, PetscReal *smallest)
+/* Smallest eigenvalue, relative to the largest, of a cube under a uniform pressure of `ratio` times
+   mu. */
+static PetscErrorCode pressed(const char *element, const char *law, PetscReal ratio,
+                              PetscReal *smallest)
 {
   TestScene t;
   PetscInt n;
@@ -138,15 +158,17 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
-                      "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
-                      "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
-                      element, law));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
+              "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
+              "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
+              element, law));
   m = t.model->material[0];
   eps = ratio * m->mu / (3. * SbMaterialBulkModulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
-  for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++) u[i] = -eps * t.model->space->node_x[i];
+  for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++)
+    u[i] = -eps * t.model->space->node_x[i];
   PetscCall(VecRestoreArray(t.run->U, &u));
   PetscCall(SbSpaceFollowJumps(t.model->space, t.run->U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(spectrum(&t, &n, &w));
@@ -159,21 +181,25 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
 static PetscErrorCode check_pressed(const char *element, const char *law)
 {
   static const PetscReal ratios[] = {0.5, 1., 2., 5., 10., 50.};
-  PetscReal smallest = 0., reached[2] = {0., 0.};
+  PetscReal smallest = 0.;
+  PetscReal reached[2] = {0., 0.};
 
   PetscFunctionBeginUser;
   for (int stretched = 0; stretched < 2; stretched++) {
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(ratios); k++) {
       PetscCall(pressed(element, law, stretched ? -ratios[k] : ratios[k], &smallest));
-      if (smallest <= 0.) break;
+      if (smallest <= 0.)
+        break;
       reached[stretched] = ratios[k];
     }
   }
-  test_print("  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law, reached[0],
-             reached[1]);
+  test_print("  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law,
+             reached[0], reached[1]);
+
   /* the energy of the mean volume, summed over the body, is that of its boundary */
   if (!strcmp(element, "p2") && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50. && reached[1] == 50., "P2 is not stable under even pressures");
+
   /* the jump penalty adapts to the pressure */
   if ((!strcmp(element, "cr") || !strcmp(element, "dg")) && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50., "%s is not stable under even pressures", element);
@@ -185,8 +211,8 @@ static PetscErrorCode check_pressed(const char *element, const char *law)
 static PetscErrorCode check_mesh(Shape shape)
 {
   static const PetscReal nus[] = {0.3, 0.4999, 0.499999};
-  static const char *const laws[] = {"corotated -body_a_tangent warped", "corotated -body_a_tangent exact",
-                                     "stvk", "neohookean"};
+  static const char *const laws[] = {"corotated -body_a_tangent warped",
+                                     "corotated -body_a_tangent exact", "stvk", "neohookean"};
   static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
   static const char *const little = "-body_a_gamma0 0.01 -body_a_gamma1 0.01";
   MeshContext m = {.shape = shape};
@@ -204,8 +230,10 @@ static PetscErrorCode check_mesh(Shape shape)
     PetscCall(check_case(shape, path, &(Case){"p2", "linear", "", nus[k], 0.}, PETSC_TRUE));
   }
   PetscCall(check_case(shape, path, &(Case){"dg", "linear", little, 0.3, 0.}, PETSC_TRUE));
-  PetscCall(check_case(shape, path, &(Case){"cr", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
-  PetscCall(check_case(shape, path, &(Case){"dg", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
+  PetscCall(
+    check_case(shape, path, &(Case){"cr", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
+  PetscCall(
+    check_case(shape, path, &(Case){"dg", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
   for (int law = 0; law < 4 && shape == MOVED; law++) {
     PetscCall(check_case(shape, path, &(Case){"cr", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"dg", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
@@ -217,7 +245,8 @@ static PetscErrorCode check_mesh(Shape shape)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  for (Shape shape = MOVED; shape <= SLIVERS; shape++) PetscCall(check_mesh(shape));
+  for (Shape shape = MOVED; shape <= SLIVERS; shape++)
+    PetscCall(check_mesh(shape));
   for (int e = 0; e < 4; e++) {
     static const char *const elements[] = {"p1", "cr", "dg", "p2"};
 

@@ -2,15 +2,16 @@
 /*
   Contact with rigid obstacles.
 
-    press      a block under a load on a plane: uniform stress, the obstacle carries the load, the gap is closed
-    fall       a block falls on a plane: no step gains energy (implicit Euler), the momentum changes by weight and contact
+    press      a block under a load on a plane: uniform stress, the obstacle carries the load, the
+    gap is closed fall       a block falls on a plane: no step gains energy (implicit Euler), the
+    momentum changes by weight and contact
                force only, and no node is behind the plane at the end of a step
-    incline    friction on a slope of tan = 0.5: a block sticks with 0.51, keeps its speed with 0.5, slides at g (sin - mu cos) with 0.49
-    held       static friction balances a load along the floor
+    incline    friction on a slope of tan = 0.5: a block sticks with 0.51, keeps its speed with 0.5,
+    slides at g (sin - mu cos) with 0.49 held       static friction balances a load along the floor
     corner     a block slides along a floor and a wall, each with friction: g - mu (N + N')
     indent     a capsule indents a block and is dragged: the four responses give the same force
-    bounds     a beam that sags on a plane: the same displacement as by PETSc's solver of variational inequalities
-    hertz      a rigid sphere on a half-space: force against approach
+    bounds     a beam that sags on a plane: the same displacement as by PETSc's solver of
+    variational inequalities hertz      a rigid sphere on a half-space: force against approach
 */
 #include "hertz.h"
 
@@ -18,7 +19,8 @@
 
 #define LOAD 500.0 /* Pa */
 
-/* A column between two planes of symmetry, loaded from above: u = -p/E (-nu x, -nu y, z), with nu = 0.3. */
+/* A column between two planes of symmetry, loaded from above: u = -p/E (-nu x, -nu y, z), with nu =
+   0.3. */
 static PetscErrorCode check_press(const char *element, const char *response, PetscReal stiffness,
                                   PetscReal tolerance)
 {
@@ -28,20 +30,21 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
 
   PetscFunctionBeginUser;
   verify_case("press, %s, %s", element, response);
-  PetscCall(
-    test_open(&t,
-              "-bodies a -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects "
-              "x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type "
-              "fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction -effect_load_on "
-              "zmax -effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_response projected "
-              "-effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s "
-              "-effect_floor_stiffness %g" VERIFY_BODY("a", "box:0.1,0.1,0.05:4", "linear", "1e5", "0.3"),
-              element, -LOAD, response, stiffness));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects "
+    "x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type "
+    "fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction -effect_load_on "
+    "zmax -effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_response projected "
+    "-effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s "
+    "-effect_floor_stiffness %g" VERIFY_BODY("a", "box:0.1,0.1,0.05:4", "linear", "1e5", "0.3"),
+    element, -LOAD, response, stiffness));
   PetscCall(record_solve(&t, &r));
   PetscCall(contact_stress_error(&t, LOAD, &worst));
   PetscCall(test_scene_close(&t));
   VERIFY_LESS(worst, 1e-6, "stress from uniform, of the load");
-  VERIFY_NEAR(record_last(&r, "floor_force_z"), LOAD * 0.01, 1e-6 * LOAD * 0.01, "force of the floor, N");
+  VERIFY_NEAR(record_last(&r, "floor_force_z"), LOAD * 0.01, 1e-6 * LOAD * 0.01,
+              "force of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_penetration"), 0, tolerance, "penetration, m");
   VERIFY_MORE(record_last(&r, "floor_contacts"), 20, "contacts");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -56,20 +59,22 @@ static PetscErrorCode check_fall(const char *element, const char *response)
 
   PetscFunctionBeginUser;
   verify_case("fall, %s, %s", element, response);
-  PetscCall(
-    record_run(&r,
-               "-bodies a -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 -body_a_velocity 0,0,-0.5 "
-               "-body_a_element %s -effects gravity,floor -effect_floor_type contact -effect_floor_response "
-               "projected -effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time "
-               "euler_implicit -ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10" VERIFY_BODY(
-                 "a", "box:0.1,0.1,0.1:2", "corotated", "1e4", "0.3"),
-               element, response));
+  PetscCall(record_run(
+    &r,
+    "-bodies a -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 -body_a_velocity 0,0,-0.5 "
+    "-body_a_element %s -effects gravity,floor -effect_floor_type contact -effect_floor_response "
+    "projected -effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time "
+    "euler_implicit -ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10" VERIFY_BODY(
+      "a", "box:0.1,0.1,0.1:2", "corotated", "1e4", "0.3"),
+    element, response));
+
   /* kinetic and potential energy 0.5 J at the start; momentum 0.7 kg m/s at impact */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-7, "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-7, "momentum that no force explains, kg m/s");
   VERIFY_MORE(record_impulse(&r, "floor_force_z"), 1, "impulse of the floor, N s");
   VERIFY_MORE(record_max(&r, "floor_force_z"), 3 * r.mass * 9.81, "largest force of the floor, N");
-  if (exact) VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * 0.17, "penetration, m");
+  if (exact)
+    VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * 0.17, "penetration, m");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,7 +83,8 @@ static PetscErrorCode check_fall(const char *element, const char *response)
 static PetscErrorCode check_incline(const char *element, const char *response, PetscReal mu)
 {
   static const PetscReal time[2] = {0.3, 0.6};
-  const PetscReal normal = 9.81 * 2 / PetscSqrtReal(5), a = normal * (0.5 - mu);
+  const PetscReal normal = 9.81 * 2 / PetscSqrtReal(5);
+  const PetscReal a = normal * (0.5 - mu);
   PetscReal t[2] = {0}, v[2], x[2], h, way; /* of the centroid along the slope */
   Record r = {0};
 
@@ -87,13 +93,17 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   PetscCall(record_run(
     &r,
     "-bodies a -body_a_element %s -effects gravity,floor -effect_gravity_vector %.15g,0,%.15g "
-    "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
-    "-effect_floor_friction %g -effect_floor_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time "
+    "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
+    "plane:0,0,1,0 "
+    "-effect_floor_friction %g -effect_floor_response %s -time euler_implicit -ts_dt 0.01 "
+    "-ts_max_time "
     "0.6" VERIFY_BODY("a", "box:0.1,0.1,0.05:3", "corotated", "1e6", "0.3"),
     element, 0.5 * normal, -normal, mu, response));
-  for (PetscInt i = r.n - 1; i >= 0; i--) { /* first step that ends there or, after a divided step, later */
+  for (PetscInt i = r.n - 1; i >= 0;
+       i--) { /* first step that ends there or, after a divided step, later */
     for (int k = 0; k < 2; k++) {
-      if (record_at(&r, "t", i) < time[k] - 1e-9) continue;
+      if (record_at(&r, "t", i) < time[k] - 1e-9)
+        continue;
       t[k] = record_at(&r, "t", i);
       v[k] = record_at(&r, "a_vx", i);
       x[k] = record_at(&r, "centre_x", i);
@@ -101,6 +111,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   }
   h = t[1] - t[0];
   way = x[1] - x[0];
+
   /* solves that take N from the previous solve needed 540 to 910 when the block slides */
   VERIFY_LESS(r.newton, 7 * 60, "solves for 60 steps");
   if (mu > 0.5) {
@@ -109,7 +120,8 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   } else {
     /* implicit Euler: x1 - x0 = v0 h + a h (h + dt) / 2 */
     VERIFY_NEAR((v[1] - v[0]) / h, a, 0.01 * a + 1e-6, "acceleration, m/s^2");
-    VERIFY_NEAR(way - v[0] * h, 0.5 * a * h * (h + 0.01), 0.01 * 0.5 * a * h * h + 1e-8, "distance, m");
+    VERIFY_NEAR(way - v[0] * h, 0.5 * a * h * (h + 0.01), 0.01 * 0.5 * a * h * h + 1e-8,
+                "distance, m");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -118,7 +130,8 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
 
 static PetscErrorCode check_held(const char *response)
 {
-  const PetscReal load = 100 * 0.1 * 0.05; /* N; the weight is 4.9 N, so the friction limit is 1.47 N */
+  const PetscReal load =
+    100 * 0.1 * 0.05; /* N; the weight is 4.9 N, so the friction limit is 1.47 N */
   Record r = {0};
 
   PetscFunctionBeginUser;
@@ -126,9 +139,11 @@ static PetscErrorCode check_held(const char *response)
   PetscCall(record_run(
     &r,
     "-bodies a -effects gravity,side,load,floor -effect_side_type fixed -effect_side_on xmin "
-    "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector 100;0;0 "
+    "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector "
+    "100;0;0 "
     "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
-    "-effect_floor_obstacle plane:0,0,1,1e-5 -effect_floor_friction 0.3 -effect_floor_response %s -time "
+    "-effect_floor_obstacle plane:0,0,1,1e-5 -effect_floor_friction 0.3 -effect_floor_response %s "
+    "-time "
     "static" VERIFY_BODY("a", "box:0.1,0.1,0.05:2", "linear", "1e5", "0.3"),
     response));
   VERIFY_NEAR(record_last(&r, "floor_force_x"), -load, 1e-5 * load, "friction against the load, N");
@@ -138,27 +153,35 @@ static PetscErrorCode check_held(const char *response)
 
 /* ------------------------------------------------------------------ corner */
 
-/* Nodes on the common edge are in contact with both planes: friction with one must not reduce the force of the other. */
+/* Nodes on the common edge are in contact with both planes: friction with one must not reduce the
+   force of the other. */
 static PetscErrorCode check_corner(const char *response)
 {
-  const PetscReal push[3] = {-5, 6, -8}, mu = 0.3, a = push[1] + mu * (push[0] + push[2]), end = 0.3;
+  const PetscReal push[3] = {-5, 6, -8};
+  const PetscReal mu = 0.3;
+  const PetscReal a = push[1] + mu * (push[0] + push[2]);
+  const PetscReal end = 0.3;
   Record r = {0};
 
   PetscFunctionBeginUser;
   verify_case("corner, %s", response);
   PetscCall(record_run(
     &r,
-    "-bodies a -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g -effect_floor_type contact "
+    "-bodies a -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g -effect_floor_type "
+    "contact "
     "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_floor_response %s "
     "-effect_wall_type contact -effect_wall_response projected -effect_wall_obstacle plane:1,0,0,0 "
-    "-effect_wall_friction %g -effect_wall_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time "
+    "-effect_wall_friction %g -effect_wall_response %s -time euler_implicit -ts_dt 0.01 "
+    "-ts_max_time "
     "%g" VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "1e5", "0.3"),
     push[0], push[1], push[2], mu, response, mu, response, end));
-  VERIFY_NEAR(record_last(&r, "momentum_y"), a * end, 0.01 * a * end, "momentum along both, kg m/s");
+  VERIFY_NEAR(record_last(&r, "momentum_y"), a * end, 0.01 * a * end,
+              "momentum along both, kg m/s");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), -push[2], 1e-3 * -push[2], "force of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_force_y"), mu * push[2], 2e-3 * mu * -push[2],
               "friction of the floor, N");
-  VERIFY_NEAR(record_last(&r, "floor_force_x"), 0, 1e-2 * mu * -push[2], "friction across the motion, N");
+  VERIFY_NEAR(record_last(&r, "floor_force_x"), 0, 1e-2 * mu * -push[2],
+              "friction across the motion, N");
   VERIFY_LESS(r.newton, 15 * 30, "solves for 30 steps");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -168,23 +191,26 @@ static PetscErrorCode check_corner(const char *response)
 #define INDENT_STEPS 20
 #define INDENT_DT 0.02 /* s */
 
-/* Force of the indenter, N, at the ends of the steps [INDENT_STEPS + 1][3]; at most `most` linear solves. */
-static PetscErrorCode indent(const char *response, const char *more, PetscInt most, PetscReal force[][3])
+/* Force of the indenter, N, at the ends of the steps [INDENT_STEPS + 1][3]; at most `most` linear
+   solves. */
+static PetscErrorCode indent(const char *response, const char *more, PetscInt most,
+                             PetscReal force[][3])
 {
   static const char *const columns[3] = {"tool_force_x", "tool_force_y", "tool_force_z"};
   Record r = {0};
 
   PetscFunctionBeginUser;
   verify_case("indent, %s %s", response, more);
-  PetscCall(
-    record_run(&r,
-               "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin -effect_tool_type "
-               "contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle "
-               "capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 -effect_tool_displacement "
-               "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s -effect_tool_friction 0.3 "
-               "-time euler_implicit -ts_dt %g -ts_max_time 0.4 %s" VERIFY_BODY("a", "box:0.1,0.06,0.04:4",
-                                                                                "corotated", "2e4", "0.4"),
-               response, INDENT_DT, more));
+  PetscCall(record_run(
+    &r,
+    "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin -effect_tool_type "
+    "contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle "
+    "capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 -effect_tool_displacement "
+    "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s -effect_tool_friction 0.3 "
+    "-time euler_implicit -ts_dt %g -ts_max_time 0.4 %s" VERIFY_BODY("a", "box:0.1,0.06,0.04:4",
+                                                                     "corotated", "2e4", "0.4"),
+    response, INDENT_DT, more));
+
   /* solves that take N from the previous solve needed 1700 to 2400 */
   VERIFY_LESS(r.newton, most, "solves");
   PetscCall(PetscArrayzero(force[0], 3 * (INDENT_STEPS + 1)));
@@ -192,8 +218,10 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
     const PetscReal step = record_at(&r, "t", i) / INDENT_DT;
     const PetscInt at = (PetscInt)PetscFloorReal(step + 0.5);
 
-    if (PetscAbsReal(step - (PetscReal)at) > 1e-7) continue; /* a substep */
-    for (int k = 0; k < 3; k++) force[at][k] = record_at(&r, columns[k], i);
+    if (PetscAbsReal(step - (PetscReal)at) > 1e-7)
+      continue; /* a substep */
+    for (int k = 0; k < 3; k++)
+      force[at][k] = record_at(&r, columns[k], i);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -224,9 +252,10 @@ static PetscErrorCode check_indent(void)
 
 /* ------------------------------------------------------------------ bounds */
 
-#define BEAM                                                                                              \
-  "-bodies a -body_a_mesh box:1,0.2,0.1:2 -body_a_material linear -body_a_young 2e6 -body_a_poisson 0.3 " \
-  "-body_a_density 100 -body_a_element p1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-12 "                 \
+#define BEAM                                                                              \
+  "-bodies a -body_a_mesh box:1,0.2,0.1:2 -body_a_material linear -body_a_young 2e6 "     \
+  "-body_a_poisson 0.3 "                                                                  \
+  "-body_a_density 100 -body_a_element p1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-12 " \
   "-effect_clamp_type fixed -effect_clamp_on xmin "
 
 static PetscErrorCode vi_function(SNES snes, Vec U, Vec F, void *ctx)
@@ -265,7 +294,8 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscCall(VecSet(upper, PETSC_INFINITY));
   PetscCall(VecGetArray(lower, &low));
   for (PetscInt i = 0; i < m->space->nnode_owned; i++)
-    if (!m->space->fixed[i]) low[3 * i + 2] = floor - m->space->node_x[3 * i + 2];
+    if (!m->space->fixed[i])
+      low[3 * i + 2] = floor - m->space->node_x[3 * i + 2];
   PetscCall(VecRestoreArray(lower, &low));
   PetscCall(SNESCreate(m->comm, &snes));
   PetscCall(SNESSetType(snes, SNESVINEWTONRSLS));
@@ -281,7 +311,8 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscCall(PCSetType(pc, PCJACOBI));
   PetscCall(KSPSetTolerances(ksp, 1e-13, 1e-14, PETSC_DEFAULT, 10000));
   PetscCall(SNESSetOptionsPrefix(snes, "vi_"));
-  PetscCall(PetscOptionsSetValue(NULL, "-vi_snes_vi_zero_tolerance", "1e-9")); /* m: active bounds */
+  PetscCall(
+    PetscOptionsSetValue(NULL, "-vi_snes_vi_zero_tolerance", "1e-9")); /* m: active bounds */
   PetscCall(SNESSetFromOptions(snes));
   PetscCall(SNESSolve(snes, NULL, U));
   PetscCall(SNESGetConvergedReason(snes, &reason));
@@ -303,13 +334,14 @@ static PetscErrorCode check_bounds(void)
 
   PetscFunctionBeginUser;
   verify_case("bounds");
-  PetscCall(test_open(&t,
-                      BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
-                           "projected -effect_floor_obstacle plane:0,0,1,%g",
-                      floor));
-  PetscCall(record_solve(&t, &r));
   PetscCall(
-    test_open(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
+    test_open(&t,
+              BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
+                   "projected -effect_floor_obstacle plane:0,0,1,%g",
+              floor));
+  PetscCall(record_solve(&t, &r));
+  PetscCall(test_open(
+    &free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
   free.model->load = 1;
   PetscCall(VecDuplicate(free.run->U, &U));
   PetscCall(solve_bounded(free.model, free.run->J, floor, U));
@@ -343,13 +375,15 @@ static void hertz_map(const VerifyPlace *place, PetscReal x[3])
 }
 
 /*
-  Hertz: a rigid sphere of radius R with approach d to a half-space has the contact radius a = sqrt(R d) and
-  the force 4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The far faces have the displacement of a half-space under that
-  point force (Boussinesq); at their distance of 20 a the difference is of the order (a/r)^2 of it.
+  Hertz: a rigid sphere of radius R with approach d to a half-space has the contact radius a =
+  sqrt(R d) and the force 4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The far faces have the displacement of
+  a half-space under that point force (Boussinesq); at their distance of 20 a the difference is of
+  the order (a/r)^2 of it.
 */
 static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal tolerance)
 {
-  const PetscReal d = HERTZ_A * HERTZ_A, E = 1e5;
+  const PetscReal d = HERTZ_A * HERTZ_A;
+  const PetscReal E = 1e5;
   const PetscReal P = 4. / 3 * E / (1 - POISSON * POISSON) * PetscPowReal(d, 1.5);
   const PetscInt n[3] = {cells, cells, cells};
   Record record = {0};
@@ -361,17 +395,22 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
   PetscCall(boussinesq(P, E, -1, 0, sizeof(far), far));
   PetscCall(record_run(
     &record,
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g -body_a_poisson "
-    "%g -body_a_density 1 -sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
-    "-set_x1_at plane:1,0,0,1 -set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g "
+    "-body_a_poisson "
+    "%g -body_a_density 1 -sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at "
+    "plane:0,1,0,0 "
+    "-set_x1_at plane:1,0,0,1 -set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at "
+    "plane:0,0,1,0 "
     "-time static -ksp_rtol 1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_far_type "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+    "-effect_far_type "
     "prescribed_displacement -effect_far_on x1,y1,z1 -effect_far_displacement %s "
     "-effect_ball_type contact -effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
     path, element, E, POISSON, far, 1 - d));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));
-  VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance, "force against that of Hertz");
+  VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance,
+              "force against that of Hertz");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,11 +2,14 @@
 /*
   P2 on second-order meshes with curved tets, interior edges included:
 
-    patch       an affine displacement of the boundary extends to all nodes, for every material; a uniform pressure on the curved surface is in
-                equilibrium with the uniform stress; both up to rounding, as the quadrature is exact for these polynomials
+    patch       an affine displacement of the boundary extends to all nodes, for every material; a
+    uniform pressure on the curved surface is in
+                equilibrium with the uniform stress; both up to rounding, as the quadrature is exact
+                for these polynomials
     rigid       a rotation gives neither force nor energy
-    sums        volume of the body, lumped and consistent mass, force of a load on a curved facet: exact
-    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets; effectivity of the
+    sums        volume of the body, lumped and consistent mass, force of a load on a curved facet:
+    exact sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner
+    wall, curved and straight tets; effectivity of the
                 error estimate of the ledger
     ranks       the same displacement as on one rank, also from an .h5 file read in slabs
     refused     error for a tet whose Jacobian is not positive, with its number
@@ -51,13 +54,13 @@ static PetscErrorCode check_patch(const char *mesh, const char *law, const char 
   PetscReal error;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    test_open(&t,
-              "-bodies a -body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
-              "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
-              "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
-              "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
-              volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
+    "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
+    "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
+    "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
+    volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law));
   PetscCall(verify_solve(&t, "patch test"));
   PetscCall(affine_error(&t, A, &error));
   test_print("  patch test, %s, %s: %.1e\n", law, volume, error);
@@ -73,12 +76,14 @@ static void turn(const PetscReal x[3], PetscReal v[3])
 
   verify_rotation(axis, 1., R);
   verify_apply(R, x, v);
-  for (int k = 0; k < 3; k++) v[k] -= x[k];
+  for (int k = 0; k < 3; k++)
+    v[k] -= x[k];
 }
 
 static void shrink(const PetscReal x[3], PetscReal v[3])
 {
-  for (int k = 0; k < 3; k++) v[k] = -1e-3 * x[k];
+  for (int k = 0; k < 3; k++)
+    v[k] = -1e-3 * x[k];
 }
 
 static void one(const PetscReal x[3], PetscReal v[3])
@@ -109,13 +114,14 @@ static PetscErrorCode check_equilibrium(const char *mesh)
   Vec U;
 
   PetscFunctionBeginUser;
+
   /* K = E / (3 (1 - 2 nu)); the volumetric strain 3 (-1e-3) gives the pressure 3 K 1e-3 */
-  PetscCall(test_open(
-    &t,
-    "-bodies a -body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type pressure "
-    "-effect_p_on skin -effect_p_value 10 -effect_p_follower no -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
-      "a", "%s", "linear", "1e3", "0.45"),
-    mesh));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_element p2 -sets skin -set_skin_at boundary -effects p "
+                      "-effect_p_type pressure "
+                      "-effect_p_on skin -effect_p_value 10 -effect_p_follower no -time "
+                      "euler_implicit -ts_dt 0.1" VERIFY_BODY("a", "%s", "linear", "1e3", "0.45"),
+                      mesh));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(residual(&t, U, &size));
   PetscCall(test_fill(t.model, shrink, U));
@@ -125,9 +131,9 @@ static PetscErrorCode check_equilibrium(const char *mesh)
   PetscCall(VecDestroy(&U));
   PetscCall(test_scene_close(&t));
   for (int law = 1; law < 4; law++) {
-    PetscCall(
-      test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
-                mesh, laws[law]));
+    PetscCall(test_open(
+      &t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
+      mesh, laws[law]));
     PetscCall(VecDuplicate(t.run->U, &U));
     PetscCall(residual(&t, U, &still));
     PetscCall(test_fill(t.model, turn, U));
@@ -145,7 +151,8 @@ static PetscErrorCode check_equilibrium(const char *mesh)
 static PetscErrorCode check_sums(const char *mesh, const char *mass)
 {
   TestScene t;
-  PetscReal body = 0., energy, least, now, total, force, volume;
+  PetscReal body = 0.;
+  PetscReal energy, least, now, total, force, volume;
   PetscInt inverted;
   const PetscReal *u;
   Vec U, V, F;
@@ -153,7 +160,8 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
+    "-bodies a -body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q "
+    "-effect_q_type "
     "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
       "a", "%s", "linear", "1e3", "0.3"),
     mass, mesh));
@@ -168,6 +176,7 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
   PetscCall(SbSpaceRestoreLocalRead(t.model->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_REAL, MPI_SUM, t.model->comm));
   SB_CHECK_NEAR(now, volume, 1e-13, "volume of the tets and of the body");
+
   /* M a - f with a = (1, 0, 0), along (1, 0, 0): the mass less the total force */
   PetscCall(SbModelResidual(t.model, 0., U, NULL, NULL, PETSC_FALSE, F));
   PetscCall(VecDot(F, V, &force));
@@ -184,17 +193,18 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
 
 /* ------------------------------------------------------------------ Lame's sphere */
 
-#define SHELL                                                                                              \
-  "-bodies a" VERIFY_BODY("a", "%s", "linear", "1",                                                        \
-                          "%.17g") "-body_a_element %s -sets x,y,z,in -set_x_at plane:1,0,0,0 -set_y_at "  \
-                                   "plane:0,1,0,0 -set_z_at plane:0,0,1,0 "                                \
-                                   "-set_in_at sphere:0,0,0,1.0001 -effects x,y,z,p -effect_x_type fixed " \
-                                   "-effect_x_on x -effect_x_components x "                                \
-                                   "-effect_y_type fixed -effect_y_on y -effect_y_components y "           \
-                                   "-effect_z_type fixed -effect_z_on z "                                  \
-                                   "-effect_z_components z -effect_p_type pressure -effect_p_on in "       \
-                                   "-effect_p_value 1 -effect_p_follower no "                              \
-                                   "-time static -solver direct"
+#define SHELL                                                                        \
+  "-bodies a" VERIFY_BODY(                                                           \
+    "a", "%s", "linear", "1",                                                        \
+    "%.17g") "-body_a_element %s -sets x,y,z,in -set_x_at plane:1,0,0,0 -set_y_at "  \
+             "plane:0,1,0,0 -set_z_at plane:0,0,1,0 "                                \
+             "-set_in_at sphere:0,0,0,1.0001 -effects x,y,z,p -effect_x_type fixed " \
+             "-effect_x_on x -effect_x_components x "                                \
+             "-effect_y_type fixed -effect_y_on y -effect_y_components y "           \
+             "-effect_z_type fixed -effect_z_on z "                                  \
+             "-effect_z_components z -effect_p_type pressure -effect_p_on in "       \
+             "-effect_p_value 1 -effect_p_follower no "                              \
+             "-time static -solver direct"
 
 static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, const char *element,
                                    PetscReal *error)
@@ -202,7 +212,8 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   TestScene t;
   char mesh[512];
   const PetscScalar *u;
-  PetscReal sum[2] = {0., 0.}, missing, guess;
+  PetscReal sum[2] = {0., 0.};
+  PetscReal missing, guess;
   SbSpaceEstimate est;
   SbEnergies energies;
 
@@ -210,30 +221,36 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(curved_mesh_write(n, n, curved_shell, second, mesh));
   PetscCall(test_open(&t, SHELL, mesh, (double)nu, element));
   PetscCall(verify_solve(&t, "sphere"));
+
   /* error at the vertices with equal weights; both meshes have the same vertices */
   PetscCall(VecGetArrayRead(t.run->U, &u));
   for (PetscInt i = 0; i < t.model->space->nnode_owned; i++) {
-    const PetscReal *x = t.model->space->node_x + 3 * i,
-                    r = PetscSqrtReal(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+    const PetscReal *x = t.model->space->node_x + 3 * i;
+    const PetscReal r = PetscSqrtReal(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
     const PetscReal exact = ((1. - 2. * nu) * r + 4. * (1. + nu) / (r * r)) / 7.;
 
-    if (t.model->space->node_orig[i] >= t.model->mesh->Nvert) continue;
-    for (int k = 0; k < 3; k++) sum[0] += PetscSqr(u[3 * i + k] - exact * x[k] / r);
+    if (t.model->space->node_orig[i] >= t.model->mesh->Nvert)
+      continue;
+    for (int k = 0; k < 3; k++)
+      sum[0] += PetscSqr(u[3 * i + k] - exact * x[k] / r);
     sum[1] += PetscSqr(exact);
   }
   PetscCall(VecRestoreArrayRead(t.run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, t.model->comm));
   *error = PetscSqrtReal(sum[0] / sum[1]);
-  test_print("  sphere, nu %g, %s, %5d %s tets: error %.3e\n", nu, element, (int)t.model->mesh->Ncell,
-             second ? "curved" : "straight", *error);
-  /* energy of the error: missing strain energy; the exact one is half the work of the pressure on the wall displacement */
+  test_print("  sphere, nu %g, %s, %5d %s tets: error %.3e\n", nu, element,
+             (int)t.model->mesh->Ncell, second ? "curved" : "straight", *error);
+
+  /* energy of the error: missing strain energy; the exact one is half the work of the pressure on
+     the wall displacement */
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
   missing = 0.25 * PETSC_PI * (1. - 2. * nu + 4. * (1. + nu)) / 7. - energies.strain;
   PetscCall(SbSpaceEstimateCreate(t.model, &est));
   PetscCall(SbSpaceEstimateCompute(est, 1., t.run->U, t.run->V, t.run->A));
   guess = PetscSqrtReal(est->body2[0]);
-  test_print("    in energy %.3e J^(1/2), estimated %.2f times that\n", PetscSqrtReal(PetscAbsReal(missing)),
-             guess / PetscSqrtReal(PetscAbsReal(missing)));
+  test_print("    in energy %.3e J^(1/2), estimated %.2f times that\n",
+             PetscSqrtReal(PetscAbsReal(missing)), guess / PetscSqrtReal(PetscAbsReal(missing)));
+
   /* 1.20 to 1.24 times the true error on these meshes; the bounds are those of verify_estimate */
   if (second)
     SB_CHECK(guess > 0.6 * PetscSqrtReal(missing) && guess < 1.3 * PetscSqrtReal(missing),
@@ -254,11 +271,14 @@ static PetscErrorCode check_sphere(PetscReal nu)
   }
   test_print("  orders: curved %.2f, straight %.2f\n", log(curved[0] / curved[1]) / log(2.),
              log(straight[0] / straight[1]) / log(2.));
-  /* theoretical orders in the mean square: 3, and 2 with the geometry of straight tets; here on coarse meshes */
-  SB_CHECK(curved[0] > 7. * curved[1] && straight[0] < 5. * straight[1], "orders: curved %g, straight %g",
-           log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.));
-  SB_CHECK(curved[0] < 0.2 * straight[0] && curved[1] < 0.1 * straight[1], "curved %g, %g, straight %g, %g",
-           curved[0], curved[1], straight[0], straight[1]);
+
+  /* theoretical orders in the mean square: 3, and 2 with the geometry of straight tets; here on
+     coarse meshes */
+  SB_CHECK(curved[0] > 7. * curved[1] && straight[0] < 5. * straight[1],
+           "orders: curved %g, straight %g", log(curved[0] / curved[1]) / log(2.),
+           log(straight[0] / straight[1]) / log(2.));
+  SB_CHECK(curved[0] < 0.2 * straight[0] && curved[1] < 0.1 * straight[1],
+           "curved %g, %g, straight %g, %g", curved[0], curved[1], straight[0], straight[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,11 +328,13 @@ static PetscErrorCode check_ranks(void)
 
       PetscCall(test_open_on(
         r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
-        "-bodies a" VERIFY_BODY(
-          "a", "%s", "neohookean", "1e6",
-          "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g -effect_f_type "
-                  "fixed -effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time newmark "
-                  "-mass %s -ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
+        "-bodies a" VERIFY_BODY("a", "%s", "neohookean", "1e6",
+                                "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 "
+                                        "-effects f,g -effect_f_type "
+                                        "fixed -effect_f_on foot -effect_g_type gravity "
+                                        "-effect_g_vector 3,-5,-9.81 -time newmark "
+                                        "-mass %s -ts_dt 0.02 -ts_max_time 0.06 -solver %s "
+                                        "-ksp_rtol 1e-12 -snes_rtol 1e-12%s",
         r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
         r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
       volume[r] = t.model->body[0].volume;
@@ -323,12 +345,14 @@ static PetscErrorCode check_ranks(void)
     }
     test_print("  %s: one rank and all differ by %.1e\n", solver[k],
                verify_difference(3 * n, value[0], value[1]));
-    SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one rank and all differ by %g",
-             solver[k], verify_difference(3 * n, value[0], value[1]));
-    SB_CHECK(verify_difference(3 * n, value[0], value[2]) < 1e-12, "%s: the .h5 differs by %g", solver[k],
-             verify_difference(3 * n, value[0], value[2]));
+    SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8,
+             "%s: one rank and all differ by %g", solver[k],
+             verify_difference(3 * n, value[0], value[1]));
+    SB_CHECK(verify_difference(3 * n, value[0], value[2]) < 1e-12, "%s: the .h5 differs by %g",
+             solver[k], verify_difference(3 * n, value[0], value[2]));
     SB_CHECK_NEAR(volume[2], volume[0], 1e-14, "volume of the .h5");
-    for (int r = 0; r < 3; r++) PetscCall(PetscFree(value[r]));
+    for (int r = 0; r < 3; r++)
+      PetscCall(PetscFree(value[r]));
   }
   (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)strlen(h5) - 3, h5);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -337,7 +361,8 @@ static PetscErrorCode check_ranks(void)
 /* Moves the midpoint node of the edge from (0, 0, 0) to (0, 0, 1) beyond the end of the edge. */
 static void fold(PetscReal x[3])
 {
-  if (x[0] == 0. && x[1] == 0. && x[2] == 0.5) x[2] = 1.2;
+  if (x[0] == 0. && x[1] == 0. && x[2] == 0.5)
+    x[2] = 1.2;
 }
 
 static PetscErrorCode check_refused(void)
@@ -349,15 +374,19 @@ static PetscErrorCode check_refused(void)
   PetscCall(curved_mesh_write(1, 1, fold, PETSC_TRUE, mesh));
   PetscCall(PetscSNPrintf(words, sizeof(words), "body 'a'|%s|tetrahedron 3|Jacobian", mesh));
   SB_CHECK_ERROR(
-    test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"),
-              mesh),
+    test_open(
+      &t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"),
+      mesh),
     PETSC_ERR_USER_INPUT, words);
   PetscCall(test_scene_close(&t));
+
   /* other elements use the straight tet */
   PetscCall(test_open(
-    &t, "-bodies a -body_a_element p1 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"), mesh));
+    &t, "-bodies a -body_a_element p1 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"),
+    mesh));
   SB_CHECK_NEAR(t.model->body[0].volume, 0.5, 1e-14, "volume of the straight tets");
-  SB_CHECK(strstr(t.model->body[0].note, "straight: 1") != NULL, "note '%s'", t.model->body[0].note);
+  SB_CHECK(strstr(t.model->body[0].note, "straight: 1") != NULL, "note '%s'",
+           t.model->body[0].note);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 // @ranks 1 2
 /*
-  Contact springs with dampers: a stiff block hits a plane, with response `penalty`. It is a mass on a spring
-  k and a dashpot k tau without tension: the rebound speed is that of this oscillator.
+  Contact springs with dampers: a stiff block hits a plane, with response `penalty`. It is a mass on
+  a spring k and a dashpot k tau without tension: the rebound speed is that of this oscillator.
 */
 #include "contact.h"
 
@@ -16,7 +16,8 @@
 static PetscReal leaving(PetscReal k, PetscReal tau)
 {
   const PetscReal h = STEP / 100;
-  PetscReal x = 0, v = -SPEED;
+  PetscReal x = 0;
+  PetscReal v = -SPEED;
 
   do {
     const PetscReal force = PetscMax(0, -k * x - k * tau * v);
@@ -37,14 +38,17 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
   verify_case("%s, damping %g s", what, tau);
   PetscCall(record_run(
     &r,
-    "-body_a_velocity 0,0,%g -effect_meet_response penalty -effect_meet_stiffness %g -effect_meet_damping %g "
+    "-body_a_velocity 0,0,%g -effect_meet_response penalty -effect_meet_stiffness %g "
+    "-effect_meet_damping %g "
     "-time euler_implicit -ts_dt %g -ts_max_time 0.06 -snes_rtol 1e-10 -bodies %s" VERIFY_BODY(
       "a", "box:0.05,0.05,0.05:1", "linear", "%g", "0.3"),
     -SPEED, FACTOR, tau, STEP, scene, YOUNG));
-  if (tau == 0) *k = PetscSqr(record_max(&r, "meet_force_z") / SPEED) / MASS;
+  if (tau == 0)
+    *k = PetscSqr(record_max(&r, "meet_force_z") / SPEED) / MASS;
   verify_show("springs, N/m", *k);
   speed = PetscSqrtReal(2 * record_last(&r, "kinetic") / MASS);
   VERIFY_NEAR(speed, leaving(*k, tau), 0.02 * SPEED, "speed after the impact, m/s");
+
   /* the springs return a part of the kinetic energy */
   VERIFY_LESS(speed, SPEED * (1 + PETSC_SMALL), "speed after the impact, m/s");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,23 +1,26 @@
 // @ranks 1
 /*
-  Effectivity of the spatial error estimate: estimate over true error in the energy norm (sbestimate.h), for
-  P1, CR, DG and P2, on problems with known stress, or with a reference on a mesh at least twice as fine.
+  Effectivity of the spatial error estimate: estimate over true error in the energy norm
+  (sbestimate.h), for P1, CR, DG and P2, on problems with known stress, or with a reference on a
+  mesh at least twice as fine.
 
-    cube      manufactured.h, n perturbed cells along an edge; at nu = 0.49999 P1 has a thousandth of the exact displacement
-    shell     Lame's hollow sphere (locking.h), edge length 0.3
-    bar       clamped at one end, under its weight, n cells across; the stress is singular at the edge of the clamp
-    cook      Cook's membrane, clamped on its left, sheared on its right, plane strain, 4 n cells in each direction
-    two       the bar with an upper half forty times as stiff: the stress jumps at the interface
-    turned    the bar with a nonlinear material, its end rotated by more than half a radian
-    squeeze   a plate tied to two stiff ones that approach each other: no loads, so a locked solution has too much energy, not too
+    cube      manufactured.h, n perturbed cells along an edge; at nu = 0.49999 P1 has a thousandth
+    of the exact displacement shell     Lame's hollow sphere (locking.h), edge length 0.3
+    bar       clamped at one end, under its weight, n cells across; the stress is singular at the
+    edge of the clamp cook      Cook's membrane, clamped on its left, sheared on its right, plane
+    strain, 4 n cells in each direction two       the bar with an upper half forty times as stiff:
+    the stress jumps at the interface turned    the bar with a nonlinear material, its end rotated
+    by more than half a radian
+    squeeze   a plate tied to two stiff ones that approach each other: no loads, so a locked
+    solution has too much energy, not too
               little
     sphere    a rigid sphere that indents a quarter of a block
     wave      axial vibration of a rod: half of its load is inertia
 
-  Each ratio must be between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are other estimators
-  on P1: recovery only (Zienkiewicz and Zhu 1992), which does not detect locking; and traction jumps
-  (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c calibrated for the cube, n = 16 and nu = 0.3,
-  which exceed the error if the pressure oscillates.
+  Each ratio must be between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are other
+  estimators on P1: recovery only (Zienkiewicz and Zhu 1992), which does not detect locking; and
+  traction jumps (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c calibrated for the
+  cube, n = 16 and nu = 0.3, which exceed the error if the pressure oscillates.
 */
 #include "locking.h"
 #include "sbtet.h"
@@ -37,41 +40,50 @@ static void exact_cube(PetscReal nu, const PetscReal x[3], PetscReal S[9])
   PetscReal u[3], G[9];
 
   manufactured_exact(x, u, G);
-  for (int k = 0; k < 9; k++) S[k] = mu * (G[k] + G[3 * (k % 3) + k / 3]);
+  for (int k = 0; k < 9; k++)
+    S[k] = mu * (G[k] + G[3 * (k % 3) + k / 3]);
 }
 
 static void exact_shell(PetscReal nu, const PetscReal x[3], PetscReal S[9])
 {
-  const PetscReal r = PetscSqrtReal(SbDot3(x, x)), radial = (1. - 8. / (r * r * r)) / 7.,
-                  hoop = (1. + 4. / (r * r * r)) / 7.;
+  const PetscReal r = PetscSqrtReal(SbDot3(x, x));
+  const PetscReal radial = (1. - 8. / (r * r * r)) / 7.;
+  const PetscReal hoop = (1. + 4. / (r * r * r)) / 7.;
 
   (void)nu;
-  for (int k = 0; k < 9; k++) S[k] = (k % 4 == 0) * hoop + (radial - hoop) * x[k / 3] * x[k % 3] / (r * r);
+  for (int k = 0; k < 9; k++)
+    S[k] = (k % 4 == 0) * hoop + (radial - hoop) * x[k / 3] * x[k % 3] / (r * r);
 }
 
-/* Rod of length 1, E = 1, rho = 1, nu = 0, fixed at x = 0: u_x = (1 - cos(k t)) sin(k x), k = pi/2, at k t = pi. */
+/* Rod of length 1, E = 1, rho = 1, nu = 0, fixed at x = 0: u_x = (1 - cos(k t)) sin(k x), k = pi/2,
+   at k t = pi. */
 static void exact_wave(PetscReal nu, const PetscReal x[3], PetscReal S[9])
 {
   (void)nu;
-  for (int k = 0; k < 9; k++) S[k] = 0.;
+  for (int k = 0; k < 9; k++)
+    S[k] = 0.;
   S[0] = PETSC_PI * PetscCosReal(0.5 * PETSC_PI * x[0]);
 }
 
-/* Deviatoric energy density of the symmetric part of R^T T (R NULL: of T), J/m^3; *trace: its trace, with the volumetric energy density trace^2 / (18 K). */
+/* Deviatoric energy density of the symmetric part of R^T T (R NULL: of T), J/m^3; *trace: its
+   trace, with the volumetric energy density trace^2 / (18 K). */
 static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9], PetscReal *trace)
 {
-  PetscReal s[9], square = 0.;
+  PetscReal s[9];
+  PetscReal square = 0.;
 
   if (R)
     SbMatTransposeMul(R, T, s);
   else
     memcpy(s, T, sizeof(s));
-  for (int k = 0; k < 9; k++) square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
+  for (int k = 0; k < 9; k++)
+    square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
   *trace = s[0] + s[4] + s[8];
   return (square - *trace * *trace / 3.) / (4. * m->mu);
 }
 
-/* Stresses of a solved run, linear in each cell; for P2 the deviator is linear and the pressure is constant. */
+/* Stresses of a solved run, linear in each cell; for P2 the deviator is linear and the pressure is
+   constant. */
 typedef struct {
   PetscInt n, npoint;    /* number of cells; sample points per cell for the sums */
   PetscReal *V;          /* [n] volumes, m^3 */
@@ -86,7 +98,9 @@ typedef struct {
 static PetscErrorCode stress_get(SbModel m, Vec U, Stress *s)
 {
   const PetscInt n = m->mesh->ncell;
-  const PetscReal near = SbRuleQuadratic.L[0][0], far = SbRuleQuadratic.L[0][1], *u;
+  const PetscReal near = SbRuleQuadratic.L[0][0];
+  const PetscReal far = SbRuleQuadratic.L[0][1];
+  const PetscReal *u;
   PetscReal *psi, *P, *point;
 
   PetscFunctionBeginUser;
@@ -110,18 +124,22 @@ static PetscErrorCode stress_get(SbModel m, Vec U, Stress *s)
       const PetscReal *from = s->npoint == 1 ? P + 9 * c : point + 9 * (4 * c + q);
       PetscReal more = 0.;
 
-      for (int k = 0; k < 9; k++) more += R[k] * (P[9 * c + k] - from[k]) / 3.;
-      for (int k = 0; k < 9; k++) s->P[c][q][k] = from[k] + more * R[k];
+      for (int k = 0; k < 9; k++)
+        more += R[k] * (P[9 * c + k] - from[k]) / 3.;
+      for (int k = 0; k < 9; k++)
+        s->P[c][q][k] = from[k] + more * R[k];
       for (int k = 0; k < 3; k++) {
         s->x[c][q][k] = 0.;
         for (int a = 0; a < 4; a++)
           s->x[c][q][k] += (s->npoint == 1 ? 0.25 : SbRuleQuadratic.L[q][a]) * cell.x[a][k];
       }
     }
-    for (int i = 0; i < 36; i++) sum[i % 9] += s->P[c][i / 9][i % 9];
+    for (int i = 0; i < 36; i++)
+      sum[i % 9] += s->P[c][i / 9][i % 9];
     for (int a = 0; a < 4; a++)
       for (int k = 0; k < 9; k++)
-        s->at[c][a][k] = s->npoint == 1 ? P[9 * c + k] : (s->P[c][a][k] - far * sum[k]) / (near - far);
+        s->at[c][a][k] =
+          s->npoint == 1 ? P[9 * c + k] : (s->P[c][a][k] - far * sum[k]) / (near - far);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(PetscFree3(psi, P, point));
@@ -140,10 +158,12 @@ static PetscErrorCode stress_free(Stress *s)
 static void subtract(const Stress *s, PetscInt cell, const PetscReal b[4], PetscReal S[9])
 {
   for (int a = 0; a < 4; a++)
-    for (int k = 0; k < 9; k++) S[k] -= b[a] * s->at[cell][a][k];
+    for (int k = 0; k < 9; k++)
+      S[k] -= b[a] * s->at[cell][a][k];
 }
 
-/* Adds the energy of a stress difference S. P2: the pressure energy is that of the mean pressure of a cell. */
+/* Adds the energy of a stress difference S. P2: the pressure energy is that of the mean pressure of
+   a cell. */
 static void add_difference(SbModel m, Stress *s, const PetscReal R[9], PetscInt cell, PetscReal w,
                            const PetscReal S[9])
 {
@@ -186,10 +206,12 @@ static PetscErrorCode exact_error(SbModel m, Vec U, PetscReal nu, Exact exact, P
     const PetscInt *v = m->mesh->cell + 4 * c;
 
     for (int q = 0; q < 14; q++) {
-      PetscReal p[3] = {0., 0., 0.}, S[9];
+      PetscReal p[3] = {0., 0., 0.};
+      PetscReal S[9];
 
       for (int a = 0; a < 4; a++)
-        for (int k = 0; k < 3; k++) p[k] += b[q][a] * m->mesh->x[3 * v[a] + k];
+        for (int k = 0; k < 3; k++)
+          p[k] += b[q][a] * m->mesh->x[3 * v[a] + k];
       exact(nu, p, S);
       subtract(&s, c, b[q], S);
       add_difference(m, &s, NULL, c, w[q] * s.V[c], S);
@@ -213,21 +235,30 @@ static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscRea
     const PetscInt *v = mesh->cell + 4 * c;
     PetscReal e[9];
 
-    for (int k = 0; k < 9; k++) e[k] = mesh->x[3 * v[1 + k / 3] + k % 3] - mesh->x[3 * v[0] + k % 3];
+    for (int k = 0; k < 9; k++)
+      e[k] = mesh->x[3 * v[1 + k / 3] + k % 3] - mesh->x[3 * v[0] + k % 3];
     SbMatCofactor(e, inverse[c]);
-    for (int k = 0; k < 9; k++) inverse[c][k] /= 6. * s.V[c];
+    for (int k = 0; k < 9; k++)
+      inverse[c][k] /= 6. * s.V[c];
   }
   for (PetscInt i = 0; i < fine->npoint * fine->n; i++) {
-    const PetscInt f = i / fine->npoint, q = i % fine->npoint;
-    PetscReal best = -PETSC_MAX_REAL, S[9], at_b[4] = {0.};
+    const PetscInt f = i / fine->npoint;
+    const PetscInt q = i % fine->npoint;
+    PetscReal best = -PETSC_MAX_REAL;
+    PetscReal S[9];
+    PetscReal at_b[4] = {0.};
     PetscInt at = 0;
 
-    /* the cell that contains the point, or the nearest one where the surfaces of the meshes differ */
+    /* the cell that contains the point, or the nearest one where the surfaces of the meshes
+       differ */
     for (PetscInt c = 0; c < s.n && best < 0.; c++) {
-      PetscReal d[3], b[4], least = 0.;
+      PetscReal d[3], b[4];
+      PetscReal least = 0.;
 
-      for (int k = 0; k < 3; k++) d[k] = fine->x[f][q][k] - mesh->x[3 * mesh->cell[4 * c] + k];
-      for (int a = 0; a < 3; a++) b[a + 1] = SbDot3(inverse[c] + 3 * a, d);
+      for (int k = 0; k < 3; k++)
+        d[k] = fine->x[f][q][k] - mesh->x[3 * mesh->cell[4 * c] + k];
+      for (int a = 0; a < 3; a++)
+        b[a + 1] = SbDot3(inverse[c] + 3 * a, d);
       b[0] = 1. - b[1] - b[2] - b[3];
       least = PetscMin(PetscMin(b[0], b[1]), PetscMin(b[2], b[3]));
       if (least > best && s.material[c] == fine->material[f]) {
@@ -245,7 +276,8 @@ static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum over interior faces of h |F| |[P N]|^2 / mu, with h |F| the mean of the two volumes; without the constant c. */
+/* Sum over interior faces of h |F| |[P N]|^2 / mu, with h |F| the mean of the two volumes; without
+   the constant c. */
 static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
 {
   SbMesh mesh = m->mesh;
@@ -257,13 +289,18 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
   PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
   *eta2 = 0.;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    const PetscInt c = i / 4, other = faces.neighbour[i], *v = mesh->cell + 4 * c;
+    const PetscInt c = i / 4;
+    const PetscInt other = faces.neighbour[i];
+    const PetscInt *v = mesh->cell + 4 * c;
     const SbMaterial law = m->material[s.material[c]];
     const PetscReal *x[3];
-    PetscReal p[3], q[3], N[3], jump = 0.;
+    PetscReal p[3], q[3], N[3];
+    PetscReal jump = 0.;
 
-    if (other < c) continue;
-    for (int k = 0; k < 3; k++) x[k] = mesh->x + 3 * v[(i + 1 + k) % 4];
+    if (other < c)
+      continue;
+    for (int k = 0; k < 3; k++)
+      x[k] = mesh->x + 3 * v[(i + 1 + k) % 4];
     for (int k = 0; k < 3; k++) {
       p[k] = x[1][k] - x[0][k];
       q[k] = x[2][k] - x[0][k];
@@ -285,28 +322,32 @@ static PetscErrorCode report(const Case *c, TestScene *t, PetscReal error2)
   const PetscBool stiff = (PetscBool)!strcmp(c->element, "p1");
   SbRun run = t->run;
   SbSpaceEstimate est;
-  PetscReal ratio, other = 0.;
+  PetscReal ratio;
+  PetscReal other = 0.;
   char others[64] = "| |";
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceEstimateCreate(t->model, &est));
-  PetscCall(SbSpaceEstimateCompute(est, strcmp(c->problem, "wave") ? 1. : 2., run->U, run->V, run->A));
+  PetscCall(
+    SbSpaceEstimateCompute(est, strcmp(c->problem, "wave") ? 1. : 2., run->U, run->V, run->A));
   ratio = PetscSqrtReal(est->body2[0] / error2);
   if (stiff) {
     PetscCall(jump_estimate(t->model, run->U, &other));
-    PetscCall(PetscSNPrintf(others, sizeof(others), "| %.2f | %.2f |", ratio / PetscSqrtReal(est->factor[0]),
+    PetscCall(PetscSNPrintf(others, sizeof(others), "| %.2f | %.2f |",
+                            ratio / PetscSqrtReal(est->factor[0]),
                             PetscSqrtReal(jump * other / error2)));
   }
-  test_print("| %s | %s | %d | %g | %.3g | %.3g | %.2f %s\n", c->problem, c->element, (int)c->n, c->nu,
-             PetscSqrtReal(est->body2[0] / est->strain[0]), PetscSqrtReal(error2 / est->strain[0]), ratio,
-             others);
-  SB_CHECK(ratio > 0.6 && ratio < 1.3, "%s, %s, n %d, nu %g: the estimate is %g of the error", c->problem,
-           c->element, (int)c->n, c->nu, ratio);
+  test_print("| %s | %s | %d | %g | %.3g | %.3g | %.2f %s\n", c->problem, c->element, (int)c->n,
+             c->nu, PetscSqrtReal(est->body2[0] / est->strain[0]),
+             PetscSqrtReal(error2 / est->strain[0]), ratio, others);
+  SB_CHECK(ratio > 0.6 && ratio < 1.3, "%s, %s, n %d, nu %g: the estimate is %g of the error",
+           c->problem, c->element, (int)c->n, c->nu, ratio);
   PetscCall(SbSpaceEstimateDestroy(&est));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ problems with a known stress */
+/* ------------------------------------------------------------------ problems with a known
+   stress */
 
 static PetscErrorCode check_exact(const Case *c, const char *scene, const char *mesh, Exact exact)
 {
@@ -328,7 +369,8 @@ static PetscErrorCode check_cube(const char *element, PetscInt n, PetscReal nu)
   char scene[VERIFY_TEXT], mesh[512];
 
   PetscFunctionBeginUser;
-  PetscCall(verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
+  PetscCall(
+    verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
   PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
   PetscCall(PetscStrlcat(scene, " -solver direct", sizeof(scene)));
   PetscCall(check_exact(&c, scene, mesh, exact_cube));
@@ -341,14 +383,14 @@ static PetscErrorCode check_shell(const char *element, PetscReal nu)
   char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(scene, sizeof(scene),
-                  "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
-                  "-effects x,y,z,push -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
-                  "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed "
-                  "-effect_z_on z0 -effect_z_components z -effect_push_type pressure -effect_push_on inside "
-                  "-effect_push_value 1 -effect_push_follower no -time static -solver direct",
-                  nu));
+  PetscCall(PetscSNPrintf(
+    scene, sizeof(scene),
+    "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
+    "-effects x,y,z,push -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
+    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed "
+    "-effect_z_on z0 -effect_z_components z -effect_push_type pressure -effect_push_on inside "
+    "-effect_push_value 1 -effect_push_follower no -time static -solver direct",
+    nu));
   PetscCall(check_exact(&c, scene, "meshes/shell.msh", exact_shell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -359,21 +401,24 @@ static PetscErrorCode check_wave(const char *element, PetscInt n)
   char mesh[512];
 
   PetscFunctionBeginUser;
+  PetscCall(verify_distorted_box((const PetscInt[3]){4 * n, n, n},
+                                 (const PetscReal[3]){1., 0.25, 0.25}, mesh));
   PetscCall(
-    verify_distorted_box((const PetscInt[3]){4 * n, n, n}, (const PetscReal[3]){1., 0.25, 0.25}, mesh));
-  PetscCall(check_exact(&c,
-                        "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 "
-                        "-body_a_density 1 -sets root -set_root_at plane:1,0,0,0 -effects hold,load "
-                        "-effect_hold_type fixed -effect_hold_on root -effect_load_type body_force "
-                        "-effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
-                        "-ts_max_time 2 -ksp_rtol 1e-10",
-                        mesh, exact_wave));
+    check_exact(&c,
+                "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 "
+                "-body_a_density 1 -sets root -set_root_at plane:1,0,0,0 -effects hold,load "
+                "-effect_hold_type fixed -effect_hold_on root -effect_load_type body_force "
+                "-effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
+                "-ts_max_time 2 -ksp_rtol 1e-10",
+                mesh, exact_wave));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ problems with a reference on a finer mesh */
+/* ------------------------------------------------------------------ problems with a reference on a
+   finer mesh */
 
-/* Box of shape[3] n cells and the given size, deformed by `map` if not NULL; `options` of the scene. */
+/* Box of shape[3] n cells and the given size, deformed by `map` if not NULL; `options` of the
+   scene. */
 typedef struct {
   const char *name, *options;
   PetscInt shape[3];
@@ -397,8 +442,8 @@ static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t
     PetscCall(verify_mesh_write(n, p->map, (void *)(uintptr_t)p->size, mesh));
   else
     PetscCall(verify_distorted_box(n, p->size, mesh));
-  PetscCall(test_open(t, "%s -body_a_mesh %s -body_a_element %s -body_a_poisson %.17g", p->options, mesh,
-                      c->element, c->nu));
+  PetscCall(test_open(t, "%s -body_a_mesh %s -body_a_element %s -body_a_poisson %.17g", p->options,
+                      mesh, c->element, c->nu));
   PetscCall(verify_solve(t, p->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -408,7 +453,8 @@ typedef struct {
   PetscInt n;
 } Level;
 
-/* A problem on a reference mesh and on the meshes that are compared with it, ended by one without an element. */
+/* A problem on a reference mesh and on the meshes that are compared with it, ended by one without
+   an element. */
 typedef struct {
   const Problem *problem;
   PetscReal nu;
@@ -421,7 +467,8 @@ static PetscErrorCode check_finer(const Reference *r)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_problem(r->problem, &(Case){r->problem->name, r->fine.element, r->fine.n, r->nu}, &t));
+  PetscCall(
+    open_problem(r->problem, &(Case){r->problem->name, r->fine.element, r->fine.n, r->nu}, &t));
   PetscCall(stress_get(t.model, t.run->U, &stress));
   PetscCall(test_scene_close(&t));
   for (const Level *l = r->levels; l->element; l++) {
@@ -442,7 +489,8 @@ static void straight_map(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal *size = (const PetscReal *)place->ctx;
 
-  for (int k = 0; k < 3; k++) x[k] *= size[k];
+  for (int k = 0; k < 3; k++)
+    x[k] *= size[k];
 }
 
 /* Map of a graded mesh: cells grow with the distance from the corner (0, 0, 0) in the top face. */
@@ -470,8 +518,10 @@ static const Problem two = {
 static const Problem cook = {
   "cook",
   "-bodies a -body_a_material linear -body_a_young 1 -body_a_density 1 -sets left,right "
-  "-set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 -effects hold,plane,pull -effect_hold_type "
-  "fixed -effect_hold_on left -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
+  "-set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 -effects hold,plane,pull "
+  "-effect_hold_type "
+  "fixed -effect_hold_on left -effect_plane_type fixed -effect_plane_on all "
+  "-effect_plane_components z "
   "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static "
   "-solver direct",
   {4, 4, 1},
@@ -480,7 +530,8 @@ static const Problem cook = {
 static const Problem squeeze = {
   "squeeze",
   "-bodies a -body_a_material linear -body_a_young 5e4 -body_a_density 1000 -sets low,high "
-  "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type fixed "
+  "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type "
+  "fixed "
   "-effect_hold_on low -effect_press_type prescribed_displacement -effect_press_on high "
   "-effect_press_displacement 0;0;-0.01 -time static -solver direct",
   {2, 2, 1},
@@ -488,23 +539,27 @@ static const Problem squeeze = {
   NULL};
 static const Problem corotated = {
   "turned, co-rotated",
-  BAR "-body_a_material corotated -body_a_tangent exact -effect_weight_vector 0,0,-4 -solver direct",
+  BAR
+  "-body_a_material corotated -body_a_tangent exact -effect_weight_vector 0,0,-4 -solver direct",
   {4, 1, 1},
   {0.4, 0.1, 0.1},
   NULL};
-static const Problem neohookean = {"turned, neo-Hookean",
-                                   BAR
-                                   "-body_a_material neohookean -effect_weight_vector 0,0,-2 -solver direct",
-                                   {4, 1, 1},
-                                   {0.4, 0.1, 0.1},
-                                   NULL};
-/* Radius of the sphere 1 m, indentation 0.01 m: the contact radius by Hertz is 0.1 m, two or four cells. */
+static const Problem neohookean = {
+  "turned, neo-Hookean",
+  BAR "-body_a_material neohookean -effect_weight_vector 0,0,-2 -solver direct",
+  {4, 1, 1},
+  {0.4, 0.1, 0.1},
+  NULL};
+/* Radius of the sphere 1 m, indentation 0.01 m: the contact radius by Hertz is 0.1 m, two or four
+   cells. */
 static const Problem sphere = {
   "sphere",
   "-bodies a -body_a_material linear -body_a_young 1e5 -body_a_density 1 -sets x0,y0,z1,top "
-  "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
+  "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at "
+  "plane:0,0,1,0 "
   "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type fixed -effect_x_on x0 "
-  "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed "
+  "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+  "-effect_z_type fixed "
   "-effect_z_on z1 -effect_ball_type contact -effect_ball_response projected -effect_ball_on top "
   "-effect_ball_obstacle sphere:0,0,0.99,1",
   {1, 1, 1},
@@ -540,20 +595,27 @@ int main(int argc, char **argv)
   test_print("| problem | element | n | nu | estimate | error | ratio | recovery alone "
              "| jumps |\n|---|---|---|---|---|---|---|---|---|\n");
   for (int i = 0; i < 4; i++) {
-    for (PetscInt n = 4; n <= 16; n *= 2) PetscCall(check_cube("p1", n, nu[i]));
+    for (PetscInt n = 4; n <= 16; n *= 2)
+      PetscCall(check_cube("p1", n, nu[i]));
     PetscCall(check_cube("cr", 4, nu[i]));
-    if (i % 3 == 0) PetscCall(check_cube("cr", 8, nu[i]));
+    if (i % 3 == 0)
+      PetscCall(check_cube("cr", 8, nu[i]));
     PetscCall(check_cube("dg", 4, nu[i]));
-    if (i % 3 == 0) PetscCall(check_cube("p2", 4, nu[i]));
-    if (i == 3) PetscCall(check_cube("p2", 8, nu[i]));
+    if (i % 3 == 0)
+      PetscCall(check_cube("p2", 4, nu[i]));
+    if (i == 3)
+      PetscCall(check_cube("p2", 8, nu[i]));
   }
   for (int i = 0; i < 4; i++) {
     PetscCall(check_shell("p1", nu[i]));
     PetscCall(check_shell("cr", nu[i]));
-    if (i % 3 == 0) PetscCall(check_shell("dg", nu[i]));
-    if (i % 3 == 0) PetscCall(check_shell("p2", nu[i]));
+    if (i % 3 == 0)
+      PetscCall(check_shell("dg", nu[i]));
+    if (i % 3 == 0)
+      PetscCall(check_shell("p2", nu[i]));
   }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(references); i++) PetscCall(check_finer(&references[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(references); i++)
+    PetscCall(check_finer(&references[i]));
   PetscCall(check_wave("p1", 2));
   PetscCall(check_wave("p1", 4));
   PetscCall(check_wave("cr", 2));

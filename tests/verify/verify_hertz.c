@@ -4,8 +4,9 @@
 */
 #include "hertz.h"
 
-/* Forces on three meshes, each of half the cell size of the one before: an error of order two, so Aitken's limit is Hertz's force; the gap of a
-   barrier of the width d / 100 adds up to 1.5 % to it. */
+/* Forces on three meshes, each of half the cell size of the one before: an error of order two, so
+   Aitken's limit is Hertz's force; the gap of a barrier of the width d / 100 adds up to 1.5 % to
+   it. */
 static PetscErrorCode check_meshes(const Pair *p)
 {
   static const PetscInt cells[] = {5, 10, CELLS};

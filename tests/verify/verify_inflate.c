@@ -1,32 +1,35 @@
 // @ranks 1 2
 /*
-  Inflation of a thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, by a follower
-  pressure on the inner wall, to 1.5 times its radius: CR, stable neo-Hookean material, mu = 1, nu = 0.499,
-  between symmetry planes. The pressure acts on part of the surface, whose facets are discontinuous at their
-  edges.
+  Inflation of a thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, by a
+  follower pressure on the inner wall, to 1.5 times its radius: CR, stable neo-Hookean material, mu
+  = 1, nu = 0.499, between symmetry planes. The pressure acts on part of the surface, whose facets
+  are discontinuous at their edges.
 
-  Without change of volume the hoop stretch decreases from la = a/A inside to lb, lb^k = 1 + (la^k - 1)
-  (A/B)^k, and radial equilibrium gives
+  Without change of volume the hoop stretch decreases from la = a/A inside to lb, lb^k = 1 + (la^k -
+  1) (A/B)^k, and radial equilibrium gives
 
-    p = int_lb^la dW/dl / (l^k - 1) dl,   k = 3 for the sphere, 2 for the cylinder, W(l) the energy at that stretch.
+    p = int_lb^la dW/dl / (l^k - 1) dl,   k = 3 for the sphere, 2 for the cylinder, W(l) the energy
+    at that stretch.
 
-  W = mu/2 (I1 - 3) gives mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 -
-  la^-2)/2] for the cylinder. The material of this program is
+  W = mu/2 (I1 - 3) gives mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) +
+  (lb^-2 - la^-2)/2] for the cylinder. The material of this program is
 
     W = 2/3 mu [(I1 - 3) - log((I1 + 1)/4)],   dW/dI1 = 2/3 mu I1/(I1 + 1):
 
-  mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with
-  the classical energy.
+  mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is
+  checked with the classical energy.
 
-    pressure   of the closed form at the computed stretch, against the applied one: within 1 % on one mesh of 1,920 tets, and
+    pressure   of the closed form at the computed stretch, against the applied one: within 1 % on
+    one mesh of 1,920 tets, and
                converging
 
-  A facet of CR has the area at the centre of its tet, h/4 behind the wall, where the hoop stretch is less
-  than at the wall: the force of a follower pressure is too small by about h/2 dln(l)/dR, 4 % for h = A/11 and
-  l = 1.5. Layers are therefore graded towards the inner wall, by GROWTH each on the fine mesh; the coarse one
-  has half as many.
-    iterations are bounded, with CHOLMOD, which fails if the tangent is indefinite, and with MUMPS, which only counts negative pivots
-    order      the error of a perturbed solution is squared by one iteration of Newton's method
+  A facet of CR has the area at the centre of its tet, h/4 behind the wall, where the hoop stretch
+  is less than at the wall: the force of a follower pressure is too small by about h/2 dln(l)/dR, 4
+  % for h = A/11 and l = 1.5. Layers are therefore graded towards the inner wall, by GROWTH each on
+  the fine mesh; the coarse one has half as many.
+    iterations are bounded, with CHOLMOD, which fails if the tangent is indefinite, and with MUMPS,
+    which only counts negative pivots order      the error of a perturbed solution is squared by one
+    iteration of Newton's method
 */
 #include "verify.h"
 
@@ -48,9 +51,9 @@ static PetscReal integrand(PetscInt k, PetscBool classical, PetscReal l)
 /* Pressure at the inner stretch la, by Simpson's rule. */
 static PetscReal closed_form(PetscInt k, PetscBool classical, PetscReal la)
 {
-  const PetscReal power = (PetscReal)k,
-                  lb =
-                    PetscPowReal(1. + (PetscPowReal(la, power) - 1.) / PetscPowReal(2., power), 1. / power);
+  const PetscReal power = (PetscReal)k;
+  const PetscReal lb =
+    PetscPowReal(1. + (PetscPowReal(la, power) - 1.) / PetscPowReal(2., power), 1. / power);
   const PetscInt n = 200;
   PetscReal sum = 0.;
 
@@ -64,14 +67,16 @@ static PetscReal closed_form(PetscInt k, PetscBool classical, PetscReal la)
 
 static void check_quadrature(void)
 {
-  const PetscReal a = STRETCH, b3 = PetscCbrtReal(1. + (a * a * a - 1.) / 8.),
-                  b2 = PetscSqrtReal(1. + (a * a - 1.) / 4.);
+  const PetscReal a = STRETCH;
+  const PetscReal b3 = PetscCbrtReal(1. + (a * a * a - 1.) / 8.);
+  const PetscReal b2 = PetscSqrtReal(1. + (a * a - 1.) / 4.);
 
   SB_CHECK_NEAR(closed_form(3, PETSC_TRUE, a),
                 0.5 * (4. / b3 + PetscPowReal(b3, -4.) - 4. / a - PetscPowReal(a, -4.)), 1e-9,
                 "sphere, classical energy");
-  SB_CHECK_NEAR(closed_form(2, PETSC_TRUE, a), PetscLogReal(a / b2) + 0.5 * (1. / (b2 * b2) - 1. / (a * a)),
-                1e-9, "cylinder, classical energy");
+  SB_CHECK_NEAR(closed_form(2, PETSC_TRUE, a),
+                PetscLogReal(a / b2) + 0.5 * (1. / (b2 * b2) - 1. / (a * a)), 1e-9,
+                "cylinder, classical energy");
 }
 
 /* Radius of the surface below a layer, of nlayer in all; the fine mesh has ten. */
@@ -79,12 +84,14 @@ static PetscReal radius(PetscInt layer, PetscInt nlayer)
 {
   const PetscReal growth = PetscPowReal(GROWTH, 10. / (PetscReal)nlayer);
 
-  return 1. + (PetscPowReal(growth, (PetscReal)layer) - 1.) / (PetscPowReal(growth, (PetscReal)nlayer) - 1.);
+  return 1. + (PetscPowReal(growth, (PetscReal)layer) - 1.) /
+                (PetscPowReal(growth, (PetscReal)nlayer) - 1.);
 }
 
 /*
-  An eighth of the sphere: nlayer layers, each with the n^2 triangles of an octahedron's face, whose prisms
-  are cut into three tets along the diagonals to the vertex with the higher number. Collective.
+  An eighth of the sphere: nlayer layers, each with the n^2 triangles of an octahedron's face, whose
+  prisms are cut into three tets along the diagonals to the vertex with the higher number.
+  Collective.
 */
 static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 {
@@ -97,15 +104,18 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
     PetscInt count = 0;
 
     /* number of vertex (i, j) of a layer: rows j of n + 1 - j vertices */
-    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)((nlayer + 1) * per_layer));
+    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n",
+            (int)((nlayer + 1) * per_layer));
     for (PetscInt layer = 0; layer <= nlayer; layer++) {
       const PetscReal r = radius(layer, nlayer);
 
       for (PetscInt j = 0; j <= n; j++) {
         for (PetscInt i = 0; i + j <= n; i++) {
-          const PetscReal q = 0.5 * PETSC_PI / (PetscReal)n, x = PetscSinReal(q * (PetscReal)(n - i - j)),
-                          y = PetscSinReal(q * (PetscReal)i), z = PetscSinReal(q * (PetscReal)j),
-                          scale = r / PetscSqrtReal(x * x + y * y + z * z);
+          const PetscReal q = 0.5 * PETSC_PI / (PetscReal)n;
+          const PetscReal x = PetscSinReal(q * (PetscReal)(n - i - j));
+          const PetscReal y = PetscSinReal(q * (PetscReal)i);
+          const PetscReal z = PetscSinReal(q * (PetscReal)j);
+          const PetscReal scale = r / PetscSqrtReal(x * x + y * y + z * z);
 
           fprintf(f, "%d %.17g %.17g %.17g\n", (int)++count, scale * x, scale * y, scale * z);
         }
@@ -118,21 +128,25 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 
       for (PetscInt j = 0; j < n; row += n + 1 - j, j++) {
         for (PetscInt c = 0; c < 2 * (n - j) - 1; c++) {
-          const PetscInt a = row + c / 2 + 1, b = a + n + 1 - j; /* in this row; in the next, shorter one */
+          const PetscInt a = row + c / 2 + 1,
+                         b = a + n + 1 - j; /* in this row; in the next, shorter one */
           const PetscInt low[3] = {c % 2 ? a + 1 : a, c % 2 ? b : a + 1, c % 2 ? b + 1 : b};
-          const PetscInt way = c % 2 ? 1 : 0; /* the two kinds of triangles have opposite orientations */
+          const PetscInt way =
+            c % 2 ? 1 : 0; /* the two kinds of triangles have opposite orientations */
 
           for (PetscInt k = 0; k < 3; k++) {
             PetscInt v[4];
 
-            for (PetscInt m = 0; m < 4; m++) v[m] = m <= 2 - k ? low[m] : low[m - 1] + per_layer;
+            for (PetscInt m = 0; m < 4; m++)
+              v[m] = m <= 2 - k ? low[m] : low[m - 1] + per_layer;
             if (way != k % 2) {
               const PetscInt first = v[0];
 
               v[0] = v[1];
               v[1] = first;
             }
-            fprintf(f, "%d 4 2 0 1 %d %d %d %d\n", (int)++count, (int)v[0], (int)v[1], (int)v[2], (int)v[3]);
+            fprintf(f, "%d 4 2 0 1 %d %d %d %d\n", (int)++count, (int)v[0], (int)v[1], (int)v[2],
+                    (int)v[3]);
           }
         }
       }
@@ -146,7 +160,8 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 /* Map of a quarter of a ring, one layer in z. */
 static void ring(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal r = radius(place->at[0], place->n[0]), angle = 0.5 * PETSC_PI * x[1];
+  const PetscReal r = radius(place->at[0], place->n[0]);
+  const PetscReal angle = 0.5 * PETSC_PI * x[1];
 
   x[0] = place->at[1] == place->n[1] ? 0. : r * PetscCosReal(angle);
   x[1] = r * PetscSinReal(angle);
@@ -166,9 +181,11 @@ static PetscErrorCode inner_stretch(TestScene *t, PetscInt k, PetscReal *stretch
   PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     const PetscInt node = s->cell_node[i];
-    PetscReal rest = 0., now = 0.;
+    PetscReal rest = 0.;
+    PetscReal now = 0.;
 
-    if (!(s->mesh->face_set[i] & SB_SET_BIT(inside))) continue;
+    if (!(s->mesh->face_set[i] & SB_SET_BIT(inside)))
+      continue;
     for (PetscInt c = 0; c < k; c++) {
       rest += PetscSqr(s->node_x[3 * node + c]);
       now += PetscSqr(s->node_x[3 * node + c] + u[3 * node + c]);
@@ -195,31 +212,37 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
 {
   const char *name = k == 3 ? "sphere" : "cylinder";
   const PetscReal p = closed_form(k, PETSC_FALSE, STRETCH);
-  PetscReal stretch = 0., error[2], order = 0.;
+  PetscReal stretch = 0.;
+  PetscReal error[2];
+  PetscReal order = 0.;
   TestScene t;
 
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material neohookean -body_a_young %.17g "
-    "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type "
+    "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type fixed "
+    "-effect_x_on x0 "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+    "-effect_z_type "
     "fixed -effect_z_components z -effect_push_type pressure -effect_push_on inside "
-    "-effect_push_value %.17g -time static -static_steps 4 -solver %s -ksp_rtol 1e-11 -snes_rtol 1e-9",
+    "-effect_push_value %.17g -time static -static_steps 4 -solver %s -ksp_rtol 1e-11 -snes_rtol "
+    "1e-9",
     mesh, 2. * (1. + NU), NU, more, p, solver));
   PetscCall(verify_solve(&t, name));
   PetscCall(inner_stretch(&t, k, &stretch));
   PetscCall(verify_newton(&t, ripple, 1e-4, error, &order));
-  test_print("  %s, %s: %d load steps, %d Newton and %d linear iterations; stretch %.4f, there p %.5f "
-             "(classical %.5f), applied %.5f: %+.2f %%; order %.2f\n",
-             name, solver, (int)t.run->steps_total, (int)t.run->newton_total, (int)t.run->linear_total,
-             stretch, closed_form(k, PETSC_FALSE, stretch), closed_form(k, PETSC_TRUE, stretch), p,
-             100. * (closed_form(k, PETSC_FALSE, stretch) / p - 1.), order);
+  test_print(
+    "  %s, %s: %d load steps, %d Newton and %d linear iterations; stretch %.4f, there p %.5f "
+    "(classical %.5f), applied %.5f: %+.2f %%; order %.2f\n",
+    name, solver, (int)t.run->steps_total, (int)t.run->newton_total, (int)t.run->linear_total,
+    stretch, closed_form(k, PETSC_FALSE, stretch), closed_form(k, PETSC_TRUE, stretch), p,
+    100. * (closed_form(k, PETSC_FALSE, stretch) / p - 1.), order);
   SB_CHECK(stretch > 1.35, "%s: stretch %g only", name, stretch);
   *wrong = closed_form(k, PETSC_FALSE, stretch) / p - 1.;
   SB_CHECK_NEAR(order, 2., 0.15, "order of Newton's method");
-  SB_CHECK(t.run->steps_total == 4 && t.run->newton_total <= 40, "%s, %s: %d steps, %d iterations", name,
-           solver, (int)t.run->steps_total, (int)t.run->newton_total);
+  SB_CHECK(t.run->steps_total == 4 && t.run->newton_total <= 40, "%s, %s: %d steps, %d iterations",
+           name, solver, (int)t.run->steps_total, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -233,7 +256,8 @@ static PetscErrorCode check_body(PetscInt k, const char *more)
   PetscFunctionBeginUser;
   PetscCall(SbHasPackage("mumps", &mumps));
   for (PetscInt i = 0; i < 2; i++) {
-    const PetscInt n = i ? 8 : 4, nlayer = i ? 10 : 5;
+    const PetscInt n = i ? 8 : 4;
+    const PetscInt nlayer = i ? 10 : 5;
     char mesh[512];
 
     if (k == 3)
@@ -241,10 +265,12 @@ static PetscErrorCode check_body(PetscInt k, const char *more)
     else
       PetscCall(verify_mesh_write((const PetscInt[3]){nlayer, n + n / 2, 1}, ring, NULL, mesh));
     PetscCall(check(k, mesh, more, "direct", &error[i]));
-    if (mumps && !i) PetscCall(check(k, mesh, more, "mumps", &again));
+    if (mumps && !i)
+      PetscCall(check(k, mesh, more, "mumps", &again));
   }
   SB_CHECK_NEAR(error[1], 0., 0.01, "pressure of the closed form");
-  SB_CHECK(PetscAbsReal(error[1]) < 0.6 * PetscAbsReal(error[0]), "errors %g and %g", error[0], error[1]);
+  SB_CHECK(PetscAbsReal(error[1]) < 0.6 * PetscAbsReal(error[0]), "errors %g and %g", error[0],
+           error[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -252,8 +278,8 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   check_quadrature();
-  PetscCall(
-    check_body(3, "-sets x0,y0,z0,inside " WALLS "-set_inside_at sphere:0,0,0,1.001 -effect_z_on z0"));
+  PetscCall(check_body(3, "-sets x0,y0,z0,inside " WALLS
+                          "-set_inside_at sphere:0,0,0,1.001 -effect_z_on z0"));
   PetscCall(check_body(2, "-sets x0,y0,z0,z1,inside " WALLS "-set_z1_at plane:0,0,1,0.1 "
                           "-set_inside_at sphere:0,0,0.05,1.01 -effect_z_on z0,z1"));
   SB_TEST_END();

@@ -2,17 +2,21 @@
 /*
   Runs that reject steps with inverted tets (-time_inverted reject).
 
-    stops     a box whose compression would invert it at 2/3 of the path: every integrator stops before that with the reason, within the
-              shortest step of it, and without inverted tets; a run that accepts them reaches the end with all tets inverted
-    mirrored  a body that is inverted initially goes on: the number of inverted tets does not increase
-    alpha2    cannot reject steps, and says so
+    stops     a box whose compression would invert it at 2/3 of the path: every integrator stops
+    before that with the reason, within the
+              shortest step of it, and without inverted tets; a run that accepts them reaches the
+              end with all tets inverted
+    mirrored  a body that is inverted initially goes on: the number of inverted tets does not
+    increase alpha2    cannot reject steps, and says so
 */
 #include "scene.h"
 
-#define BOX                                                                                                 \
-  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e4 -body_a_poisson " \
+#define BOX                                                                                 \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e4 " \
+  "-body_a_poisson "                                                                        \
   "0.3 -body_a_density 1000 "
-#define PRESS BOX "-effects press -effect_press_type prescribed_displacement -effect_press_on boundary "
+#define PRESS \
+  BOX "-effects press -effect_press_type prescribed_displacement -effect_press_on boundary "
 
 static PetscErrorCode check_stops(const char *time, PetscReal shortest)
 {
@@ -33,8 +37,8 @@ static PetscErrorCode check_stops(const char *time, PetscReal shortest)
     if (refuse) {
       SB_CHECK(strstr(s.run->stop_reason, "inverted") && !e.ninverted && e.min_J > 0.,
                "%s: %d inverted, '%s'", time, (int)e.ninverted, s.run->stop_reason);
-      SB_CHECK(s.run->t_now < 2. / 3 && s.run->t_now > 2. / 3 - 1.01 * shortest, "%s: stops at %.6g", time,
-               s.run->t_now);
+      SB_CHECK(s.run->t_now < 2. / 3 && s.run->t_now > 2. / 3 - 1.01 * shortest,
+               "%s: stops at %.6g", time, s.run->t_now);
     } else {
       SB_CHECK(!s.run->stop_reason[0] && e.ninverted && PetscAbsReal(s.run->t_now - 1.) < 1e-6,
                "%s: t %.6g, '%s'", time, s.run->t_now, s.run->stop_reason);
@@ -59,7 +63,9 @@ static PetscErrorCode check_mirrored(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(
-    PRESS "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted reject", &s));
+    PRESS
+    "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted reject",
+    &s));
   s.run->want_energies = PETSC_TRUE;
   PetscCall(test_fill(s.model, mirror, s.run->U));
   PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e));

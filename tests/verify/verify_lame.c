@@ -1,12 +1,14 @@
 // @ranks 1 2
 /*
-  Lame's thick-walled sphere, radii 1 and 2, pressure 1 inside, E = 1, nu = 0.49999, one eighth of it between
-  symmetry planes (supports of one component), edge length 0.3: displacement, radial and hoop stress of the
-  cells against
+  Lame's thick-walled sphere, radii 1 and 2, pressure 1 inside, E = 1, nu = 0.49999, one eighth of
+  it between symmetry planes (supports of one component), edge length 0.3: displacement, radial and
+  hoop stress of the cells against
 
-    u = (1/7) ((1 - 2 nu) r + 4 (1 + nu) / r^2),   sigma_rr = (1 - 8 / r^3) / 7,   sigma_tt = (1 + 4 / r^3) / 7.
+    u = (1/7) ((1 - 2 nu) r + 4 (1 + nu) / r^2),   sigma_rr = (1 - 8 / r^3) / 7,   sigma_tt = (1 + 4
+    / r^3) / 7.
 
-  The stresses are of first order, with the largest error at the wall, where their gradient is largest.
+  The stresses are of first order, with the largest error at the wall, where their gradient is
+  largest.
 */
 #include "locking.h"
 
@@ -22,8 +24,9 @@ int main(int argc, char **argv)
 
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver direct", elements[i]));
     PetscCall(locking_shell("meshes/shell.msh", 0.49999, more, &e, &cost));
-    test_print("  %s: errors of u %.4f, stress %.4f %.4f, at the wall %.4f %.4f; u of the wall %.4f\n",
-               elements[i], e.u, e.stress[0], e.stress[1], e.wall[0], e.wall[1], e.at_wall);
+    test_print(
+      "  %s: errors of u %.4f, stress %.4f %.4f, at the wall %.4f %.4f; u of the wall %.4f\n",
+      elements[i], e.u, e.stress[0], e.stress[1], e.wall[0], e.wall[1], e.at_wall);
     if (i == 0) {
       SB_CHECK(e.u > 0.3, "P1 has an error of %g only: this mesh shows no locking", e.u);
       continue;

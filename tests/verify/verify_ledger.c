@@ -1,11 +1,11 @@
 // @ranks 1 2
 /*
-  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps
-  on an oscillating bar, for every integrator and with damping; of linear and Newton solves with loose
-  tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its estimates are the
-  same on any number of ranks, and -accuracy is reached, also if contact is the largest error. The true error
-  of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a
-  solve relative to a solution up to rounding.
+  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of
+  time steps on an oscillating bar, for every integrator and with damping; of linear and Newton
+  solves with loose tolerances; of contact springs and barrier gaps. And: the ledger changes no
+  result, its estimates are the same on any number of ranks, and -accuracy is reached, also if
+  contact is the largest error. The true error of the time step is relative to the same run with 32
+  times shorter steps by Newmark's method, that of a solve relative to a solution up to rounding.
 */
 #include "verify.h"
 
@@ -13,10 +13,13 @@
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_young 1e5 -body_bar_poisson 0.3 " \
   "-body_bar_density 1000 -effects gravity,hold -effect_hold_type fixed -effect_hold_on xmin "
 
-/* Energy norm of the difference of two states of the model, whose material is linear or nearly linear between them. */
+/* Energy norm of the difference of two states of the model, whose material is linear or nearly
+   linear between them. */
 static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
 {
-  PetscReal unused, mass = 0., all;
+  PetscReal unused;
+  PetscReal mass = 0.;
+  PetscReal all;
   PetscScalar form;
   PetscInt inverted;
   const PetscScalar *v;
@@ -36,7 +39,8 @@ static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscRea
   if (V) {
     PetscCall(VecWAXPY(D, -1., V, V1));
     PetscCall(VecGetArrayRead(D, &v));
-    for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) mass += m->space->node_mass[i / 3] * v[i] * v[i];
+    for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++)
+      mass += m->space->node_mass[i / 3] * v[i] * v[i];
     PetscCall(VecRestoreArrayRead(D, &v));
   }
   PetscCallMPI(MPI_Allreduce(&mass, &all, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -46,10 +50,14 @@ static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscRea
 }
 
 /* Error of `source` in a run against a reference run. */
-static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source, const char *scene,
-                              const char *coarse, const char *fine, PetscReal low, PetscReal high)
+static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source,
+                              const char *scene, const char *coarse, const char *fine,
+                              PetscReal low, PetscReal high)
 {
-  PetscReal error = 0., estimate, stored, linear = 0., ratio;
+  PetscReal error = 0.;
+  PetscReal estimate, stored;
+  PetscReal linear = 0.;
+  PetscReal ratio;
   TestScene t, reference;
 
   PetscFunctionBeginUser;
@@ -57,16 +65,20 @@ static PetscErrorCode compare(const char *what, const char *name, SbErrorSource 
   PetscCall(verify_solve(&reference, what));
   PetscCall(test_open(&t, "%s %s -ledger yes", scene, coarse));
   PetscCall(verify_solve(&t, what));
-  PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(
+    distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
   PetscCall(test_ledger(t.run, source, &estimate, &stored));
+
   /* the remainder of Newton's method is partly that of its linear solves */
-  if (source == SB_ERROR_NONLINEAR) PetscCall(test_ledger(t.run, SB_ERROR_LINEAR, &linear, &stored));
+  if (source == SB_ERROR_NONLINEAR)
+    PetscCall(test_ledger(t.run, SB_ERROR_LINEAR, &linear, &stored));
   estimate = PetscSqrtReal(PetscSqr(estimate) + PetscSqr(linear));
   ratio = estimate / error;
   stored = PetscSqrtReal(stored);
-  test_print("  | %s | %s | %.2e | %.2e | %.2f |\n", what, name, error / stored, estimate / stored, ratio);
-  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, name, ratio,
-           low, high);
+  test_print("  | %s | %s | %.2e | %.2e | %.2f |\n", what, name, error / stored, estimate / stored,
+             ratio);
+  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what,
+           name, ratio, low, high);
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_close(&reference));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -78,13 +90,17 @@ static PetscErrorCode steps(void)
     const char *what, *scene, *coarse, *fine;
     PetscReal low, high;
   } of[] = {
-    {"implicit Euler", "", "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125", 0.5, 2},
-    {"implicit Euler, long steps", "", "-time euler_implicit -ts_dt 0.01", "-time newmark -ts_dt 0.0005", 0.3,
-     3},
+    {"implicit Euler", "", "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125",
+     0.5, 2},
+    {"implicit Euler, long steps", "", "-time euler_implicit -ts_dt 0.01",
+     "-time newmark -ts_dt 0.0005", 0.3, 3},
     {"Newmark", "", "-time newmark -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
-    {"generalized alpha", "", "-time genalpha -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
-    {"symplectic Euler", "", "-time euler_symplectic -ts_dt 5e-4", "-time newmark -ts_dt 0.00025", 0.5, 2},
-    {"implicit Euler, damped", "-effects gravity,hold,damp -effect_damp_type damping -effect_damp_alpha 4",
+    {"generalized alpha", "", "-time genalpha -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5,
+     2},
+    {"symplectic Euler", "", "-time euler_symplectic -ts_dt 5e-4", "-time newmark -ts_dt 0.00025",
+     0.5, 2},
+    {"implicit Euler, damped",
+     "-effects gravity,hold,damp -effect_damp_type damping -effect_damp_alpha 4",
      "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125", 0.5, 2},
     {"Newmark, corotated", "-body_bar_material corotated", "-time newmark -ts_dt 0.008",
      "-time newmark -ts_dt 0.00025", 0.5, 2},
@@ -96,13 +112,15 @@ static PetscErrorCode steps(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
-    /* thousands of steps of a small system: on several ranks only an implicit and an explicit integrator */
-    if (test_size > 1 && i != 2 && i != 4) continue;
+    /* thousands of steps of a small system: on several ranks only an implicit and an explicit
+       integrator */
+    if (test_size > 1 && i != 2 && i != 4)
+      continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene),
                             BAR "-body_bar_material linear -ts_max_time 0.4 -ksp_rtol 1e-10 %s",
                             of[i].scene));
-    PetscCall(
-      compare(of[i].what, "time", SB_ERROR_TIME, scene, of[i].coarse, of[i].fine, of[i].low, of[i].high));
+    PetscCall(compare(of[i].what, "time", SB_ERROR_TIME, scene, of[i].coarse, of[i].fine, of[i].low,
+                      of[i].high));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -115,14 +133,16 @@ static PetscErrorCode solves(void)
     SbErrorSource source;
     const char *scene, *coarse, *fine;
   } of[] = {
-    {"CG to 1e-2", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static", "-ksp_rtol 1e-2",
-     "-ksp_rtol 1e-13"},
-    {"CG to 1e-5", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static", "-ksp_rtol 1e-5",
-     "-ksp_rtol 1e-13"},
-    {"Newton to 1e-1", "nonlinear", SB_ERROR_NONLINEAR, "-body_bar_material neohookean -time static",
-     "-ksp_rtol 1e-8 -snes_rtol 1e-1", "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
-    {"Newton to 1e-4", "nonlinear", SB_ERROR_NONLINEAR, "-body_bar_material neohookean -time static",
-     "-ksp_rtol 1e-8 -snes_rtol 1e-4", "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
+    {"CG to 1e-2", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static",
+     "-ksp_rtol 1e-2", "-ksp_rtol 1e-13"},
+    {"CG to 1e-5", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static",
+     "-ksp_rtol 1e-5", "-ksp_rtol 1e-13"},
+    {"Newton to 1e-1", "nonlinear", SB_ERROR_NONLINEAR,
+     "-body_bar_material neohookean -time static", "-ksp_rtol 1e-8 -snes_rtol 1e-1",
+     "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
+    {"Newton to 1e-4", "nonlinear", SB_ERROR_NONLINEAR,
+     "-body_bar_material neohookean -time static", "-ksp_rtol 1e-8 -snes_rtol 1e-4",
+     "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
     {"CG to 1e-3, Newmark", "linear", SB_ERROR_LINEAR,
      "-body_bar_material linear -time newmark -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
      "-ksp_rtol 1e-12"},
@@ -130,48 +150,58 @@ static PetscErrorCode solves(void)
      "-body_bar_material linear -time genalpha -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
      "-ksp_rtol 1e-12"},
     {"Newton to 1e-3, implicit Euler", "nonlinear", SB_ERROR_NONLINEAR,
-     "-body_bar_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4", "-snes_rtol 1e-3",
-     "-snes_rtol 1e-10 -ksp_rtol 1e-8"},
+     "-body_bar_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4",
+     "-snes_rtol 1e-3", "-snes_rtol 1e-10 -ksp_rtol 1e-8"},
     {"CG to 1e-3, implicit Euler", "linear", SB_ERROR_LINEAR,
-     "-body_bar_material linear -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
-     "-ksp_rtol 1e-12"},
+     "-body_bar_material linear -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4",
+     "-ksp_rtol 1e-3", "-ksp_rtol 1e-12"},
     {"CG to 1e-3, P2", "linear", SB_ERROR_LINEAR,
-     "-body_bar_material linear -body_bar_element p2 -time static", "-ksp_rtol 1e-3", "-ksp_rtol 1e-13"},
+     "-body_bar_material linear -body_bar_element p2 -time static", "-ksp_rtol 1e-3",
+     "-ksp_rtol 1e-13"},
   };
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
-    /* with a factor per rank the error of CG is smooth and accumulates: docs/reports/error_estimates.md */
-    if (test_size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR) continue;
+    /* with a factor per rank the error of CG is smooth and accumulates:
+       docs/reports/error_estimates.md */
+    if (test_size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR)
+      continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene), BAR "%s %s", cg, of[i].scene));
-    PetscCall(compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));
+    PetscCall(
+      compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Penalty springs against the exact rigid contact: a block indented by a ball, and one that settles evenly on its springs. */
+/* Penalty springs against the exact rigid contact: a block indented by a ball, and one that settles
+   evenly on its springs. */
 static PetscErrorCode springs(void)
 {
   static const char block[] =
-    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear "
+    "-body_block_young 1e5 "
     "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type fixed -effect_tool_type contact "
     "-effect_tool_response projected -effect_tool_on zmax -time static -ksp_rtol 1e-10 ";
-  static const char ball[] = "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
-  static const char *const stiffness[] = {"20", "5"}, *const width[] = {"2e-4", "1e-3"};
+  static const char ball[] =
+    "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
+  static const char *const stiffness[] = {"20", "5"};
+  static const char *const width[] = {"2e-4", "1e-3"};
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 2; i++) {
     char scene[VERIFY_TEXT], coarse[256];
 
     PetscCall(PetscSNPrintf(scene, sizeof(scene), "%s %s", block, ball));
-    PetscCall(PetscSNPrintf(coarse, sizeof(coarse), "-effect_tool_response penalty -effect_tool_stiffness %s",
+    PetscCall(PetscSNPrintf(coarse, sizeof(coarse),
+                            "-effect_tool_response penalty -effect_tool_stiffness %s",
                             stiffness[i]));
     PetscCall(compare("springs under a ball", "contact", SB_ERROR_CONTACT, scene, coarse,
                       "-effect_tool_response projected", 0.3, 3));
     PetscCall(PetscSNPrintf(coarse, sizeof(coarse),
-                            "-effect_tool_response barrier -effect_tool_barrier_width %s", width[i]));
+                            "-effect_tool_response barrier -effect_tool_barrier_width %s",
+                            width[i]));
     PetscCall(compare("gaps of a barrier under a ball", "contact", SB_ERROR_CONTACT, scene, coarse,
                       "-effect_tool_response barrier -effect_tool_barrier_width 4e-6", 0.3, 3));
   }
@@ -186,66 +216,78 @@ static PetscErrorCode spectator(const char *options)
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 2; i++) {
-    PetscCall(
-      test_open(&t[i], BAR "%s %s", options,
-                i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
+    PetscCall(test_open(
+      &t[i], BAR "%s %s", options,
+      i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
     PetscCall(verify_solve(&t[i], "spectator"));
   }
-  SB_CHECK(!t[0].ledger && !t[0].run->post_solve.fn && !t[0].run->ncolumn, "a run without -ledger has one");
+  SB_CHECK(!t[0].ledger && !t[0].run->post_solve.fn && !t[0].run->ncolumn,
+           "a run without -ledger has one");
   SB_CHECK(t[1].run->ncolumn == SB_ERROR_COUNT, "%d columns", (int)t[1].run->ncolumn);
   PetscCall(VecAXPY(t[1].run->U, -1., t[0].run->U));
   PetscCall(VecNorm(t[1].run->U, NORM_INFINITY, &difference));
   SB_CHECK(difference == 0., "with a ledger displacements differ by %g m: %s", difference, options);
-  SB_CHECK(t[0].run->linear_total == t[1].run->linear_total, "with a ledger iterations differ: %s", options);
-  for (int i = 0; i < 2; i++) PetscCall(test_scene_close(&t[i]));
+  SB_CHECK(t[0].run->linear_total == t[1].run->linear_total, "with a ledger iterations differ: %s",
+           options);
+  for (int i = 0; i < 2; i++)
+    PetscCall(test_scene_close(&t[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The requested accuracy is reached, and not exceeded by a large factor. */
 static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
 {
-  PetscReal error = 0., form, stored;
+  PetscReal error = 0.;
+  PetscReal form, stored;
   TestScene t, reference;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    test_open(&reference,
-              BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.00025 -ksp_rtol 1e-10"));
+  PetscCall(test_open(
+    &reference,
+    BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.00025 -ksp_rtol 1e-10"));
   PetscCall(verify_solve(&reference, "dial"));
   PetscCall(test_open(
-    &t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g", accuracy));
+    &t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g",
+    accuracy));
   PetscCall(verify_solve(&t, "dial"));
-  PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(
+    distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
   PetscCall(test_ledger(t.run, SB_ERROR_TIME, &form, &stored));
   *steps = t.run->steps_total;
   test_print("  -accuracy %g: %d steps, %d iterations, error %.2e\n", accuracy, (int)*steps,
              (int)t.run->linear_total, error / PetscSqrtReal(stored));
   SB_CHECK(error < accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g", accuracy,
            error / PetscSqrtReal(stored));
-  SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good", accuracy,
-           error / PetscSqrtReal(stored));
+  SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good",
+           accuracy, error / PetscSqrtReal(stored));
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_close(&reference));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain;
-  the gaps are the only error, and their share of the displacement is that of force and state. And a ball that
-  indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of
-  the mesh.
+  A block between rollers and a plate that is displaced onto it by a hundredth of the height:
+  uniform strain; the gaps are the only error, and their share of the displacement is that of force
+  and state. And a ball that indents a block against the same with a tiny width: the error is the
+  requested one, or a tenth of that of the mesh.
 */
 static PetscErrorCode gaps(void)
 {
   static const char plate[] =
-    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
-    "-body_block_poisson 0.3 -sets left,front,low -set_left_at plane:1,0,0,0 -set_front_at plane:0,1,0,0 "
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear "
+    "-body_block_young 1e5 "
+    "-body_block_poisson 0.3 -sets left,front,low -set_left_at plane:1,0,0,0 -set_front_at "
+    "plane:0,1,0,0 "
     "-set_low_at plane:0,0,1,0 -effects x,y,z,tool -effect_x_type fixed -effect_x_on left "
-    "-effect_x_components x -effect_y_type fixed -effect_y_on front -effect_y_components y -effect_z_type "
-    "fixed -effect_z_on low -effect_z_components z -effect_tool_type contact -effect_tool_response barrier "
-    "-effect_tool_obstacle plane:0,0,-1,-0.0505 -effect_tool_displacement 0;0;-0.001*t -time static ";
+    "-effect_x_components x -effect_y_type fixed -effect_y_on front -effect_y_components y "
+    "-effect_z_type "
+    "fixed -effect_z_on low -effect_z_components z -effect_tool_type contact -effect_tool_response "
+    "barrier "
+    "-effect_tool_obstacle plane:0,0,-1,-0.0505 -effect_tool_displacement 0;0;-0.001*t -time "
+    "static ";
   static const char ball[] =
-    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear "
+    "-body_block_young 1e5 "
     "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type fixed -effect_hold_on zmin "
     "-effect_tool_type contact -effect_tool_response barrier -effect_tool_on zmax -time static "
     "-effect_tool_obstacle sphere:0.05,0.05,0.0905,0.04 -effect_tool_displacement 0;0;-0.0035*t ";
@@ -259,16 +301,19 @@ static PetscErrorCode gaps(void)
   PetscCall(test_open(&reference, "%s -effect_tool_barrier_width 1e-6", ball));
   PetscCall(verify_solve(&reference, "ball"));
   for (int i = 0; i < 2; i++) {
-    PetscReal error, mesh = 0., stored;
+    PetscReal error;
+    PetscReal mesh = 0.;
+    PetscReal stored;
 
     PetscCall(test_open(&t, "%s -accuracy %g", plate, asked[i]));
     PetscCall(verify_solve(&t, "plate"));
     PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
-    error = PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
+    error =
+      PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
     test_print("  plate, -accuracy %g: force off by %.1e, width %.1e m\n", asked[i], error,
                t.model->potential[0]->width);
-    SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g", asked[i],
-             error);
+    SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g",
+             asked[i], error);
     SB_CHECK(!i || t.model->potential[0]->width < 0.2 * width, "width %g, then %g m", width,
              t.model->potential[0]->width);
     width = t.model->potential[0]->width;
@@ -276,12 +321,13 @@ static PetscErrorCode gaps(void)
 
     PetscCall(test_open(&t, "%s -accuracy %g", ball, asked[i]));
     PetscCall(verify_solve(&t, "ball"));
-    PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+    PetscCall(
+      distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
     PetscCall(test_ledger(t.run, SB_ERROR_SPACE, &mesh, &stored));
     test_print("  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n", asked[i],
                error / PetscSqrtReal(stored), mesh / PetscSqrtReal(stored));
-    SB_CHECK(error < PetscMax(asked[i] * PetscSqrtReal(stored), 0.1 * mesh), "ball, -accuracy %g: %g",
-             asked[i], error / PetscSqrtReal(stored));
+    SB_CHECK(error < PetscMax(asked[i] * PetscSqrtReal(stored), 0.1 * mesh),
+             "ball, -accuracy %g: %g", asked[i], error / PetscSqrtReal(stored));
     PetscCall(test_scene_close(&t));
   }
   PetscCall(test_scene_close(&reference));
@@ -296,6 +342,7 @@ int main(int argc, char **argv)
   PetscCall(steps());
   PetscCall(solves());
   PetscCall(springs());
+
   /* a factorisation on several ranks sums in the order in which messages arrive */
   PetscCall(spectator("-body_bar_material linear -time static -solver cg_icc"));
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));

@@ -1,24 +1,27 @@
 // @ranks 1,2
 /*
-  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to
-  the stretch s, has the nominal stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
+  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one
+  axis to the stretch s, has the nominal stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3:
+  0.19245 E.
 
-  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without
-  bound with the load. A path to a lower load reaches its end. With arc length control each equilibrium
-  satisfies the formula, past the maximum, through s = 0, where the height is zero, to the inverted branch,
-  which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path,
-  also from the end of a load path.
+  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements
+  grow without bound with the load. A path to a lower load reaches its end. With arc length control
+  each equilibrium satisfies the formula, past the maximum, through s = 0, where the height is zero,
+  to the inverted branch, which carries 0.2 E; with dead and follower loads, and with all elements.
+  A restart continues the same path, also from the end of a load path.
 
-  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a
-  cantilever curled up by it the number of Newton iterations is bounded, although symmetric parts of the
-  tangent are indefinite on the way; likewise for a strip that it pulls by its end.
+  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for
+  a cantilever curled up by it the number of Newton iterations is bounded, although symmetric parts
+  of the tangent are indefinite on the way; likewise for a strip that it pulls by its end.
 */
 #include "verify.h"
 
-#define CUBE                                                                                              \
-  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 "           \
-  "-body_a_density 1 -effects x,y,z,press -effect_x_type fixed -effect_x_on xmin -effect_x_components x " \
-  "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed -effect_z_on zmin " \
+#define CUBE                                                                                    \
+  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 " \
+  "-body_a_density 1 -effects x,y,z,press -effect_x_type fixed -effect_x_on xmin "              \
+  "-effect_x_components x "                                                                     \
+  "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed "         \
+  "-effect_z_on zmin "                                                                          \
   "-effect_z_components z -effect_press_on zmax -time static "
 #define DEAD "-effect_press_type traction -effect_press_vector 0;0;%.17g "
 
@@ -33,11 +36,13 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
+  PetscCall(test_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load,
+                      steps, more));
   PetscCall(SbRunSolve(t.run));
   test_print("  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n", load, steps, more,
              t.run->t_now, (int)t.run->steps_total, t.run->softening, t.run->stop_reason);
-  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit", t.run->t_now);
+  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit",
+           t.run->t_now);
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3 / steps, "load factor reached");
   SB_CHECK(t.run->steps_total <= steps + 60, "%d steps", (int)t.run->steps_total);
   SB_CHECK((t.run->stop_reason[0] == 0) == (reached == 1.), "%s", t.run->stop_reason);
@@ -49,7 +54,8 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
 /* Path with a follower pressure: it ends at the limit, in few iterations. */
 static PetscErrorCode check_follower_end(const char *element)
 {
-  const PetscReal load = 0.25, reached = limit / load;
+  const PetscReal load = 0.25;
+  const PetscReal reached = limit / load;
   TestScene t;
 
   PetscFunctionBeginUser;
@@ -58,9 +64,11 @@ static PetscErrorCode check_follower_end(const char *element)
                            "-body_a_element %s",
                       load, element));
   PetscCall(SbRunSolve(t.run));
-  test_print("  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n", load, element, t.run->t_now,
-             (int)t.run->steps_total, (int)t.run->newton_total, t.run->stop_reason);
-  /* below the limit by the least increment; the iterations are bounded by twice those of the slowest element */
+  test_print("  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n", load, element,
+             t.run->t_now, (int)t.run->steps_total, (int)t.run->newton_total, t.run->stop_reason);
+
+  /* below the limit by the least increment; the iterations are bounded by twice those of the
+     slowest element */
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
   SB_CHECK(t.run->softening > 10., "%s: softening %g", element, t.run->softening);
   SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
@@ -69,33 +77,37 @@ static PetscErrorCode check_follower_end(const char *element)
 }
 
 /* Cantilever that a follower pressure on its upper face curls up. */
-static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pressure, PetscReal iterations)
+static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pressure,
+                                 PetscReal iterations)
 {
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
-                      "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
-                      "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
-                      "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
-                      nu, pressure, element));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
+    "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
+    "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
+    "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
+    nu, pressure, element));
   PetscCall(verify_solve(&t, "curl"));
   PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n", element,
-    nu, pressure, (int)t.run->newton_total, (int)t.run->linear_total, (int)t.run->rejected_total));
+    PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
+    element, nu, pressure, (int)t.run->newton_total, (int)t.run->linear_total,
+    (int)t.run->rejected_total));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
            t.run->t_now, (int)t.run->rejected_total);
-  SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
+  SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element,
+           (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is
-  pulled the less stiff it is in bending: the lowest eigenvalue of the tangent decreases as exp(-k length),
-  k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps
-  increase the residual, and the next ones reduce it.
+  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more
+  it is pulled the less stiff it is in bending: the lowest eigenvalue of the tangent decreases as
+  exp(-k length), k^2 = load / (EI); that of its symmetric part is negative from the first load step
+  on. Full Newton steps increase the residual, and the next ones reduce it.
 */
 static PetscErrorCode check_pull(const char *element, PetscReal nu)
 {
@@ -103,22 +115,27 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
-                      "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
-                      "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
-                      "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
-                      "-body_a_element %s",
-                      nu, element));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
+              "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
+              "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
+              "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
+              "-body_a_element %s",
+              nu, element));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "pull"));
   PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element,
-    nu, (int)t.run->newton_total, (int)t.run->rejected_total, t.run->energies.strain));
+    PETSC_COMM_WORLD,
+    "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element, nu,
+    (int)t.run->newton_total, (int)t.run->rejected_total, t.run->energies.strain));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
            t.run->t_now, (int)t.run->rejected_total);
+
   /* 1.5 times the measured number */
-  SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element, (int)t.run->newton_total);
+  SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element,
+           (int)t.run->newton_total);
+
   /* P1 is too stiff by 6 % */
   SB_CHECK_NEAR(t.run->energies.strain, energy, 0.08 * energy, "strain energy");
   PetscCall(test_scene_close(&t));
@@ -139,7 +156,8 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionBeginUser;
   (void)run;
   b->s = 2. * step->energies.centre[2]; /* the base stays at z = 0 */
-  b->error = PetscMax(b->error, PetscAbsReal(step->t * b->load - 0.5 * (b->s - b->s * b->s * b->s)));
+  b->error =
+    PetscMax(b->error, PetscAbsReal(step->t * b->load - 0.5 * (b->s - b->s * b->s * b->s)));
   b->top = PetscMax(b->top, step->t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,7 +179,8 @@ static PetscErrorCode open_branch(const char *dir, PetscBool follower, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solution branch: with a dead load until the inverted cube carries it, with a follower load to beyond the limit. */
+/* Solution branch: with a dead load until the inverted cube carries it, with a follower load to
+   beyond the limit. */
 static PetscErrorCode check_branch(PetscBool follower, const char *more)
 {
   TestScene t;
@@ -170,8 +189,9 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscFunctionBeginUser;
   PetscCall(open_branch(NULL, follower, more, &b, &t));
   PetscCall(verify_solve(&t, "branch"));
-  test_print("  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n", more,
-             (int)t.run->steps_total, (int)t.run->rejected_total, b.top, b.s, b.error);
+  test_print("  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n",
+             more, (int)t.run->steps_total, (int)t.run->rejected_total, b.top, b.s, b.error);
+
   /* tolerance of the residual: 1e-8 of the load */
   SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, b.error);
   SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, t.run->t_now);
@@ -181,30 +201,31 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prescribed displacements scale with the load factor: s = 1 - lambda / 2, and Newton's method converges as with loads. */
+/* Prescribed displacements scale with the load factor: s = 1 - lambda / 2, and Newton's method
+   converges as with loads. */
 static PetscErrorCode check_drive(void)
 {
   TestScene t;
   Branch b = {.load = 0.};
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(
-    &t, CUBE ARC
-    "-static_steps 10 -effect_press_type prescribed_displacement -effect_press_displacement 0;0;-0.5"));
+  PetscCall(test_open(&t, CUBE ARC "-static_steps 10 -effect_press_type prescribed_displacement "
+                                   "-effect_press_displacement 0;0;-0.5"));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(verify_solve(&t, "prescribed_displacement"));
   test_print("  drive: %d steps, %d Newton iterations, s %.12f\n", (int)t.run->steps_total,
              (int)t.run->newton_total, b.s);
-  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", b.s,
-           t.run->t_now);
+  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g",
+           b.s, t.run->t_now);
   SB_CHECK(t.run->rejected_total == 0 && t.run->newton_total <= 5 * t.run->steps_total,
            "%d Newton iterations in %d steps", (int)t.run->newton_total, (int)t.run->steps_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A restart from a checkpoint within a run, or at the end of a load path, continues on the same branch. */
+/* A restart from a checkpoint within a run, or at the end of a load path, continues on the same
+   branch. */
 static PetscErrorCode check_restart(const char *first, const char *checkpoint, PetscReal tolerance)
 {
   const char *folder = getenv("TMPDIR");
@@ -220,12 +241,13 @@ static PetscErrorCode check_restart(const char *first, const char *checkpoint, P
   PetscCall(open_branch(dir, PETSC_FALSE, more, &whole, &t));
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_scene_close(&t));
-  PetscCall(PetscSNPrintf(more, sizeof(more), ARC "-static_max_displacement 0.99 -restart %s/%s " OUTPUT, dir,
+  PetscCall(PetscSNPrintf(more, sizeof(more),
+                          ARC "-static_max_displacement 0.99 -restart %s/%s " OUTPUT, dir,
                           checkpoint));
   PetscCall(open_branch(dir, PETSC_FALSE, more, &b, &t));
   PetscCall(SbRunSolve(t.run));
-  test_print("  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first, checkpoint, whole.s, b.s,
-             b.error);
+  test_print("  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first, checkpoint,
+             whole.s, b.s, b.error);
   SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", b.error);
   SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", b.s);
   SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", b.s, whole.s);
@@ -237,9 +259,11 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_end(0.19, 5, "-body_a_tangent exact"));
+
   /* Newton's method with the exact tangent can converge to the inverted cube */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact -time_inverted reject"));
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd"));
+
   /* increments as small as rounding: the limit of attempts ends the path */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd -static_min_increment 1e-15"));
   PetscCall(check_follower_end("p1"));
@@ -247,6 +271,7 @@ int main(int argc, char **argv)
   PetscCall(check_follower_end("cr"));
   PetscCall(check_curl("p1", 0.3, 2e4, 90));
   PetscCall(check_curl("p2", 0.3, 8e3, 110));
+
   /* the symmetric part of the tangent is indefinite from load factors of 0.75 on */
   PetscCall(check_curl("p2", 0.4999, 1.2e3, 250));
   PetscCall(check_pull("p1", 0.4999));

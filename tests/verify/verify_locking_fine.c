@@ -2,8 +2,8 @@
 // @ranks 1
 // @cpu 1500
 /*
-  The last refinement of the convergence that verify_locking.c begins, n = 8 and 16, at the smallest and the
-  largest Poisson's ratio: 152,064 unknowns with CR, 294,912 with DG.
+  The last refinement of the convergence that verify_locking.c begins, n = 8 and 16, at the smallest
+  and the largest Poisson's ratio: 152,064 unknowns with CR, 294,912 with DG.
 */
 #include "locking.h"
 
@@ -15,8 +15,8 @@ static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, Pet
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver pressure", element));
   PetscCall(locking_cube(n, "", nu, more, error, &cost));
-  test_print("  %s nu %-8g n %2d: L2 %.5f  H1 %.5f, %.1f s\n", element, nu, (int)n, error[0], error[1],
-             cost.seconds);
+  test_print("  %s nu %-8g n %2d: L2 %.5f  H1 %.5f, %.1f s\n", element, nu, (int)n, error[0],
+             error[1], cost.seconds);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -27,7 +27,8 @@ static PetscErrorCode check_order(const char *element, PetscReal nu)
   PetscFunctionBeginUser;
   PetscCall(measure(element, 8, nu, coarse));
   PetscCall(measure(element, 16, nu, fine));
-  for (int k = 0; k < 2; k++) order[k] = PetscLog2Real(coarse[k] / fine[k]);
+  for (int k = 0; k < 2; k++)
+    order[k] = PetscLog2Real(coarse[k] / fine[k]);
   test_print("  %s nu %-8g orders %.3f %.3f\n", element, nu, order[0], order[1]);
   SB_CHECK(order[0] >= 1.9, "%s, nu %g: order %g in L2", element, nu, order[0]);
   SB_CHECK(order[1] >= 0.95, "%s, nu %g: order %g in H1", element, nu, order[1]);

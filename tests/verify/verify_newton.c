@@ -1,12 +1,13 @@
 // @ranks 1 2
 /*
-  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load
-  step, near nu = 1/2.
+  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in
+  one load step, near nu = 1/2.
 
-  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of
-  2, 4 and 8 equal load steps, all with the same final state. An indefinite tangent is projected: with the
-  exact one only the same load takes more iterations, and with the projected one only the last iterations are
-  not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
+  It converges in one load step, without a rejected one, and takes at most twice the iterations of
+  the best of 2, 4 and 8 equal load steps, all with the same final state. An indefinite tangent is
+  projected: with the exact one only the same load takes more iterations, and with the projected one
+  only the last iterations are not quadratic. Loose linear solves do not prevent the recovery from a
+  provisional step.
 */
 #include "verify.h"
 
@@ -25,7 +26,8 @@ static PetscErrorCode keep(SNES snes, PetscInt it, PetscReal norm, void *ctx)
 
   PetscFunctionBeginUser;
   (void)snes;
-  if (it == 0) o->n = 0;
+  if (it == 0)
+    o->n = 0;
   o->residual[o->n++ % MOST] = norm;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -35,12 +37,13 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
-                      "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
-                      "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
-                      "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
-                      poisson, (int)steps, extra));
+  PetscCall(
+    test_open(&t,
+              "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
+              "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
+              "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+              "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
+              poisson, (int)steps, extra));
   *o = (Outcome){0};
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SNESMonitorSet(t.run->snes, keep, o, NULL));
@@ -54,43 +57,52 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
 
 static PetscErrorCode check_one_step(PetscReal poisson)
 {
-  Outcome one, best = {.iterations = PETSC_MAX_INT}, o;
+  Outcome one;
+  Outcome best = {.iterations = PETSC_MAX_INT};
+  Outcome o;
 
   PetscFunctionBeginUser;
   PetscCall(bend(poisson, 1, "", &one));
   for (PetscInt steps = 2; steps <= 8; steps *= 2) {
     PetscCall(bend(poisson, steps, "", &o));
     SB_CHECK_NEAR(o.strain, one.strain, 1e-6 * one.strain, "strain energy with more load steps");
-    if (o.iterations < best.iterations) best = o;
+    if (o.iterations < best.iterations)
+      best = o;
   }
   test_print("  nu %g: %d iterations in one load step, %d in the best number of them\n", poisson,
              (int)one.iterations, (int)best.iterations);
   SB_CHECK(one.rejected == 0, "nu %g: %d rejected load steps", poisson, (int)one.rejected);
-  SB_CHECK(one.iterations <= 2 * best.iterations, "nu %g: %d iterations, %d with load steps chosen by hand",
-           poisson, (int)one.iterations, (int)best.iterations);
+  SB_CHECK(one.iterations <= 2 * best.iterations,
+           "nu %g: %d iterations, %d with load steps chosen by hand", poisson, (int)one.iterations,
+           (int)best.iterations);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A pressure that bends the bar by more than its length: the first step changes volumes by a fifth, and pressures are those of its linearisation. */
+/* A pressure that bends the bar by more than its length: the first step changes volumes by a fifth,
+   and pressures are those of its linearisation. */
 static PetscErrorCode check_bend_far(const char *element)
 {
   Outcome one, four;
   char extra[256];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(extra, sizeof(extra),
-                          "-body_bar_element %s -effects gravity,clamp,press -effect_gravity_vector 0,0,0 "
-                          "-effect_press_type pressure -effect_press_on zmax -effect_press_value 2400",
-                          element));
+  PetscCall(
+    PetscSNPrintf(extra, sizeof(extra),
+                  "-body_bar_element %s -effects gravity,clamp,press -effect_gravity_vector 0,0,0 "
+                  "-effect_press_type pressure -effect_press_on zmax -effect_press_value 2400",
+                  element));
   PetscCall(bend(0.4999, 1, extra, &one));
   PetscCall(bend(0.4999, 4, extra, &four));
-  test_print("  bend far, %s: %d iterations in one load step, %d in four\n", element, (int)one.iterations,
-             (int)four.iterations);
+  test_print("  bend far, %s: %d iterations in one load step, %d in four\n", element,
+             (int)one.iterations, (int)four.iterations);
   SB_CHECK(one.rejected == 0 && one.iterations <= four.iterations,
-           "%s: %d iterations, %d rejected load steps, %d iterations in four", element, (int)one.iterations,
-           (int)one.rejected, (int)four.iterations);
-  /* twice the measured number; with the pressures of the states 52, 147 and 236, the last two after a rejected load step */
+           "%s: %d iterations, %d rejected load steps, %d iterations in four", element,
+           (int)one.iterations, (int)one.rejected, (int)four.iterations);
+
+  /* twice the measured number; with the pressures of the states 52, 147 and 236, the last two after
+     a rejected load step */
   SB_CHECK(one.iterations <= 50, "%s: %d iterations", element, (int)one.iterations);
+
   /* the jump penalty of CR depends on the load steps, to the extent that it changes by a percent */
   SB_CHECK_NEAR(four.strain, one.strain, 1e-4 * one.strain, "strain energy with more load steps");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -108,7 +120,8 @@ static PetscErrorCode check_quadratic(void)
   if (o.n >= 4 && o.n < MOST) {
     const PetscReal *r = o.residual + o.n - 3;
 
-    /* for order two the ratio of the logarithms is 2; the last residual is at the level of rounding, hence 1.4 */
+    /* for order two the ratio of the logarithms is 2; the last residual is at the level of
+       rounding, hence 1.4 */
     SB_CHECK(PetscLogReal(r[2] / r[1]) < 1.4 * PetscLogReal(r[1] / r[0]),
              "residuals %g, %g, %g are not quadratic", r[0], r[1], r[2]);
   }
@@ -117,7 +130,8 @@ static PetscErrorCode check_quadratic(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A full Newton step in rotation stores hundreds of times the energy that it should release; the next step recovers although its linear solve is inexact. */
+/* A full Newton step in rotation stores hundreds of times the energy that it should release; the
+   next step recovers although its linear solve is inexact. */
 static PetscErrorCode check_come_back(void)
 {
   PetscInt iterations[2];
@@ -125,21 +139,22 @@ static PetscErrorCode check_come_back(void)
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
-    PetscCall(
-      test_open(&t,
-                "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material corotated "
-                "-body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 -effects clamp,gravity "
-                "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
-                k ? "pressure" : "direct"));
+    PetscCall(test_open(
+      &t,
+      "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material corotated "
+      "-body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 -effects clamp,gravity "
+      "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
+      k ? "pressure" : "direct"));
     PetscCall(verify_solve(&t, "come back"));
     iterations[k] = t.run->newton_total;
     SB_CHECK(t.run->rejected_total == 0, "%d rejected steps", (int)t.run->rejected_total);
     PetscCall(test_scene_close(&t));
   }
-  test_print("  come back: %d iterations with loose solves, %d with exact ones\n", (int)iterations[1],
-             (int)iterations[0]);
-  SB_CHECK(iterations[1] <= 2 * iterations[0], "%d iterations with loose solves, %d with exact ones",
-           (int)iterations[1], (int)iterations[0]);
+  test_print("  come back: %d iterations with loose solves, %d with exact ones\n",
+             (int)iterations[1], (int)iterations[0]);
+  SB_CHECK(iterations[1] <= 2 * iterations[0],
+           "%d iterations with loose solves, %d with exact ones", (int)iterations[1],
+           (int)iterations[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,7 +163,8 @@ int main(int argc, char *argv[])
   const PetscReal poisson[] = {0.3, 0.49, 0.499, 0.4999};
 
   SB_TEST_BEGIN(argc, argv);
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(poisson); k++) PetscCall(check_one_step(poisson[k]));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(poisson); k++)
+    PetscCall(check_one_step(poisson[k]));
   PetscCall(check_bend_far("p1"));
   PetscCall(check_bend_far("p2"));
   PetscCall(check_bend_far("cr"));

@@ -1,11 +1,11 @@
 // @ranks 1 2
 /*
-  Initially overlapping bodies are separated: cubes that overlap by half, rotated ones, crossed bars without a
-  vertex inside the other, a finger deep inside a block, bodies in rigid obstacles. The penetration is removed
-  in the number of steps of the option, with at most twice the energy M v^2 of a bar pushed with that speed v;
-  momentum is conserved. At the end there are no intersections and all pairs are included in the barrier;
-  -effect_NAME_verify checks the rest. A neighbouring body is not affected. A self-intersecting bent bar has
-  separation directions.
+  Initially overlapping bodies are separated: cubes that overlap by half, rotated ones, crossed bars
+  without a vertex inside the other, a finger deep inside a block, bodies in rigid obstacles. The
+  penetration is removed in the number of steps of the option, with at most twice the energy M v^2
+  of a bar pushed with that speed v; momentum is conserved. At the end there are no intersections
+  and all pairs are included in the barrier; -effect_NAME_verify checks the rest. A neighbouring
+  body is not affected. A self-intersecting bent bar has separation directions.
 */
 #include "contact.h"
 #include "sbbarrier.h"
@@ -24,8 +24,8 @@ static PetscReal parting_energy(PetscReal mass, PetscReal depth)
 }
 
 /* Bodies with a total mass of `mass` (kg); deepest: bounds of the initial depth, m. */
-static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscReal mass, PetscReal time,
-                                   const PetscReal deepest[2])
+static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscReal mass,
+                                   PetscReal time, const PetscReal deepest[2])
 {
   Record r = {0};
   PetscReal most;
@@ -42,15 +42,18 @@ static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscRe
   VERIFY_NEAR(record_last(&r, "meet_unguarded"), 0, 0, "edges through triangles at the end");
   VERIFY_LESS(record_max(&r, "kinetic"), 2 * most, "kinetic energy, J");
   VERIFY_MORE(record_max(&r, "kinetic"), 1e-4 * most, "kinetic energy, J");
-  VERIFY_LESS(record_last(&r, "strain"), 0.01 * record_last(&r, "kinetic"), "strain energy at the end, J");
+  VERIFY_LESS(record_last(&r, "strain"), 0.01 * record_last(&r, "kinetic"),
+              "strain energy at the end, J");
   VERIFY_LESS(record_size(&r, "momentum", PETSC_FALSE),
               1e-4 * PetscSqrtReal(mass * record_last(&r, "kinetic")), "momentum, kg m/s");
   VERIFY_LESS(record_size(&r, "angular", PETSC_FALSE),
-              1e-2 * 0.1 * PetscSqrtReal(mass * record_last(&r, "kinetic")), "angular momentum, kg m^2/s");
+              1e-2 * 0.1 * PetscSqrtReal(mass * record_last(&r, "kinetic")),
+              "angular momentum, kg m^2/s");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Faces in common planes, where rounding decides what is inside: the bodies are separated all the same. */
+/* Faces in common planes, where rounding decides what is inside: the bodies are separated all the
+   same. */
 static PetscErrorCode check_aligned(void)
 {
   Record r = {0};
@@ -58,8 +61,8 @@ static PetscErrorCode check_aligned(void)
   PetscFunctionBeginUser;
   verify_case("aligned");
   PetscCall(record_run(&r,
-                       MEET STEPPING "-bodies a,b -body_b_translate 0.05,0,0" SOFT("a", "box:0.1,0.1,0.1:3")
-                         SOFT("b", "box:0.1,0.1,0.1:2"),
+                       MEET STEPPING "-bodies a,b -body_b_translate 0.05,0,0" SOFT(
+                         "a", "box:0.1,0.1,0.1:3") SOFT("b", "box:0.1,0.1,0.1:2"),
                        STEP, 0.4));
   VERIFY_NEAR(record_last(&r, "meet_unguarded"), 0, 0, "edges through triangles at the end");
   VERIFY_LESS(record_max(&r, "kinetic"), 2 * parting_energy(2, DEPTH), "kinetic energy, J");
@@ -67,7 +70,8 @@ static PetscErrorCode check_aligned(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cube under its weight that initially overlaps an obstacle below it by a tenth of its height rises and comes to rest on it. */
+/* A cube under its weight that initially overlaps an obstacle below it by a tenth of its height
+   rises and comes to rest on it. */
 static PetscErrorCode check_obstacle(const char *obstacle)
 {
   const PetscReal weight = 9.81;
@@ -77,9 +81,10 @@ static PetscErrorCode check_obstacle(const char *obstacle)
   verify_case("in %s", obstacle);
   PetscCall(record_run(
     &r,
-    STEPPING "-bodies a -body_a_translate 0,0,-0.01 -effects gravity,floor -effect_floor_type contact "
-             "-effect_floor_response barrier -effect_floor_verify yes -effect_floor_obstacle %s" SOFT(
-               "a", "box:0.1,0.1,0.1:3"),
+    STEPPING
+    "-bodies a -body_a_translate 0,0,-0.01 -effects gravity,floor -effect_floor_type contact "
+    "-effect_floor_response barrier -effect_floor_verify yes -effect_floor_obstacle %s" SOFT(
+      "a", "box:0.1,0.1,0.1:3"),
     STEP, 0.6, obstacle));
   VERIFY_NEAR(record_at(&r, "floor_penetration", 1), 0.01, 0.1, "depth after a step, m");
   VERIFY_NEAR(record_last(&r, "floor_penetration"), 0, 0, "depth at the end, m");
@@ -93,7 +98,8 @@ static PetscErrorCode check_obstacle(const char *obstacle)
 static PetscErrorCode check_ring(const char *element)
 {
   SbContactOverlap o = {0};
-  PetscReal *x, radial = 0;
+  PetscReal *x;
+  PetscReal radial = 0;
   SbContactMesh m;
   SbFacet *facet;
   PetscInt nfacet, set;
@@ -113,7 +119,9 @@ static PetscErrorCode check_ring(const char *element)
   m->self = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &x));
   for (PetscInt i = 0; i < m->nvertex; i++) {
-    const PetscReal *X = m->X + 3 * i, turn = (2 * PETSC_PI + 0.7) / 2, r = 1 / turn + X[2] + 0.03 * X[0];
+    const PetscReal *X = m->X + 3 * i;
+    const PetscReal turn = (2 * PETSC_PI + 0.7) / 2;
+    const PetscReal r = 1 / turn + X[2] + 0.03 * X[0];
 
     x[3 * i] = r * PetscSinReal(turn * X[0]);
     x[3 * i + 1] = X[1];
@@ -121,10 +129,11 @@ static PetscErrorCode check_ring(const char *element)
   }
   PetscCall(SbContactOverlapFind(m, x, PETSC_FALSE, &o));
   for (PetscInt i = 0; i < o.n; i++) {
-    const PetscReal *p = x + 3 * o.point[i].v[0], *n = o.point[i].normal;
+    const PetscReal *p = x + 3 * o.point[i].v[0];
+    const PetscReal *n = o.point[i].normal;
 
-    radial +=
-      PetscAbsReal(n[0] * p[0] + n[2] * p[2]) / PetscSqrtReal(p[0] * p[0] + p[2] * p[2]) / (PetscReal)o.n;
+    radial += PetscAbsReal(n[0] * p[0] + n[2] * p[2]) / PetscSqrtReal(p[0] * p[0] + p[2] * p[2]) /
+              (PetscReal)o.n;
   }
   VERIFY_MORE(o.ncrossing, 20, "edges through triangles");
   VERIFY_MORE(o.n, 8, "points that know the way out");
@@ -141,8 +150,10 @@ static PetscErrorCode check_ring(const char *element)
 
 int main(int argc, char **argv)
 {
-  const PetscReal half[2] = {DEPTH, 0.13}, small[2] = {0.04, 0.05}, bars[2] = {0.008, 0.012},
-                  finger[2] = {0.1, 0.11};
+  const PetscReal half[2] = {DEPTH, 0.13};
+  const PetscReal small[2] = {0.04, 0.05};
+  const PetscReal bars[2] = {0.008, 0.012};
+  const PetscReal finger[2] = {0.1, 0.11};
   Record r = {0};
 
   SB_TEST_BEGIN(argc, argv);
@@ -150,33 +161,33 @@ int main(int argc, char **argv)
                          "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
                            SOFT("b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.05,0.003,0.004",
                          2, 0.4, half));
-  PetscCall(check_bodies(
-    "cubes, CR, and themselves",
-    "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3") SOFT(
-      "b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.05,0.003,0.004 -body_a_element cr -body_b_element cr "
-                                "-effect_meet_self yes",
-    2, 0.4, half));
+  PetscCall(check_bodies("cubes, CR, and themselves",
+                         "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
+                           SOFT("b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.05,0.003,0.004 "
+                                                          "-body_a_element cr -body_b_element cr "
+                                                          "-effect_meet_self yes",
+                         2, 0.4, half));
   PetscCall(check_bodies(
     "a smaller one in a face, turned",
     "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
       SOFT("b", "box:0.06,0.06,0.06:2") "-body_b_translate 0.06,0.02,0.03 -body_b_rotate 1,2,3,5",
     1.216, 0.4, small));
   PetscCall(check_bodies("crossed bars",
-                         "-bodies a,b " SOFT("a", "box:0.2,0.02,0.02:10,1,1")
-                           SOFT("b", "box:0.02,0.2,0.02:1,10,1") "-body_b_translate 0.093,-0.0931,0.012",
+                         "-bodies a,b " SOFT("a", "box:0.2,0.02,0.02:10,1,1") SOFT(
+                           "b", "box:0.02,0.2,0.02:1,10,1") "-body_b_translate 0.093,-0.0931,0.012",
                          0.16, 0.4, bars));
-  PetscCall(check_bodies(
-    "finger",
-    "-bodies a,b " SOFT("a", "box:0.02,0.02,0.2:2,2,20") SOFT(
-      "b",
-      "box:0.1,0.1,0.2:4,4,8") "-body_a_translate 0.041,0.0392,0.1 -body_a_element cr -body_b_element dg",
-    2.08, 0.4, finger));
+  PetscCall(check_bodies("finger",
+                         "-bodies a,b " SOFT("a", "box:0.02,0.02,0.2:2,2,20") SOFT(
+                           "b", "box:0.1,0.1,0.2:4,4,8") "-body_a_translate 0.041,0.0392,0.1 "
+                                                         "-body_a_element cr -body_b_element dg",
+                         2.08, 0.4, finger));
   PetscCall(check_aligned());
+
   /* bodies without contact do not move */
   verify_case("apart");
   PetscCall(record_run(&r,
-                       MEET STEPPING "-bodies a,b -body_b_translate 0.101,0,0" SOFT("a", "box:0.1,0.1,0.1:3")
-                         SOFT("b", "box:0.1,0.1,0.1:2"),
+                       MEET STEPPING "-bodies a,b -body_b_translate 0.101,0,0" SOFT(
+                         "a", "box:0.1,0.1,0.1:3") SOFT("b", "box:0.1,0.1,0.1:2"),
                        STEP, 0.04));
   VERIFY_LESS(record_max(&r, "kinetic") + record_max(&r, "strain"), 1e-20, "energy, J");
   VERIFY_NEAR(record_max(&r, "meet_unguarded"), 0, 0, "edges through triangles");

@@ -2,9 +2,12 @@
 /*
   Element p2, one volumetric strain per tet.
 
-    derivatives   forces are the derivative of the energy and the tangent that of the forces, for every material, with the volumetric part by the
-                  mean and at the points, straight and curved tets: Taylor remainders of third and second order
-    orders        manufactured solution (manufactured.h): 3 in L2 and 2 in H1 at nu 0.3; at 0.49 and 0.4999 errors within a factor of 2.5
+    derivatives   forces are the derivative of the energy and the tangent that of the forces, for
+    every material, with the volumetric part by the
+                  mean and at the points, straight and curved tets: Taylor remainders of third and
+                  second order
+    orders        manufactured solution (manufactured.h): 3 in L2 and 2 in H1 at nu 0.3; at 0.49 and
+    0.4999 errors within a factor of 2.5
                   of those, where the volumetric part at the points locks
 */
 #include "curved.h"
@@ -59,7 +62,8 @@ static PetscErrorCode check_derivatives(const char *mesh, const char *law, const
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(VecDuplicate(U, &D));
   PetscCall(VecDuplicate(U, &AD));
-  for (int k = 0; k < 3; k++) PetscCall(VecDuplicate(U, &F[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(VecDuplicate(U, &F[k]));
   PetscCall(test_fill(t.model, bend, U));
   PetscCall(test_fill(t.model, ripple, D));
   PetscCall(SbSpaceCreateMatrix(t.model->space, SB_MATRIX_BAIJ, &A));
@@ -79,17 +83,18 @@ static PetscErrorCode check_derivatives(const char *mesh, const char *law, const
     PetscCall(VecNorm(F[1], NORM_2, &size[0]));
     off[k][1] = size[0] / (e * size[1]);
   }
-  test_print("  %-10s %-9s: slope of the energy off by %.1e, %.1e; tangent by %.1e, %.1e\n", law, volume,
-             off[0][0], off[1][0], off[0][1], off[1][1]);
+  test_print("  %-10s %-9s: slope of the energy off by %.1e, %.1e; tangent by %.1e, %.1e\n", law,
+             volume, off[0][0], off[1][0], off[0][1], off[1][1]);
   if (!strcmp(law, "linear")) {
     SB_CHECK(off[1][0] < 1e-9 && off[1][1] < 1e-10, "linear: %g, %g", off[1][0], off[1][1]);
   } else {
-    SB_CHECK(off[0][0] < 1e-3 && off[1][0] < 0.3 * off[0][0] + 1e-9, "%s %s: energy and force: %g, %g", law,
-             volume, off[0][0], off[1][0]);
-    SB_CHECK(off[0][1] < 0.1 && off[1][1] < 0.55 * off[0][1], "%s %s: force and tangent: %g, %g", law, volume,
-             off[0][1], off[1][1]);
+    SB_CHECK(off[0][0] < 1e-3 && off[1][0] < 0.3 * off[0][0] + 1e-9,
+             "%s %s: energy and force: %g, %g", law, volume, off[0][0], off[1][0]);
+    SB_CHECK(off[0][1] < 0.1 && off[1][1] < 0.55 * off[0][1], "%s %s: force and tangent: %g, %g",
+             law, volume, off[0][1], off[1][1]);
   }
-  for (int k = 0; k < 3; k++) PetscCall(VecDestroy(&F[k]));
+  for (int k = 0; k < 3; k++)
+    PetscCall(VecDestroy(&F[k]));
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&D));
   PetscCall(VecDestroy(&AD));
@@ -106,7 +111,8 @@ static PetscErrorCode solve(PetscInt n, PetscReal nu, const char *volume, PetscR
   LockingCost cost;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element p2 -body_a_volume %s -solver direct", volume));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element p2 -body_a_volume %s -solver direct",
+                          volume));
   PetscCall(locking_cube(n, "", nu, more, error, &cost));
   test_print("  %-9s nu %-6g n %2d: L2 %.5f  H1 %.4f\n", volume, nu, (int)n, error[0], error[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -121,14 +127,16 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(curved_mesh_write(2, 1, curved_wobble, PETSC_TRUE, curved));
   for (int k = 0; k < 16; k++)
-    PetscCall(
-      check_derivatives(k < 8 ? "box:0.4,0.3,0.5:2" : curved, laws[k / 2 % 4], k % 2 ? "pointwise" : "mean"));
+    PetscCall(check_derivatives(k < 8 ? "box:0.4,0.3,0.5:2" : curved, laws[k / 2 % 4],
+                                k % 2 ? "pointwise" : "mean"));
+
   /* orders of the errors, which do not depend on nu */
   PetscCall(solve(12, 0.3, "mean", finest));
   PetscCall(solve(8, 0.3, "mean", fine));
   PetscCall(solve(8, 0.49, "mean", near));
   PetscCall(solve(8, 0.4999, "mean", nearer));
   PetscCall(solve(8, 0.4999, "pointwise", locked));
+
   /* four to six cells per half wave: a little below the asymptotic order */
   SB_CHECK_NEAR(log(fine[0] / finest[0]) / log(1.5), 3., 0.3, "order in L2");
   SB_CHECK_NEAR(log(fine[1] / finest[1]) / log(1.5), 2., 0.3, "order in H1");
@@ -136,7 +144,7 @@ int main(int argc, char **argv)
     SB_CHECK(near[k] < 2.5 * fine[k] && nearer[k] < 2.5 * fine[k],
              "errors at nu 0.3, 0.49, 0.4999: %g, %g, %g", fine[k], near[k], nearer[k]);
   }
-  SB_CHECK(locked[0] > 1.5 * nearer[0], "with the volumetric part at the points it does not lock: %g",
-           locked[0]);
+  SB_CHECK(locked[0] > 1.5 * nearer[0],
+           "with the volumetric part at the points it does not lock: %g", locked[0]);
   SB_TEST_END();
 }

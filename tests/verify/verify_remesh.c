@@ -2,23 +2,26 @@
 /*
   Transfer of a state to another mesh of the same body.
 
-    linear     linear displacements and accelerations are reproduced, for every element, on a body deformed by them; for P2 a
+    linear     linear displacements and accelerations are reproduced, for every element, on a body
+    deformed by them; for P2 a
                quadratic velocity too
-    same       values at surface nodes are bitwise the same; so are those of a body that is not re-meshed
-    curved     all of this on a body of curved tets, whose surface keeps its shape to the last bit
-    momenta    mass, momentum and angular momentum of each body are conserved to 1e-12, free and supported, with both mass matrices
-    energy     the change of energy of a smooth motion decreases with the square of the edge length
-    run        a run with re-meshing: steps, time, totals; the energy balance closes with remesh_loss; Newmark and symplectic Euler continue
-    refused    a mesher that fails: the run is bitwise the same as without re-meshing
-    sets       groups of a file and shapes hold the same triangles, vertices of the surface and volume
+    same       values at surface nodes are bitwise the same; so are those of a body that is not
+    re-meshed curved     all of this on a body of curved tets, whose surface keeps its shape to the
+    last bit momenta    mass, momentum and angular momentum of each body are conserved to 1e-12,
+    free and supported, with both mass matrices energy     the change of energy of a smooth motion
+    decreases with the square of the edge length run        a run with re-meshing: steps, time,
+    totals; the energy balance closes with remesh_loss; Newmark and symplectic Euler continue
+    refused    a mesher that fails: the run is bitwise the same as without re-meshing sets
+    groups of a file and shapes hold the same triangles, vertices of the surface and volume
 */
 #include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"
 #include "curved.h"
 
-#define TWO                                                                                         \
-  "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,2,2 -body_a_material neohookean -body_a_young 1e4 "   \
-  "-body_a_poisson 0.3 -body_a_density 900 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate 0,1,0 " \
+#define TWO                                                                                       \
+  "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,2,2 -body_a_material neohookean -body_a_young 1e4 " \
+  "-body_a_poisson 0.3 -body_a_density 900 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate "     \
+  "0,1,0 "                                                                                        \
   "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_density 700 "
 #define EULER "-time euler_implicit -ts_dt 0.01 -ts_max_time 0.05 "
 
@@ -60,14 +63,17 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
   PetscFunctionBeginUser;
   PetscCall(SbGather(p->a.run, &g));
   PetscCall(SbRemeshResultCreate(&g, &result));
-  if (!test_rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
+  if (!test_rank)
+    PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
   PetscCall(PetscArraycpy(p->outcome, result.outcome, 2));
   PetscCallMPI(MPI_Bcast(p->outcome, (int)sizeof(p->outcome), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
   for (int b = 0; b < 2; b++) {
-    if (test_rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result.in_memory[b]));
-    if (test_rank && b == 0) result.in_memory[b]->mass = g.mass[0];
+    if (test_rank)
+      PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result.in_memory[b]));
+    if (test_rank && b == 0)
+      result.in_memory[b]->mass = g.mass[0];
     p->b.model->body[b].in_memory = result.in_memory[b];
     result.in_memory[b] = NULL;
   }
@@ -90,8 +96,8 @@ static PetscErrorCode close_pair(Pair *p)
 }
 
 /* Largest difference between a vector and a function of the reference position. */
-static PetscErrorCode difference(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U,
-                                 PetscReal *worst)
+static PetscErrorCode difference(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]),
+                                 Vec U, PetscReal *worst)
 {
   const PetscScalar *u;
 
@@ -102,7 +108,8 @@ static PetscErrorCode difference(SbModel m, void (*f)(const PetscReal x[3], Pets
     PetscReal expected[3];
 
     f(m->space->node_x + 3 * i, expected);
-    for (int k = 0; k < 3; k++) *worst = PetscMax(*worst, PetscAbsReal(u[3 * i + k] - expected[k]));
+    for (int k = 0; k < 3; k++)
+      *worst = PetscMax(*worst, PetscAbsReal(u[3 * i + k] - expected[k]));
   }
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
@@ -125,7 +132,8 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
   PetscCall(make_second(&p, fixture_cone));
   SB_CHECK(!p.outcome[0].message[0], "%s: %s", element, p.outcome[0].message);
   SB_CHECK(p.b.model->body[0].ncell == p.a.model->body[0].nfacet && p.a.model->body[0].ncell == 96,
-           "%s: %d tets, then %d", element, (int)p.a.model->body[0].ncell, (int)p.b.model->body[0].ncell);
+           "%s: %d tets, then %d", element, (int)p.a.model->body[0].ncell,
+           (int)p.b.model->body[0].ncell);
   PetscCall(difference(p.b.model, linear, p.b.run->U, &worst));
   SB_CHECK(worst < 1e-13, "%s: a linear displacement is wrong by %g m", element, worst);
   PetscCall(difference(p.b.model, linear, p.b.run->A, &worst));
@@ -138,14 +146,16 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
   SB_CHECK(worst < 1e-13, "%s: a linear acceleration is wrong by %g m/s^2", element, worst);
   PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
   PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
-  SB_CHECK_NEAR(e[1].strain, e[0].strain, 1e-12 * e[0].strain, "strain energy of a linear displacement");
+  SB_CHECK_NEAR(e[1].strain, e[0].strain, 1e-12 * e[0].strain,
+                "strain energy of a linear displacement");
   SB_CHECK_NEAR(e[1].volume, e[0].volume, 1e-13 * e[0].volume, "volume now");
   SB_CHECK_NEAR(p.b.model->body[0].volume, p.a.model->body[0].volume, 1e-15, "volume at rest");
   PetscCall(close_pair(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of the bits of positions and values over the nodes of a body, of its surface or all, independent of their order. */
+/* Sum of the bits of positions and values over the nodes of a body, of its surface or all,
+   independent of their order. */
 static PetscErrorCode bits_of(SbModel m, Vec U, PetscInt body, PetscBool surface, uint64_t *sum)
 {
   const SbSpace s = m->space;
@@ -156,18 +166,22 @@ static PetscErrorCode bits_of(SbModel m, Vec U, PetscInt body, PetscBool surface
   *sum = 0;
   PetscCall(PetscCalloc1(s->nnode, &on));
   for (PetscInt i = 0; i < 4 * m->mesh->ncell; i++) {
-    if (!(m->mesh->face_set[i] & SB_ON_BOUNDARY)) continue;
+    if (!(m->mesh->face_set[i] & SB_ON_BOUNDARY))
+      continue;
     for (int a = 0; a < (s->edge_node ? SB_CELL_NODES : 4); a++) {
       const PetscInt node = SbSpaceCellNode(s, i / 4, a);
       const PetscBool off =
-        (PetscBool)(a < 4 ? a == i % 4 : SbTetEdge[a - 4][0] == i % 4 || SbTetEdge[a - 4][1] == i % 4);
+        (PetscBool)(a < 4 ? a == i % 4
+                          : SbTetEdge[a - 4][0] == i % 4 || SbTetEdge[a - 4][1] == i % 4);
 
-      if (node >= 0 && !off) on[node] = PETSC_TRUE;
+      if (node >= 0 && !off)
+        on[node] = PETSC_TRUE;
     }
   }
   PetscCall(VecGetArrayRead(U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (s->node_body[i] != body || (surface && !on[i])) continue;
+    if (s->node_body[i] != body || (surface && !on[i]))
+      continue;
     for (int k = 0; k < 6; k++) {
       uint64_t bits;
 
@@ -187,8 +201,8 @@ static PetscErrorCode check_same(const char *element, const char *mesh)
   uint64_t a, b;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element %s %s %s", element, element,
-                      mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
+  PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element %s %s %s", element,
+                      element, mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(test_fill(p.a.model, linear, p.a.run->V));
   PetscCall(make_second(&p, fixture_cone));
@@ -204,7 +218,9 @@ static PetscErrorCode check_same(const char *element, const char *mesh)
 
 static PetscErrorCode check_momenta(const char *more)
 {
-  PetscReal before[2][6], after[2][6], corrected[2][6], mass[2] = {0, 0}, speed;
+  PetscReal before[2][6], after[2][6], corrected[2][6];
+  PetscReal mass[2] = {0, 0};
+  PetscReal speed;
   const PetscBool named[2] = {PETSC_TRUE, PETSC_FALSE};
   Pair p = {0};
 
@@ -215,8 +231,8 @@ static PetscErrorCode check_momenta(const char *more)
   PetscCall(make_second(&p, fixture_cone));
   PetscCall(SbBodyMomenta(p.a.model, p.a.run->U, p.a.run->V, before));
   PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, after));
-  PetscCall(
-    SbBodySetMomenta(p.b.model, p.b.run->U, p.b.run->V, named, (const PetscReal(*)[6])before, &speed));
+  PetscCall(SbBodySetMomenta(p.b.model, p.b.run->U, p.b.run->V, named,
+                             (const PetscReal(*)[6])before, &speed));
   PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, corrected));
   for (int b = 0; b < 2; b++) {
     PetscReal moved = 0;
@@ -226,12 +242,12 @@ static PetscErrorCode check_momenta(const char *more)
         PetscAbsReal(before[b][0]) + PetscAbsReal(before[b][1]) + PetscAbsReal(before[b][2]);
 
       SB_CHECK(PetscAbsReal(corrected[b][k] - before[b][k]) <= 1e-12 * scale,
-               "'%s', body %d: momentum %d is %.15g, was %.15g, without correction %.15g", more, b, k,
-               corrected[b][k], before[b][k], after[b][k]);
+               "'%s', body %d: momentum %d is %.15g, was %.15g, without correction %.15g", more, b,
+               k, corrected[b][k], before[b][k], after[b][k]);
       moved = PetscMax(moved, PetscAbsReal(after[b][k] - before[b][k]) / scale);
     }
-    SB_CHECK((moved > 1e-6) == (b == 0), "%s: the momenta of body %d differ by %g before they are put right",
-             more, b, moved);
+    SB_CHECK((moved > 1e-6) == (b == 0),
+             "%s: the momenta of body %d differ by %g before they are put right", more, b, moved);
   }
   SB_CHECK(speed > 0 && speed < 0.1, "a rigid speed of %g m/s", speed);
   for (PetscInt i = 0; i < p.b.model->space->nnode_owned; i++)
@@ -243,7 +259,8 @@ static PetscErrorCode check_momenta(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Relative change of the strain energy of a smooth motion on a new mesh, with n cells along the shortest side. */
+/* Relative change of the strain energy of a smooth motion on a new mesh, with n cells along the
+   shortest side. */
 static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
 {
   SbEnergies e[2];
@@ -252,8 +269,10 @@ static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
 
   PetscFunctionBeginUser;
   (void)snprintf(mesh, sizeof(mesh), "box:0.4,0.1,0.2:%d,%d,%d", 4 * n, n, 2 * n);
-  if (bent) PetscCall(curved_mesh_write(n, n, curved_wobble, PETSC_TRUE, mesh));
-  PetscCall(test_open(&p.a, TWO EULER "-body_a_mesh %s %s", mesh, bent ? "-body_a_element p2" : ""));
+  if (bent)
+    PetscCall(curved_mesh_write(n, n, curved_wobble, PETSC_TRUE, mesh));
+  PetscCall(
+    test_open(&p.a, TWO EULER "-body_a_mesh %s %s", mesh, bent ? "-body_a_element p2" : ""));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(make_second(&p, SbMesherDefault));
   SB_CHECK(!p.outcome[0].message[0], "%d cells: %s", n, p.outcome[0].message);
@@ -264,7 +283,8 @@ static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The change is proportional to the squared edge length: a factor of four per halving. P2, curved or straight, on finer meshes: 7.8e-4, 2.9e-4. */
+/* The change is proportional to the squared edge length: a factor of four per halving. P2, curved
+   or straight, on finer meshes: 7.8e-4, 2.9e-4. */
 static PetscErrorCode check_energy(PetscBool bent)
 {
   PetscReal coarse, fine;
@@ -272,7 +292,8 @@ static PetscErrorCode check_energy(PetscBool bent)
   PetscFunctionBeginUser;
   PetscCall(energy_change(bent ? 6 : 3, bent, &coarse));
   PetscCall(energy_change(bent ? 12 : 6, bent, &fine));
-  test_print("  energy, %s: changed by %.2e, %.2e\n", bent ? "curved tets of p2" : "p1", coarse, fine);
+  test_print("  energy, %s: changed by %.2e, %.2e\n", bent ? "curved tets of p2" : "p1", coarse,
+             fine);
   SB_CHECK(coarse < 0.1 && fine < 0.4 * coarse,
            "a new mesh changes the energy by %g, with edges half as long by %g", coarse, fine);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -289,8 +310,9 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&s,
-                      TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
-                          "-remesh_times 0.02,0.03 -remesh_bodies a %s",
+                      TWO
+                      "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
+                      "-remesh_times 0.02,0.03 -remesh_bodies a %s",
                       element, more));
   s.run->want_energies = PETSC_TRUE;
   mass = 900 * s.model->body[0].volume;
@@ -300,14 +322,14 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   SB_CHECK(calls == 2 && !s.run->stop_reason[0], "%s %s: meshed %d times; %s", more, element, calls,
            s.run->stop_reason);
   SB_CHECK_NEAR(s.run->t_now, 0.05, 1e-10, "end");
-  SB_CHECK(explicit || (s.run->steps_total == 5 && s.run->step_now == 5), "%d steps, the last one is %d",
-           (int)s.run->steps_total, (int)s.run->step_now);
+  SB_CHECK(explicit || (s.run->steps_total == 5 && s.run->step_now == 5),
+           "%d steps, the last one is %d", (int)s.run->steps_total, (int)s.run->step_now);
   e = s.run->energies;
   sum = e.kinetic + e.strain + e.integrator_loss + e.remesh_loss - s.run->energy_start;
   scale = s.run->energy_start;
   SB_CHECK_NEAR(sum, 0, 1e-12 * scale, "account");
-  SB_CHECK(e.remesh_loss != 0 && PetscAbsReal(e.remesh_loss) < 0.2 * scale, "remesh_loss %g of %g J",
-           e.remesh_loss, scale);
+  SB_CHECK(e.remesh_loss != 0 && PetscAbsReal(e.remesh_loss) < 0.2 * scale,
+           "remesh_loss %g of %g J", e.remesh_loss, scale);
   SB_CHECK_NEAR(e.momentum[0], mass, 2e-6 * mass, "momentum along x");
   SB_CHECK_NEAR(e.momentum[1], 0, 2e-6 * mass, "momentum along y");
   SB_CHECK(e.ninverted == 0, "%d tets are inverted", (int)e.ninverted);
@@ -322,7 +344,8 @@ static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&s, TWO EULER "-body_a_angular_velocity 0,3,1 %s", more));
-  if (s.remesh) SbRemeshSetMesher(s.remesh, mesher, NULL);
+  if (s.remesh)
+    SbRemeshSetMesher(s.remesh, mesher, NULL);
   PetscCall(test_scene_solve(&s));
   PetscCall(VecNorm(s.run->U, NORM_2, norm));
   SB_CHECK(s.run->steps_total == 5, "%d steps", (int)s.run->steps_total);
@@ -334,10 +357,10 @@ static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *
 
 static PetscErrorCode check_sets(void)
 {
-  static const char text[] =
-    TWO EULER "-sets left,top,part -set_left_at group:a.xmin -set_top_at plane:0,0,1,0.2 "
-              "-set_part_at box:0,0,0,0.2,0.1,0.2 -effects hold,pull -effect_hold_type fixed "
-              "-effect_hold_on left -effect_pull_type traction -effect_pull_on top -effect_pull_vector 0;0;1";
+  static const char text[] = TWO EULER
+    "-sets left,top,part -set_left_at group:a.xmin -set_top_at plane:0,0,1,0.2 "
+    "-set_part_at box:0,0,0,0.2,0.1,0.2 -effects hold,pull -effect_hold_type fixed "
+    "-effect_hold_on left -effect_pull_type traction -effect_pull_on top -effect_pull_vector 0;0;1";
   PetscReal area[2][2] = {{0, 0}, {0, 0}};
   Pair p = {0};
 
@@ -353,11 +376,12 @@ static PetscErrorCode check_sets(void)
       PetscInt n;
 
       PetscCall(SbSpaceGetSetFacets(m->space, k, &n, &facet));
-      for (PetscInt f = 0; f < n; f++) area[i][k] += facet[f].cell < m->mesh->ncell_owned ? facet[f].area : 0;
+      for (PetscInt f = 0; f < n; f++)
+        area[i][k] += facet[f].cell < m->mesh->ncell_owned ? facet[f].area : 0;
       PetscCall(PetscFree(facet));
     }
-    SB_CHECK(m->set[0].nvert == 9 && m->set[0].nfacet == 8, "the group holds %d vertices, %d facets",
-             (int)m->set[0].nvert, (int)m->set[0].nfacet);
+    SB_CHECK(m->set[0].nvert == 9 && m->set[0].nfacet == 8,
+             "the group holds %d vertices, %d facets", (int)m->set[0].nvert, (int)m->set[0].nfacet);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, area, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   for (int k = 0; k < 2; k++)
@@ -398,8 +422,8 @@ int main(int argc, char **argv)
   PetscCall(check_momenta("-body_a_element dg -mass consistent"));
   PetscCall(check_momenta("-body_a_element p2"));
   PetscCall(check_momenta("-body_a_element p2 -mass consistent"));
-  PetscCall(check_momenta(
-    "-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type fixed -effect_hold_on end"));
+  PetscCall(check_momenta("-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type "
+                          "fixed -effect_hold_on end"));
   PetscCall(check_run(EULER, "p1", PETSC_FALSE));
   PetscCall(check_run(EULER, "cr", PETSC_FALSE));
   PetscCall(check_run(EULER, "dg", PETSC_FALSE));
@@ -409,7 +433,8 @@ int main(int argc, char **argv)
   PetscCall(check_run("-time euler_symplectic -ts_max_time 0.05", "p1", PETSC_TRUE));
   PetscCall(refused_run(fixture_refuse, "", &without));
   PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
-  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g", with,
+  SB_CHECK(with == without,
+           "a run that could not be re-meshed moves otherwise: %.17g, without %.17g", with,
            without);
   PetscCall(check_sets());
   SB_TEST_END();

@@ -1,18 +1,20 @@
 // @ranks 1 2
 /*
-  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed
-  plane framework with finite deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of span l
-  = 12.943 in each, clamped at the far ends and rigidly connected in the middle, at a height of H = 0.386 in;
-  section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum, decreases, and
-  increases again. The published maximum by Williams' theory is 34.0392 lb. Here one half is a solid, with
-  Poisson's ratio 0 as for beams.
+  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a
+  rigid jointed plane framework with finite deflections", Q. J. Mech. Appl. Math. 17, 1964): two
+  straight members of span l = 12.943 in each, clamped at the far ends and rigidly connected in the
+  middle, at a height of H = 0.386 in; section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in
+  the middle has a maximum, decreases, and increases again. The published maximum by Williams'
+  theory is 34.0392 lb. Here one half is a solid, with Poisson's ratio 0 as for beams.
 
-  With the compression N = k^2 E I, slope a = H/l and the deflection delta of the middle, a shallow beam has
+  With the compression N = k^2 E I, slope a = H/l and the deflection delta of the middle, a shallow
+  beam has
 
-    P = 2 N (a + B),   B = -delta / (l - 2/k tan(k l/2)),   N l / E A = a delta - 1/2 int w'^2 dx,   w' = B (1 - cos k x - tan(k l/2) sin k x),
+    P = 2 N (a + B),   B = -delta / (l - 2/k tan(k l/2)),   N l / E A = a delta - 1/2 int w'^2 dx,
+    w' = B (1 - cos k x - tan(k l/2) sin k x),
 
-  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and finite
-  strains: about 0.1 % each.
+  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and
+  finite strains: about 0.1 % each.
 */
 #include "verify.h"
 
@@ -23,12 +25,19 @@
 #define YOUNG 1.03e7
 #define LIMIT 34.0392 /* published largest load, lb */
 
-/* Difference between the required shortening of a member and its shortening under the compression N, and the load, lb. */
+/* Difference between the required shortening of a member and its shortening under the compression
+   N, and the load, lb. */
 static PetscReal excess(PetscReal N, PetscReal delta, PetscReal *P)
 {
-  const PetscReal EI = YOUNG * WIDTH * DEPTH * DEPTH * DEPTH / 12., EA = YOUNG * WIDTH * DEPTH;
-  const PetscReal l = SPAN, a = RISE / l, k = PetscSqrtReal(N / EI), q = k * l;
-  const PetscReal t = PetscTanReal(q / 2.), s = PetscSinReal(q), c = PetscCosReal(q);
+  const PetscReal EI = YOUNG * WIDTH * DEPTH * DEPTH * DEPTH / 12.;
+  const PetscReal EA = YOUNG * WIDTH * DEPTH;
+  const PetscReal l = SPAN;
+  const PetscReal a = RISE / l;
+  const PetscReal k = PetscSqrtReal(N / EI);
+  const PetscReal q = k * l;
+  const PetscReal t = PetscTanReal(q / 2.);
+  const PetscReal s = PetscSinReal(q);
+  const PetscReal c = PetscCosReal(q);
   const PetscReal B = -delta / (l - 2. * t / k);
   const PetscReal square = l + t * t * (l / 2. - s * c / (2. * k)) + (l / 2. + s * c / (2. * k)) -
                            2. * t * (1. - c) / k - 2. * s / k + t * s * s / k;
@@ -54,7 +63,8 @@ static PetscReal toggle_load(PetscReal delta)
 
 static void member(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical section */
+  const PetscReal depth =
+    DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical section */
 
   x[1] = RISE * x[0] + depth * (x[1] - 0.5);
   x[0] *= SPAN;
@@ -80,8 +90,10 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   P = step->t * g->full;
   expected = step->step ? toggle_load(-u[1]) : 0.;
   g->error = PetscMax(g->error, PetscAbsReal(P - expected));
-  if (g->bottom == PETSC_MAX_REAL) g->top = PetscMax(g->top, P);
-  if (P < g->top) g->bottom = PetscMin(g->bottom, P);
+  if (g->bottom == PETSC_MAX_REAL)
+    g->top = PetscMax(g->top, P);
+  if (P < g->top)
+    g->bottom = PetscMin(g->bottom, P);
   g->last[0] = -u[1];
   g->last[1] = P;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -103,7 +115,8 @@ static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny
     "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
     "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type fixed "
     "-effect_clamp_on far -effect_symmetry_type fixed -effect_symmetry_on middle "
-    "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
+    "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all "
+    "-effect_plane_components z "
     "-effect_load_type traction -effect_load_on middle -effect_load_total 0,%.17g,0 -time static "
     "-static_control arc_length -static_steps 5 -static_longest_step 1",
     mesh, element, YOUNG, SPAN, -0.5 * g.full * SPAN / (double)nx / WIDTH));

@@ -2,16 +2,21 @@
 /*
   Rotation.
 
-    turned     a body rotated rigidly in steps of 15 degrees through a full revolution, and translated: no force with rotation-invariant
-               materials, |f|_max / (E L^2) <= 1e-12, and sigma_xx = 2 (mu + lambda)(cos t - 1) about z with the linear one
-    spin       a stiff free body that spins about a principal axis, implicit Euler. A step minimises the distance to
-               x0 + h v0 over rigid motions: its closest rotation. In the plane of the spin x0 + h v0 is x0 times the
-               complex number 2 - e^(-i d), d being the rotation of the last step, so that the rotations satisfy
+    turned     a body rotated rigidly in steps of 15 degrees through a full revolution, and
+    translated: no force with rotation-invariant
+               materials, |f|_max / (E L^2) <= 1e-12, and sigma_xx = 2 (mu + lambda)(cos t - 1)
+               about z with the linear one
+    spin       a stiff free body that spins about a principal axis, implicit Euler. A step minimises
+    the distance to
+               x0 + h v0 over rigid motions: its closest rotation. In the plane of the spin x0 + h
+               v0 is x0 times the complex number 2 - e^(-i d), d being the rotation of the last
+               step, so that the rotations satisfy
 
                  d' = arg(2 - e^(-i d)),  first one atan(w0 h),
 
                for small w0 h the law w(t) = w0 / sqrt(1 + 2 w0^2 h t), for any stiffness
-    rod        a thin spinning rod stretches by u = rho w^2 l^3 / (3 E) on each side of its centre. Stiffness-proportional
+    rod        a thin spinning rod stretches by u = rho w^2 l^3 / (3 E) on each side of its centre.
+    Stiffness-proportional
                damping removes the vibration, and must not change the spin
 */
 #include <complex.h>
@@ -46,7 +51,9 @@ static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *er
 
 static PetscErrorCode check_turned(const char *element, const char *law)
 {
-  const PetscReal askew[3] = {1., 2., 3.}, z[3] = {0., 0., 1.}, E = 1e5;
+  const PetscReal askew[3] = {1., 2., 3.};
+  const PetscReal z[3] = {0., 0., 1.};
+  const PetscReal E = 1e5;
   const PetscBool linear = (PetscBool)!strcmp(law, "linear");
   PetscReal worst = 0.;
   Vec F;
@@ -100,8 +107,9 @@ static PetscErrorCode nearest_node(SbModel m, const PetscReal at[3], PetscReal p
 }
 
 typedef struct {
-  PetscReal left[3], right[3];      /* reference positions of two nodes */
-  PetscReal last[2], d, w0h, worst; /* direction between them, next expected rotation, largest error */
+  PetscReal left[3], right[3]; /* reference positions of two nodes */
+  PetscReal last[2], d, w0h,
+    worst; /* direction between them, next expected rotation, largest error */
 } Spin;
 
 static PetscErrorCode watch_spin(SbRun run, const SbStep *step, void *ctx)
@@ -112,30 +120,35 @@ static PetscErrorCode watch_spin(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionBeginUser;
   PetscCall(test_value_at(run->model, step->U, s->left, a));
   PetscCall(test_value_at(run->model, step->U, s->right, b));
-  for (int k = 0; k < 2; k++) e[k] = s->right[k] + b[k] - s->left[k] - a[k];
+  for (int k = 0; k < 2; k++)
+    e[k] = s->right[k] + b[k] - s->left[k] - a[k];
   if (step->step > 0) {
-    turned = PetscAtan2Real(s->last[0] * e[1] - s->last[1] * e[0], s->last[0] * e[0] + s->last[1] * e[1]);
+    turned =
+      PetscAtan2Real(s->last[0] * e[1] - s->last[1] * e[0], s->last[0] * e[0] + s->last[1] * e[1]);
     s->d = step->step == 1 ? PetscAtanReal(s->w0h) : carg(2. - cexp(-unit * s->d));
     s->worst = PetscMax(s->worst, PetscAbsReal(turned / s->d - 1.));
     s->d = turned;
   }
-  for (int k = 0; k < 2; k++) s->last[k] = e[k];
+  for (int k = 0; k < 2; k++)
+    s->last[k] = e[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_spin(const char *element, const char *law, PetscReal E, PetscReal w0, PetscReal h,
-                                 PetscReal tolerance, PetscReal near)
+static PetscErrorCode check_spin(const char *element, const char *law, PetscReal E, PetscReal w0,
+                                 PetscReal h, PetscReal tolerance, PetscReal near)
 {
   const PetscInt steps = 100;
   const PetscReal wt = w0 / PetscSqrtReal(1. + 2. * w0 * w0 * h * h * (PetscReal)steps);
-  const PetscReal left[3] = {-0.15, 0., 0.}, right[3] = {0.15, 0., 0.};
+  const PetscReal left[3] = {-0.15, 0., 0.};
+  const PetscReal right[3] = {0.15, 0., 0.};
   Spin s = {.w0h = w0 * h};
   TestScene t;
 
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 -body_a_element %s "
+    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 -body_a_element "
+    "%s "
     "-body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
     "-body_a_angular_velocity 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
     "-snes_rtol 1e-10",
@@ -158,18 +171,28 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
 
 static PetscErrorCode check_rod(const char *element, const char *law)
 {
-  const PetscReal w = 2., l = 0.5, E = 1e6, rho = 1000., stretch = rho * w * w * l * l * l / (3. * E);
-  PetscReal left[3] = {-l, 0., 0.}, right[3] = {l, 0., 0.}, a[3], b[3], longer = 0., rest = 0., spin;
+  const PetscReal w = 2.;
+  const PetscReal l = 0.5;
+  const PetscReal E = 1e6;
+  const PetscReal rho = 1000.;
+  const PetscReal stretch = rho * w * w * l * l * l / (3. * E);
+  PetscReal left[3] = {-l, 0., 0.};
+  PetscReal right[3] = {l, 0., 0.};
+  PetscReal a[3], b[3];
+  PetscReal longer = 0.;
+  PetscReal rest = 0.;
+  PetscReal spin;
   SbEnergies before, after;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
-                      "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 "
-                      "-body_a_density %g -body_a_angular_velocity 0,0,%g -effects damping "
-                      "-effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 -snes_rtol 1e-9",
-                      element, law, E, rho, w));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
+    "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 "
+    "-body_a_density %g -body_a_angular_velocity 0,0,%g -effects damping "
+    "-effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 -snes_rtol 1e-9",
+    element, law, E, rho, w));
   PetscCall(nearest_node(t.model, left, left));
   PetscCall(nearest_node(t.model, right, right));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
@@ -186,8 +209,11 @@ static PetscErrorCode check_rod(const char *element, const char *law)
   test_print("  rod, %s %s, after %.2f rad: longer by %.5e m on each side (%.5e), angular "
              "momentum %.7f of the start\n",
              element, law, 0.4 * (double)w, 0.5 * longer, stretch, spin);
-  /* a strain of 3e-4, and 20 cells, in which the face terms of CR and DG, and the edges of P2, are stiff */
-  SB_CHECK_NEAR(0.5 * longer, stretch, (strcmp(element, "p1") ? 1e-2 : 5e-3) * stretch, "stretch of the rod");
+
+  /* a strain of 3e-4, and 20 cells, in which the face terms of CR and DG, and the edges of P2, are
+     stiff */
+  SB_CHECK_NEAR(0.5 * longer, stretch, (strcmp(element, "p1") ? 1e-2 : 5e-3) * stretch,
+                "stretch of the rod");
   SB_CHECK_NEAR(spin, 1., 1e-4, "angular momentum with damping");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -195,12 +221,13 @@ static PetscErrorCode check_rod(const char *element, const char *law)
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg", "p2"}, *const laws[] = {"corotated", "stvk",
-                                                                                   "neohookean", "linear"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
+  static const char *const laws[] = {"corotated", "stvk", "neohookean", "linear"};
 
   SB_TEST_BEGIN(argc, argv);
   for (int e = 0; e < 4; e++) {
-    for (int law = 0; law < 4; law++) PetscCall(check_turned(elements[e], laws[law]));
+    for (int law = 0; law < 4; law++)
+      PetscCall(check_turned(elements[e], laws[law]));
     PetscCall(check_spin(elements[e], "corotated", 1e9, 10., 0.01, 1e-6, 0.02));
   }
   PetscCall(check_spin("p1", "corotated", 1e11, 10., 0.01, 1e-8, 0.02));

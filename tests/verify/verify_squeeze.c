@@ -1,13 +1,14 @@
 // @ranks 1
 /*
-  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0
-  and y = 0, no friction.
+  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry
+  planes x = 0 and y = 0, no friction.
 
-  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does
-  not move. The work of the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is
-  nearly constant, and CR and P2 give the same force (with a jump penalty that does not follow the state CR
-  gives less than half of it). With P1, x itself is an admissible test function: the integral of the trace of
-  the stress is the sum of x . f, which is minus the height times the force.
+  Both plates have the same force, which increases in every step, no cell is inverted, and the
+  midplane does not move. The work of the plates is the energy of the cushion. With Poisson's ratio
+  0.49 the volume is nearly constant, and CR and P2 give the same force (with a jump penalty that
+  does not follow the state CR gives less than half of it). With P1, x itself is an admissible test
+  function: the integral of the trace of the stress is the sum of x . f, which is minus the height
+  times the force.
 */
 #include "contact.h"
 #include <sbtet.h>
@@ -20,7 +21,8 @@ static void cushion(const VerifyPlace *place, PetscReal x[3])
 {
   (void)place;
   x[2] = (2 * x[2] - 1) * (1 - 0.15 * (x[0] * x[0] + x[1] * x[1]));
-  for (int k = 0; k < 3; k++) x[k] *= RADIUS;
+  for (int k = 0; k < 3; k++)
+    x[k] *= RADIUS;
 }
 
 /* Integral of the trace of the Cauchy stress over the deformed body, N m. */
@@ -46,13 +48,16 @@ static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscReal poisson, PetscReal swell,
-                                    PetscReal newtons)
+static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscReal poisson,
+                                    PetscReal swell, PetscReal newtons)
 {
   const PetscInt n[3] = {cells, cells, 2 * cells};
   const PetscReal young = 1e4;
   Record r = {0};
-  PetscReal trace, force, work, apart = 0, fall = 0, drift;
+  PetscReal trace, force, work;
+  PetscReal apart = 0;
+  PetscReal fall = 0;
+  PetscReal drift;
   char path[512];
   TestScene t;
 
@@ -63,10 +68,14 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
     &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %g "
     "-body_a_poisson %g -sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -effects "
-    "x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed "
-    "-effect_y_on y0 -effect_y_components y -effect_top_type contact -effect_top_response projected "
-    "-effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t -effect_bottom_type contact "
-    "-effect_bottom_response projected -effect_bottom_obstacle plane:0,0,1,%g -effect_bottom_displacement "
+    "x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type "
+    "fixed "
+    "-effect_y_on y0 -effect_y_components y -effect_top_type contact -effect_top_response "
+    "projected "
+    "-effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t -effect_bottom_type "
+    "contact "
+    "-effect_bottom_response projected -effect_bottom_obstacle plane:0,0,1,%g "
+    "-effect_bottom_displacement "
     "0;0;%g*t -time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
     path, element, young, poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
   PetscCall(record_solve(&t, &r));
@@ -91,45 +100,56 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   for (int k = 0; k < 2; k++)
     VERIFY_LESS(record_max(&r, k ? "top_penetration" : "bottom_penetration"), 1e-6 * RADIUS,
                 "behind a plate, m");
-  VERIFY_NEAR(record_last(&r, "volume") / record_at(&r, "volume", 0), 1, swell, "volume, of that at rest");
+  VERIFY_NEAR(record_last(&r, "volume") / record_at(&r, "volume", 0), 1, swell,
+              "volume, of that at rest");
   VERIFY_NEAR(work / record_last(&r, "strain"), 1, 0.02, "work of the plates against the energy");
+
   /* P2 with two cells across is 4 % below P2 with three */
-  if (newtons > 0) VERIFY_NEAR(force / newtons, 1, 0.05, "force, of that of P2 with three cells across");
+  if (newtons > 0)
+    VERIFY_NEAR(force / newtons, 1, 0.05, "force, of that of P2 with three cells across");
+
   /* the height is now RADIUS */
   if (!strcmp(element, "p1"))
-    VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
+    VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6,
+                "height times force against the trace of the stress");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contact springs scaled by the bulk modulus, at nu = 0.4999 a thousand times as stiff as by the shear modulus, need 1,800 iterations here. */
+/* Contact springs scaled by the bulk modulus, at nu = 0.4999 a thousand times as stiff as by the
+   shear modulus, need 1,800 iterations here. */
 static PetscErrorCode check_springs(const char *element)
 {
   Record r = {0};
 
   PetscFunctionBeginUser;
   verify_case("springs, %s", element);
-  PetscCall(
-    record_run(&r,
-               "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material neohookean "
-               "-body_a_young 1e4 -body_a_poisson 0.4999 -body_a_density 1000 -sets top -set_top_at "
-               "plane:0,0,1,0.1 -effects hold,weight,floor -effect_hold_type fixed -effect_hold_on top "
-               "-effect_weight_type gravity -effect_floor_type contact -effect_floor_response penalty "
-               "-effect_floor_obstacle plane:0,0,1,-0.001 -time static",
-               element));
+  PetscCall(record_run(
+    &r,
+    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material neohookean "
+    "-body_a_young 1e4 -body_a_poisson 0.4999 -body_a_density 1000 -sets top -set_top_at "
+    "plane:0,0,1,0.1 -effects hold,weight,floor -effect_hold_type fixed -effect_hold_on top "
+    "-effect_weight_type gravity -effect_floor_type contact -effect_floor_response penalty "
+    "-effect_floor_obstacle plane:0,0,1,-0.001 -time static",
+    element));
   VERIFY_LESS((PetscReal)r.newton, 80, "iterations");
-  /* `projected` gives 3.430 N (P2); the penetration of the springs, 0.5 % of the stress over the shear modulus, is below the error of the mesh */
+
+  /* `projected` gives 3.430 N (P2); the penetration of the springs, 0.5 % of the stress over the
+     shear modulus, is below the error of the mesh */
   if (!strcmp(element, "p2"))
-    VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01, "force, of that without springs");
+    VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01,
+                "force, of that without springs");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static void block(const VerifyPlace *place, PetscReal x[3])
 {
   (void)place;
-  for (int k = 0; k < 3; k++) x[k] *= (k == 2 ? 2 : 1) * RADIUS;
+  for (int k = 0; k < 3; k++)
+    x[k] *= (k == 2 ? 2 : 1) * RADIUS;
 }
 
-/* The jump penalty changes from step to step: it adds no energy to a block that is thrown onto a floor, to two thirds of its height, in steps of any length, s. */
+/* The jump penalty changes from step to step: it adds no energy to a block that is thrown onto a
+   floor, to two thirds of its height, in steps of any length, s. */
 static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal height)
 {
   const PetscInt n[3] = {2, 2, 4};
@@ -142,16 +162,21 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
   PetscCall(record_run(
     &r,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young 1e4 "
-    "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor -effect_floor_type "
-    "contact -effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt %g -ts_max_time 0.05",
+    "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor "
+    "-effect_floor_type "
+    "contact -effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt %g -ts_max_time "
+    "0.05",
     path, element, dt));
-  VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0), "energy gained in a step, J");
+  VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0),
+              "energy gained in a step, J");
+
   /* that of P2 on the same mesh; a constant penalty gives some 0.03 m less */
   VERIFY_NEAR(record_last(&r, "centre_z"), height, 0.003, "height of the centre, m");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compressed to a fifth of its height and released, without damping: the jump penalty grows with strong compression, and must not add energy. */
+/* Compressed to a fifth of its height and released, without damping: the jump penalty grows with
+   strong compression, and must not add energy. */
 static PetscErrorCode check_released(const char *element)
 {
   Record r = {0};
@@ -161,19 +186,24 @@ static PetscErrorCode check_released(const char *element)
   PetscCall(record_run(
     &r,
     "-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 -body_a_poisson 0.45 -body_a_density 1000 -effects high,low -effect_high_type contact "
+    "-body_a_young 1e4 -body_a_poisson 0.45 -body_a_density 1000 -effects high,low "
+    "-effect_high_type contact "
     "-effect_high_obstacle plane:0,0,-1,-0.0501 -effect_high_displacement "
-    "0;0;-0.04*min(1,t/0.2)+0.04*max(0,min(1,(t-0.3)/0.2)) -effect_low_type contact -effect_low_obstacle "
+    "0;0;-0.04*min(1,t/0.2)+0.04*max(0,min(1,(t-0.3)/0.2)) -effect_low_type contact "
+    "-effect_low_obstacle "
     "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.004 -ts_max_time 0.6",
     element));
-  /* the compressed body has 1 J; the integrator adds 0.035 J, most of it in one step at the fastest compression */
+
+  /* the compressed body has 1 J; the integrator adds 0.035 J, most of it in one step at the fastest
+     compression */
   VERIFY_LESS(record_gain(&r, "energy"), 0.1, "energy gained in a step, J");
   VERIFY_LESS(record_last(&r, "energy"), 0.1, "energy at the end, J");
   VERIFY_NEAR(record_last(&r, "centre_z"), 0.025, 0.002, "height of the centre, m");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compressed to half its height and released in long steps near nu = 1/2, where waves change the pressure of a cell: the penalty that depends on it must not make the energy gain of Newmark's
+/* Compressed to half its height and released in long steps near nu = 1/2, where waves change the
+   pressure of a cell: the penalty that depends on it must not make the energy gain of Newmark's
    method unbounded. P1 and P2 gain 6 and 9 % of the energy in half the motion. */
 static PetscErrorCode check_waves(const char *element)
 {
@@ -185,9 +215,11 @@ static PetscErrorCode check_waves(const char *element)
   PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh box:0.06,0.05,0.04:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 -body_a_poisson 0.499 -body_a_density 1000 -effects high,low -effect_high_type "
+    "-body_a_young 1e4 -body_a_poisson 0.499 -body_a_density 1000 -effects high,low "
+    "-effect_high_type "
     "contact -effect_high_obstacle plane:0,0,-1,-0.0401 -effect_high_displacement "
-    "0;0;-0.02*min(1,t/0.05)+0.02*max(0,min(1,(t-0.06)/0.05)) -effect_low_type contact -effect_low_obstacle "
+    "0;0;-0.02*min(1,t/0.05)+0.02*max(0,min(1,(t-0.06)/0.05)) -effect_low_type contact "
+    "-effect_low_obstacle "
     "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.003 -ts_max_time 0.2",
     element));
   PetscCall(record_solve(&t, &r));

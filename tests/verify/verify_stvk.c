@@ -1,13 +1,13 @@
 // @ranks 1
 /*
   Structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of
-  fluid-structure interaction between an elastic object and laminar incompressible flow", 2006): a St.
-  Venant-Kirchhoff beam, plane strain, 0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m to x = 0.6 m,
-  bends under gravity. Displacement of (0.6, 0.2).
+  fluid-structure interaction between an elastic object and laminar incompressible flow", 2006): a
+  St. Venant-Kirchhoff beam, plane strain, 0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m
+  to x = 0.6 m, bends under gravity. Displacement of (0.6, 0.2).
 
-  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with u_z = 0.
-  Cook's membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the right one, small
-  strains, plane strain too, is the second mapped box.
+  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with
+  u_z = 0. Cook's membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the
+  right one, small strains, plane strain too, is the second mapped box.
 
   P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated
   (Richardson).
@@ -22,12 +22,14 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
     PetscCall(locking_beam(8 << k, mu, "-body_a_material stvk", u[k], &cost));
-    test_print("    %s, %d cells across: %.6g %.6g, %d Newton iterations\n", what, 8 << k, u[k][0], u[k][1],
-               (int)cost.newton);
+    test_print("    %s, %d cells across: %.6g %.6g, %d Newton iterations\n", what, 8 << k, u[k][0],
+               u[k][1], (int)cost.newton);
   }
-  for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(u[0][k], u[1][k], 2.);
-  test_print("  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what, 1e3 * limit[0], 1e3 * limit[1],
-             1e3 * ux, 1e3 * uy);
+  for (int k = 0; k < 2; k++)
+    limit[k] = verify_extrapolate(u[0][k], u[1][k], 2.);
+  test_print("  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what, 1e3 * limit[0],
+             1e3 * limit[1], 1e3 * ux, 1e3 * uy);
+
   /* the finer mesh has an error of 1 %, its extrapolation must be at least ten times better */
   SB_CHECK_NEAR(u[1][1], uy, 0.015 * PetscAbsReal(uy), what);
   SB_CHECK_NEAR(limit[0], ux, 3e-3 * PetscAbsReal(ux), what);
@@ -48,15 +50,15 @@ static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
     const PetscInt n[3] = {16 << k, 16 << k, 1};
 
     PetscCall(verify_mesh_write(n, locking_cook_map, NULL, mesh));
-    PetscCall(
-      test_open(&t,
-                "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
-                "-body_a_density 1 "
-                "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
-                "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
-                "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type "
-                "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
-                mesh, nu));
+    PetscCall(test_open(
+      &t,
+      "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
+      "-body_a_density 1 "
+      "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
+      "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
+      "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type "
+      "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
+      mesh, nu));
     PetscCall(verify_solve(&t, "Cook"));
     PetscCall(test_value_at(t.model, t.run->U, corner, u));
     test_print("    Cook, %d x %d cells: %.6g %.6g\n", (int)n[0], (int)n[1], u[0], u[1]);

@@ -1,17 +1,23 @@
 // @ranks 1 2
 /*
-  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a
-  scene names one, its log events occur; if not, none occur, nothing is allocated and the motion is bitwise
-  the same.
+  Every effect, element, material, field and other output (tests/parts.h lists them from the
+  registries): if a scene names one, its log events occur; if not, none occur, nothing is allocated
+  and the motion is bitwise the same.
 
-    first    a process that has run only the base scene has no log event of anything else, and has allocated nothing in files of effects,
+    first    a process that has run only the base scene has no log event of anything else, and has
+    allocated nothing in files of effects,
              contact and output
-    named    compared with the base scene, exactly its own events are added, and for an element or a material that of the replaced one
-             is missing; an effect is the only one of the model, and allocates; output leaves the motion bitwise the same
-    after    the base scene run again has the same number and size of allocations as before, in set-up and in steps, its own events only
+    named    compared with the base scene, exactly its own events are added, and for an element or a
+    material that of the replaced one
+             is missing; an effect is the only one of the model, and allocates; output leaves the
+             motion bitwise the same
+    after    the base scene run again has the same number and size of allocations as before, in
+    set-up and in steps, its own events only
              and bitwise the same motion
-    apart    two distant bodies in an explicit run, without solver tolerances: what is named for one does not change the
-             motion of the other: bitwise for effects and materials, up to rounding for elements, which change the order of sums
+    apart    two distant bodies in an explicit run, without solver tolerances: what is named for one
+    does not change the
+             motion of the other: bitwise for effects and materials, up to rounding for elements,
+             which change the order of sums
     rows     an effect, element, material or output option without a row in tests/parts.h fails here
 */
 #include "../parts.h"
@@ -42,8 +48,8 @@ static PetscErrorCode name_events(void)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++) {
     PetscCall(part_names(part_families[k].name, &n, names));
     for (PetscInt i = 0; i < n && part_families[k].kind; i++)
-      PetscCall(PetscSNPrintf(event_name[nevent++], sizeof(event_name[0]), "Sb%s_%s", part_families[k].kind,
-                              names[i]));
+      PetscCall(PetscSNPrintf(event_name[nevent++], sizeof(event_name[0]), "Sb%s_%s",
+                              part_families[k].kind, names[i]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,12 +96,16 @@ static PetscErrorCode run(const char *options, Trace *trace)
                             !t.model->space->nfixed && !t.run->nmonitor);
   trace->n = 3 * verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->U, &trace->u));
-  if (t.run->V) PetscCall(verify_gather(t.model, t.run->V, &trace->v));
+  if (t.run->V)
+    PetscCall(verify_gather(t.model, t.run->V, &trace->v));
   PetscCall(test_scene_close(&t));
   PetscCall(count_events(trace->events));
-  for (PetscInt i = 0; i < nevent; i++) trace->events[i] -= first[i];
+  for (PetscInt i = 0; i < nevent; i++)
+    trace->events[i] -= first[i];
+
   /* only rank 0 prints progress */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, trace->events, EVENTS, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, trace->events, EVENTS, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +129,8 @@ static PetscBool among(const char *name, const char *list)
   const size_t length = strlen(name);
 
   for (const char *at = list; (at = strstr(at, name)); at++)
-    if ((at == list || at[-1] == ',') && (!at[length] || at[length] == ',')) return PETSC_TRUE;
+    if ((at == list || at[-1] == ',') && (!at[length] || at[length] == ','))
+      return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
@@ -134,21 +145,26 @@ static PetscErrorCode check_output_rows(void)
   SB_CHECK(rows, "the option table has no -output_dir");
   PetscCall(part_names("output", &n, names));
   for (PetscInt i = 0; i < nrow; i++) {
-    const char *key = rows[i].row->key, *part = NULL;
+    const char *key = rows[i].row->key;
+    const char *part = NULL;
     PetscBool known = PETSC_FALSE;
 
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_options); k++)
-      if (!strcmp(part_options[k].key, key)) part = part_options[k].part;
-    SB_CHECK(part, "-%s has no row in part_options of tests/parts.h: say which output it names or changes",
-             key);
-    for (PetscInt k = 0; part && k < n; k++) known = (PetscBool)(known || !strcmp(names[k], part));
-    SB_CHECK(!part || !part[0] || known, "-%s belongs to '%s', which has no row in tests/parts.h", key,
-             part ? part : "");
+      if (!strcmp(part_options[k].key, key))
+        part = part_options[k].part;
+    SB_CHECK(
+      part, "-%s has no row in part_options of tests/parts.h: say which output it names or changes",
+      key);
+    for (PetscInt k = 0; part && k < n; k++)
+      known = (PetscBool)(known || !strcmp(names[k], part));
+    SB_CHECK(!part || !part[0] || known, "-%s belongs to '%s', which has no row in tests/parts.h",
+             key, part ? part : "");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The events of `with` are those of `without` and those of the part; an element or a material replaces one event. */
+/* The events of `with` are those of `without` and those of the part; an element or a material
+   replaces one event. */
 static void check_events(const Part *part, const Trace *without, const Trace *with)
 {
   const PetscBool replaces =
@@ -158,15 +174,16 @@ static void check_events(const Part *part, const Trace *without, const Trace *wi
   for (PetscInt i = 0; i < nevent; i++) {
     const PetscBool own = among(event_name[i], part->events);
 
-    SB_CHECK(!own || with->events[i] > 0, "%s %s is named and %s was never begun", part->family, part->name,
-             event_name[i]);
-    SB_CHECK(!own || !without->events[i], "%s %s is not named and %s was begun %d times", part->family,
-             part->name, event_name[i], (int)without->events[i]);
+    SB_CHECK(!own || with->events[i] > 0, "%s %s is named and %s was never begun", part->family,
+             part->name, event_name[i]);
+    SB_CHECK(!own || !without->events[i], "%s %s is not named and %s was begun %d times",
+             part->family, part->name, event_name[i], (int)without->events[i]);
     SB_CHECK(own || without->events[i] || !with->events[i], "with %s %s %s was begun %d times, too",
              part->family, part->name, event_name[i], (int)with->events[i]);
     gone += without->events[i] && !with->events[i];
   }
-  SB_CHECK(gone == (replaces ? 1 : 0), "with %s %s %d events are gone", part->family, part->name, (int)gone);
+  SB_CHECK(gone == (replaces ? 1 : 0), "with %s %s %d events are gone", part->family, part->name,
+           (int)gone);
 }
 
 /* Scene with a preconditioner that needs only the matrix. */
@@ -181,11 +198,13 @@ static PetscErrorCode scene_text(const char *mesh, const char *scene, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compares a scene that names the part with the same scene without it; then repeats the base scene. */
+/* Compares a scene that names the part with the same scene without it; then repeats the base
+   scene. */
 static PetscErrorCode check_part(const Part *part, const char *base, const Trace *reference)
 {
-  const PetscBool output = (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field") ||
-                                       !strcmp(part->family, "estimator") || !strcmp(part->family, "remesh"));
+  const PetscBool output =
+    (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field") ||
+                !strcmp(part->family, "estimator") || !strcmp(part->family, "remesh"));
   Trace without, with, after;
   char text[PART_TEXT];
 
@@ -198,36 +217,40 @@ static PetscErrorCode check_part(const Part *part, const char *base, const Trace
   PetscCall(run(text, &with));
   check_events(part, part->scene[0] ? &without : reference, &with);
   if (!strcmp(part->family, "effect")) {
-    SB_CHECK(with.neffect > 0 && with.n_effect > 0, "%s: %d effects, %d allocations of theirs", part->name,
-             (int)with.neffect, (int)with.n_effect);
+    SB_CHECK(with.neffect > 0 && with.n_effect > 0, "%s: %d effects, %d allocations of theirs",
+             part->name, (int)with.neffect, (int)with.n_effect);
   }
   if (output) {
-    SB_CHECK(same_motion(part->scene[0] ? &without : reference, &with, with.n), "%s %s changes the motion",
-             part->family, part->name);
+    SB_CHECK(same_motion(part->scene[0] ? &without : reference, &with, with.n),
+             "%s %s changes the motion", part->family, part->name);
   }
   PetscCall(run(base, &after));
   SB_CHECK(after.setup_n == reference->setup_n && after.setup_bytes == reference->setup_bytes,
-           "after %s %s the set-up allocates %d times, %.0f bytes, before %d times, %.0f bytes", part->family,
-           part->name, (int)after.setup_n, after.setup_bytes, (int)reference->setup_n,
+           "after %s %s the set-up allocates %d times, %.0f bytes, before %d times, %.0f bytes",
+           part->family, part->name, (int)after.setup_n, after.setup_bytes, (int)reference->setup_n,
            reference->setup_bytes);
   SB_CHECK(after.step_n == reference->step_n && after.step_bytes == reference->step_bytes,
-           "after %s %s steps allocate %d times, %.0f bytes, before %d times, %.0f bytes", part->family,
-           part->name, (int)after.step_n, after.step_bytes, (int)reference->step_n, reference->step_bytes);
-  SB_CHECK(after.live == reference->live, "after %s %s the base scene holds %.0f bytes, before %.0f",
-           part->family, part->name, after.live, reference->live);
+           "after %s %s steps allocate %d times, %.0f bytes, before %d times, %.0f bytes",
+           part->family, part->name, (int)after.step_n, after.step_bytes, (int)reference->step_n,
+           reference->step_bytes);
+  SB_CHECK(after.live == reference->live,
+           "after %s %s the base scene holds %.0f bytes, before %.0f", part->family, part->name,
+           after.live, reference->live);
   SB_CHECK(!memcmp(after.events, reference->events, sizeof(after.events)),
            "after %s %s the base scene has other events", part->family, part->name);
   SB_CHECK(same_motion(reference, &after, after.n), "after %s %s the base scene moves otherwise",
            part->family, part->name);
   test_print("  %-8s %-16s: %8.0f bytes more at the end of the run\n", part->family, part->name,
              with.live - (part->scene[0] ? without.live : reference->live));
-  if (part->scene[0]) PetscCall(destroy(&without));
+  if (part->scene[0])
+    PetscCall(destroy(&without));
   PetscCall(destroy(&with));
   PetscCall(destroy(&after));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A part that is named for the bar does not change the motion of a distant body; that body is the first one, so that its numbers stay the same. */
+/* A part that is named for the bar does not change the motion of a distant body; that body is the
+   first one, so that its numbers stay the same. */
 static PetscErrorCode check_apart(const Part *part, PetscBool exact)
 {
   static const char far[] =
@@ -246,8 +269,9 @@ static PetscErrorCode check_apart(const Part *part, PetscBool exact)
   SB_CHECK(exact ? same_motion(&without, &with, n)
                  : verify_difference(n, without.u, with.u) < 1e-12 &&
                      verify_difference(n, without.v, with.v) < 1e-12,
-           "%s %s of one body changes the motion of the other, by %g and %g", part->family, part->name,
-           verify_difference(n, without.u, with.u), verify_difference(n, without.v, with.v));
+           "%s %s of one body changes the motion of the other, by %g and %g", part->family,
+           part->name, verify_difference(n, without.u, with.u),
+           verify_difference(n, without.v, with.v));
   PetscCall(destroy(&without));
   PetscCall(destroy(&with));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -265,11 +289,16 @@ static PetscErrorCode check_family(const char *family, const char *base, const T
     PetscBool found;
 
     PetscCall(part_find(family, names[i], &part, &found));
-    SB_CHECK(found, "%s %s has no row in tests/parts.h: say how the scene there names it", family, names[i]);
-    /* parts of the base scene are tested by their replacements; the number of the body is written with any field */
-    if (!found || !part.options[0] || !strcmp(part.events, "")) continue;
+    SB_CHECK(found, "%s %s has no row in tests/parts.h: say how the scene there names it", family,
+             names[i]);
+
+    /* parts of the base scene are tested by their replacements; the number of the body is written
+       with any field */
+    if (!found || !part.options[0] || !strcmp(part.events, ""))
+      continue;
     PetscCall(check_part(&part, base, reference));
-    if (part.apart) PetscCall(check_apart(&part, (PetscBool)strcmp(family, "element")));
+    if (part.apart)
+      PetscCall(check_apart(&part, (PetscBool)strcmp(family, "element")));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -316,8 +345,8 @@ int main(int argc, char **argv)
     PetscCall(check_family(part_families[k].name, base, &reference));
   PetscCall(run(base, &last));
   SB_CHECK(last.all_n == reference.all_n && last.all_bytes == reference.all_bytes,
-           "with PETSc's own: %.0f allocations, %.0f bytes, after all others %.0f and %.0f", reference.all_n,
-           reference.all_bytes, last.all_n, last.all_bytes);
+           "with PETSc's own: %.0f allocations, %.0f bytes, after all others %.0f and %.0f",
+           reference.all_n, reference.all_bytes, last.all_n, last.all_bytes);
   SB_CHECK(last.n_output == first.n_output, "%d allocations of output, before any was named %d",
            (int)last.n_output, (int)first.n_output);
   test_print("  the base scene allocates %d times, %.0f bytes, in " PART_STEPS " steps %d times\n",
