@@ -43,24 +43,26 @@ static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, 
                               PetscReal mass[2])
 {
   const SbBody *body = &m->body[b];
-  const SbMaterial mine = m->material[b];
+  const SbMaterial law = m->material[b];
   PetscInt n = 0;
 
-  mass[0] = mass[1] = mine->density * body->volume;
+  mass[0] = mass[1] = law->density * body->volume;
   (void)snprintf(name, size, "%s", body->name);
   for (PetscInt k = 0; k < m->nbody && body->copy_of[0]; k++) {
     const SbBody *other = &m->body[k];
-    const SbMaterial his = m->material[k];
+    const SbMaterial other_law = m->material[k];
 
     if (strcmp(other->copy_of, body->copy_of) || strcmp(other->element, body->element) ||
         other->ncell != body->ncell || out->body_nodes[k] != out->body_nodes[b] ||
-        his->type != mine->type || SbMaterialYoungModulus(his) != SbMaterialYoungModulus(mine) ||
-        SbMaterialPoisson(his) != SbMaterialPoisson(mine) || his->density != mine->density)
+        other_law->type != law->type ||
+        SbMaterialYoungModulus(other_law) != SbMaterialYoungModulus(law) ||
+        SbMaterialPoisson(other_law) != SbMaterialPoisson(law) ||
+        other_law->density != law->density)
       continue;
     if (k < b)
       return PETSC_FALSE;
-    mass[0] = PetscMin(mass[0], his->density * other->volume);
-    mass[1] = PetscMax(mass[1], his->density * other->volume);
+    mass[0] = PetscMin(mass[0], other_law->density * other->volume);
+    mass[1] = PetscMax(mass[1], other_law->density * other->volume);
     if (++n > 1)
       (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
   }

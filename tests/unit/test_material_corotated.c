@@ -114,6 +114,7 @@ int main(int argc, char **argv)
     SB_CHECK(m->tangent == SB_TANGENT_WARPED && m->ops.frame,
              "the warped tangent is not the default");
     test_states(m);
+    check_inversion(m, PETSC_TRUE);
     PetscCall(test_warped(m));
     PetscCall(test_degenerate(m));
     PetscCall(SbMaterialDestroy(&m));

@@ -90,6 +90,7 @@ int main(int argc, char **argv)
                                                : 0,
                                       1000, &m));
     test_states(m);
+    check_inversion(m, PETSC_TRUE);
     test_small_strains(m);
     SB_CHECK_ERROR(SbMaterialSetTangent(m, SB_TANGENT_WARPED), PETSC_ERR_USER, "neohookean");
     PetscCall(SbMaterialDestroy(&m));
