@@ -64,17 +64,21 @@ typedef struct {
                              SbPack C[81]);
 } SbMaterialOps;
 
-/* A law. */
+/*
+  A law. Its option rows are for bodies and inclusions, each with a default. Every law but a linear
+  one has the option `tangent`, with `warped` as its first choice after `auto` if it has a spin.
+
+    linear   - stress is linear in F: K is constant, and the law has a frame
+    softens  - stress has a maximum in compression, beyond which cells invert
+    jacobian - theta is J - 1, cubic in the displacement; of other laws it is at most quadratic, or
+               that of a spin
+*/
 typedef struct {
   const char *name;
   size_t size; /* bytes of `data`, zero at first */
   PetscInt nrow;
-  const SbOption *row; /* [nrow] its options, of bodies and of inclusions: each has a default. With
-                          `tangent` it has several tangents, the warped one if it has a spin */
-  PetscBool linear;    /* stress is linear in F: K is constant, and it has a frame */
-  PetscBool softens;   /* stress has a maximum in compression, beyond which cells invert */
-  PetscBool jacobian;  /* theta is J - 1, cubic in the displacement; of other laws at most quadratic
-                          or that of a spin */
+  const SbOption *row; /* [nrow] */
+  PetscBool linear, softens, jacobian;
   SbMaterialOps ops;
 } SbMaterialType;
 

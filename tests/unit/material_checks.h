@@ -623,7 +623,7 @@ static inline void check_lanes(SbMaterial m)
           f[k][l] = l == place ? F[k] : l % 3 ? uniform() : NAN;
       const int n = all_operations(m, (const SbPack *)f, what);
       for (int k = 0; k < n; k++)
-        different += memcmp(&what[k][place], &first[k][2], sizeof(PetscReal)) != 0;
+        different += what[k][place] != first[k][2];
     }
   }
   SB_CHECK(!different, "%s: %d results depend on their neighbours", m->type->name, (int)different);
