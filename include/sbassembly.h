@@ -38,8 +38,9 @@ PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
 
 /*
   The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a
-  = V D grad psi_a with D from SbMaterialOps.volumetric; of P2 V times the derivative of the mean of
-  theta. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
+  = V D grad psi_a with D from SbMaterialOps.dilatation_gradient; of P2 V times the derivative of
+  the mean of theta. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both
+  moduli are zero.
 */
 typedef struct {
   PetscInt stride; /* lanes of a batch in b: 12, or 30 with a P2 body */

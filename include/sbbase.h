@@ -137,8 +137,8 @@ void SbSuggestNames(const char *word, PetscInt n, const char *const names[], siz
 /* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
 void SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
                    char text[]);
-/* The same for the types in a list. */
-PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[]);
+/* The same with the names in alphabetical order; sorts them. */
+void SbAdviseSorted(const char *word, PetscInt n, const char *names[], size_t size, char text[]);
 /* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
 PetscBool SbHasPrefix(const char *word, const char *beginnings);
 

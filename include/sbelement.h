@@ -52,12 +52,24 @@ struct _p_SbElement {
     weak; /* DG: a prescribed boundary face gets a node of its own, to which the cell is tied */
   SbElementOps ops;
 };
-extern PetscFunctionList SbElementList;
-/* Adds an element; create() fills nodes_per and ops, and gammas with their defaults. `rows`: its
-   options, class "body", type `name`. Not collective, same on all ranks. */
-PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement),
-                                 PetscInt nrows, const SbOption rows[]);
+/* An element by name, and what it is with its options at their defaults. */
+typedef struct {
+  PetscInt nrow;
+  const SbOption *row; /* [nrow] its options, class "body", type = its name */
+  struct _p_SbElement element;
+} SbElementType;
+
+/* Names of all elements, "p1|p2|...": the range of the option `element`. */
+extern char SbElementNames[];
+/* Adds an element, which must live as long as the program, and its option rows. Not collective,
+   same on all ranks. */
+PetscErrorCode SbElementRegister(const SbElementType *type);
 PetscErrorCode SbElementRegisterAll(void);
+/* Names of all elements, in the order of their registration; their number. Not collective. */
+#define SB_ELEMENT_TYPES 16
+PetscInt SbElementTypes(const char *names[SB_ELEMENT_TYPES]);
+/* The element of a name; NULL if there is none. Not collective. */
+const SbElementType *SbElementFind(const char *name);
 /* Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not
    examined); owned by the caller. Error: PETSC_ERR_USER for an unknown name, and what the option
    readers refuse. */

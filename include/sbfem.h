@@ -203,7 +203,7 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace space);
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest),
-   the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Outputs may be NULL. Not
+   the law's pressure -lambda theta, Pa (SbMaterialPressure()). Outputs may be NULL. Not
    collective. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                       PetscReal psi[], PetscReal pressure[]);

@@ -20,16 +20,28 @@ typedef enum {
   SB_TANGENT_EXACT_SPD /* dP/dF with its negative eigenvalues raised to zero */
 } SbTangentKind;
 
+/*
+  Operations of a law on a batch; of NULL ones see there. psi is split into what changes shape and
+  what changes volume,
+
+    psi = psi_mu(F) + lambda/2 theta(F)^2,
+
+  theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
+  (corotated), tr(E) (stvk), J - 1 (neohookean); and lambda Lame's first parameter at rest
+  (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
+*/
 typedef struct {
+  /* reads the options of the law's rows into m->data, and may replace the stiffness at rest, which
+     is that of young and poisson, by SbMaterialSetLame(). NULL: the law has none, but `tangent`,
+     which is read for it. */
+  PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
-  /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change
-     of volume: tr(eps) (linear), tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p =
-     -lambda theta, Pa, positive in compression: resists the change of volume, and oscillates from
-     cell to cell where an element locks. */
-  void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
+  /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit. With
+     SB_TANGENT_EXACT_SPD its negative eigenvalues are raised to zero. */
+  void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
   /* The tangent is the isotropic Hooke tensor of lambda and mu, turned by R: fills R. NULL when the
      law needs the full tangent. Co-rotated has it with the warped tangent, linear always (R =
      I). */
@@ -40,69 +52,102 @@ typedef struct {
      not of this kind. Co-rotated has it with its exact tangents; with the warped one `frame` takes
      its place. */
   void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
-  /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
-  void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
-  /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows
-     with lambda but the stress. At rest D = I. With a frame or a spin D is their R. */
-  void (*volumetric)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9]);
+  /* theta, without unit; zero at rest, positive in expansion */
+  void (*dilatation)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack theta);
+  /* D = d theta/dF: the tangent holds lambda D D^T, and nothing else of it grows with lambda but
+     the stress. At rest D = I. With a frame or a spin D is their R. */
+  void (*dilatation_gradient)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9]);
   /* C += p d^2 theta/dF^2 (C as in tangent), for the derivative of a pressure p (Pa, tension) that
      does not come from F alone; with the filtered tangent only where that is not negative. NULL: it
      vanishes, or it is in W of spin, which is proportional to lambda theta - 2 mu. */
-  void (*curvature)(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p, SbPack C[81]);
+  void (*dilatation_hessian)(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                             SbPack C[81]);
 } SbMaterialOps;
 
+/*
+  A law. Its option rows are for bodies and inclusions, each with a default. Every law but a linear
+  one has the option `tangent`, with `warped` as its first choice after `auto` if it has a spin.
+
+    linear   - stress is linear in F: K is constant, and the law has a frame
+    softens  - stress has a maximum in compression, beyond which cells invert
+    jacobian - theta is J - 1, cubic in the displacement; of other laws it is at most quadratic, or
+               that of a spin
+*/
+typedef struct {
+  const char *name;
+  size_t size; /* bytes of `data`, zero at first */
+  PetscInt nrow;
+  const SbOption *row; /* [nrow] */
+  PetscBool linear, softens, jacobian;
+  SbMaterialOps ops;
+} SbMaterialType;
+
 struct _p_SbMaterial {
-  char law[SB_NAME_MAX], name[SB_NAME_MAX]; /* name: of the body or inclusion */
+  const SbMaterialType *type;
+  char name[SB_NAME_MAX]; /* of the body or inclusion */
   PetscLogEvent
     event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
-  SbMaterialOps ops;
-  PetscReal E, nu; /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
-  PetscReal lambda,
-    mu; /* Lame parameters at rest, Pa: from E and nu, or set by the law's constructor */
-  PetscReal density; /* kg/m^3 */
-  PetscBool linear;  /* stress is linear in F: K is constant */
+  SbMaterialOps ops;                   /* of the type; frame only with the warped tangent */
+  PetscBool linear, softens, jacobian; /* of the type */
+  struct _p_SbElastic *rest; /* stiffness at rest: SbMaterialShearModulus() and others; owned */
+  PetscReal density;         /* kg/m^3 */
   PetscBool
     adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  PetscBool softens; /* stress has a maximum in compression, beyond which cells invert */
-  PetscBool
-    jacobian; /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
   SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
+  void *data;            /* the law's own constants; freed with the material */
 };
 
-extern PetscFunctionList SbMaterialList;
-/* Adds a law; tangent: its option of this name (classes "body" and "inclusion", type = law), NULL:
-   it has one tangent only. create() fills the table and the flags of a material whose numbers are
-   set. The first tangent is the warped one of a law with a spin, else the exact one. Not
-   collective, same on all ranks. */
-PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial),
-                                  const SbOption *tangent);
-/* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
+/* Names of all laws, "linear|corotated|...": the range of the option `material`. */
+extern char SbMaterialNames[];
+/* Adds a law, which must live as long as the program, and its option rows (classes "body" and
+   "inclusion", type = law). Not collective, same on all ranks. */
+PetscErrorCode SbMaterialRegister(const SbMaterialType *type);
+/* The laws of src/material, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/* Creates the law by name and reads young, poisson, density and the law's tangent. body: the scope
-   of a body or inclusion (its `type` is not examined). The material is owned by the caller. Errors:
-   PETSC_ERR_USER for an unknown law and for what the option readers refuse. Not collective, same on
-   all ranks. */
+/* Names of all laws, in the order of their registration; their number. Not collective. */
+#define SB_MATERIAL_TYPES 32
+PetscInt SbMaterialTypes(const char *names[SB_MATERIAL_TYPES]);
+/* The law of a name; NULL if there is none. Not collective. */
+const SbMaterialType *SbMaterialFind(const char *law);
+/* Creates the law by name and reads young, poisson, density, the law's options and its tangent.
+   body: the scope of a body or inclusion (its `type` is not examined). The material is owned by the
+   caller. Errors: PETSC_ERR_USER for an unknown law and for what the option readers refuse. Not
+   collective, same on all ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
-/* The same from numbers: E > 0 in Pa, nu in (-1, 0.5), density > 0 in kg/m^3, first tangent. */
+/* The same from numbers: E > 0 in Pa, nu in (-1, 0.5), density > 0 in kg/m^3; the law's options at
+   their defaults, its first tangent: the warped one of a law with a spin, else the exact one. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
                                        PetscReal density, SbMaterial *m);
+/* For `setfromoptions`: the stiffness at rest by Lame's parameters, mu > 0 and lambda > -2/3 mu,
+   Pa. Not collective. */
+void SbMaterialSetLame(SbMaterial m, PetscReal lambda, PetscReal mu);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
-/* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its
-   tangent follows that of m, which owns it. Not collective. */
+/* The same law without its volumetric part, psi_mu (SbMaterialOps): lambda = 0. Its tangent follows
+   that of m, which owns it. Not collective. */
 PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
-/* At rest: modulus of the fastest wave, rho c^2, the stiffest for one length; and of compression.
-   Pa */
-SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
-{
-  return m->lambda + 2. * m->mu;
-}
-SB_INLINE PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
-{
-  return m->lambda + 2. * m->mu / 3.;
-}
+
+/*
+  Stiffness at rest, where every law is Hooke's; Pa, Poisson's ratio without unit. Young's modulus
+  and Poisson's ratio are those of the options, bit by bit. Not collective.
+*/
+PetscReal SbMaterialYoungModulus(const struct _p_SbMaterial *m);
+PetscReal SbMaterialPoisson(const struct _p_SbMaterial *m);
+/* mu = E / (2 (1 + nu)) */
+PetscReal SbMaterialShearModulus(const struct _p_SbMaterial *m);
+/* lambda = E nu / ((1 + nu) (1 - 2 nu)): factor of the volumetric energy (SbMaterialOps), also away
+   from rest; exactly 0 for nu = 0 and for SbMaterialGetShear(), negative for nu < 0 */
+PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m);
+/* K = lambda + 2/3 mu, of compression */
+PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m);
+/* lambda + 2 mu: of the fastest wave, rho c^2, and the stiffest for one length */
+PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m);
+
+/* p = -lambda theta, Pa, positive in compression: resists the change of volume, and oscillates from
+   cell to cell where an element locks. Not collective. */
+void SbMaterialPressure(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
 /* C += p d(cof F)/dF, C as in SbMaterialOps.tangent. Not collective. */
 void SbAddCofactorTangent(const SbPack F[9], const SbPack p, SbPack C[81]);
 /* The rotation in F; I for the linear law. Not collective. */

@@ -151,22 +151,6 @@ static inline const SbOptionRow *part_output_rows(PetscInt *n)
   return first;
 }
 
-static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n,
-                                             char names[PART_NAMES][SB_NAME_MAX])
-{
-  const char **all;
-  int count;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListGet(list, &all, &count));
-  *n = 0;
-  for (int i = 0; i < count; i++) /* PETSc 3.18 counts the closing NULL */
-    if (all[i])
-      PetscCall(PetscStrncpy(names[(*n)++], all[i], SB_NAME_MAX));
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   part_names - all names of a family, from the registry of the program; those of "output" from the
   rows above. Not collective; after SbRegisterAll().
@@ -183,9 +167,17 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n,
     for (PetscInt i = 0; i < *n; i++)
       PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
   } else if (!strcmp(family, "element")) {
-    PetscCall(part_names_list(SbElementList, n, names));
+    const char *types[SB_ELEMENT_TYPES];
+
+    *n = SbElementTypes(types);
+    for (PetscInt i = 0; i < *n; i++)
+      PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
   } else if (!strcmp(family, "material")) {
-    PetscCall(part_names_list(SbMaterialList, n, names));
+    const char *types[SB_MATERIAL_TYPES];
+
+    *n = SbMaterialTypes(types);
+    for (PetscInt i = 0; i < *n; i++)
+      PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
   } else if (!strcmp(family, "time")) {
     char **words;
     int count;

@@ -78,19 +78,10 @@ static int compare_texts(const void *a, const void *b)
   return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[])
+void SbAdviseSorted(const char *word, PetscInt n, const char *names[], size_t size, char text[])
 {
-  const char **names;
-  int n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListGet(list, &names, &n));
-  while (n && !names[n - 1])
-    n--; /* PETSc 3.18 counts the terminating NULL */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
   SbSuggestName(word, n, names, size, text);
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscBool SbHasPrefix(const char *word, const char *beginnings)

@@ -149,7 +149,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
                                        0.5 * b->mesh->shortest);
     e->width = PetscMin(e->width, b->w[i]);
     b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
-    b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
+    b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * SbMaterialYoungModulus(s->material[i]);
   }
   PetscCheck(
     b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,

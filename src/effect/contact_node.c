@@ -134,8 +134,9 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
         c->touch[slot[node]] = (Touch){.node = node, .cell = f->cell, .a = a, .along = -1};
       }
       touch = &c->touch[slot[node]];
-      touch->k +=
-        c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / f->height;
+      touch->k += c->stiffness *
+                  PetscMin(SbMaterialWaveModulus(m), STIFFEST * SbMaterialShearModulus(m)) * share /
+                  f->height;
       touch->stiff = touch->k;
     }
   }

@@ -17,7 +17,9 @@
 #include <sbelement.h>
 #include "sblog.h"
 
-PetscFunctionList SbElementList = NULL;
+static const SbElementType *types[SB_ELEMENT_TYPES];
+static PetscInt ntype;
+char SbElementNames[SB_ELEMENT_TYPES * SB_NAME_MAX];
 
 /* of DG; CR has the second one */
 static const SbOption face_rows[] = {
@@ -36,13 +38,6 @@ static const SbOption p2_rows[] = {
    "when "
    "poisson is near 0.5"},
 };
-
-static PetscErrorCode destroy_list(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListDestroy(&SbElementList));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static void tabulate_vertex(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V)
 {
@@ -67,91 +62,113 @@ static void tabulate_face(const PetscReal x[4][3], PetscReal g[3][3], PetscReal 
       g[a][i] *= -3.;
 }
 
-static PetscErrorCode create_p1(SbElement e)
-{
-  PetscFunctionBeginUser;
-  e->nodes_per[0] = 1;
-  e->ops = (SbElementOps){tabulate_vertex, 1. / 4, 1. / 10, 1. / 20, 0., {{0.}}};
-  for (int a = 0; a < 4; a++)
-    e->ops.vertex[a][a] = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* values of basis functions at the vertices, and the mass, of elements with nodes at vertices and
+   at faces */
+#define VERTEX_BASIS                                      \
+  {                                                       \
+    {1., 0., 0., 0.}, {0., 1., 0., 0.}, {0., 0., 1., 0.}, \
+    {                                                     \
+      0., 0., 0., 1.                                      \
+    }                                                     \
+  }
+#define FACE_BASIS                                           \
+  {                                                          \
+    {-2., 1., 1., 1.}, {1., -2., 1., 1.}, {1., 1., -2., 1.}, \
+    {                                                        \
+      1., 1., 1., -2.                                        \
+    }                                                        \
+  }
+#define FACE_OPS                                            \
+  {                                                         \
+    tabulate_face, 1. / 4, 2. / 5, -1. / 20, 0., FACE_BASIS \
+  }
+#define GAMMA1 0.6 /* chosen in docs/reports/locking.md */
 
-static PetscErrorCode create_p2(SbElement e)
-{
-  PetscFunctionBeginUser;
-  PetscCall(create_p1(e));
-  e->nodes_per[1] = 1;
-  e->mean_volume = PETSC_TRUE;
-  e->ops.mass_lumped = 1. / 36;
-  e->ops.mass_lumped_edge = 4. / 27;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const SbElementType elements[] = {
+  {.element = {.name = "p1",
+               .nodes_per = {1, 0, 0, 0},
+               .ops = {tabulate_vertex, 1. / 4, 1. / 10, 1. / 20, 0., VERTEX_BASIS}}},
+  {.nrow = PETSC_STATIC_ARRAY_LENGTH(p2_rows),
+   .row = p2_rows,
+   .element = {.name = "p2",
+               .nodes_per = {1, 1, 0, 0},
+               .mean_volume = PETSC_TRUE,
+               .ops = {tabulate_vertex, 1. / 36, 1. / 10, 1. / 20, 4. / 27, VERTEX_BASIS}}},
+  {.nrow = 1,
+   .row = face_rows + 1,
+   .element = {.name = "cr", .nodes_per = {0, 0, 1, 0}, .gamma1 = GAMMA1, .ops = FACE_OPS}},
+  {.nrow = PETSC_STATIC_ARRAY_LENGTH(face_rows),
+   .row = face_rows,
+   .element = {.name = "dg",
+               .nodes_per = {0, 0, 0, 4},
+               .gamma0 = 4.,
+               .gamma1 = GAMMA1,
+               .weak = PETSC_TRUE,
+               .ops = FACE_OPS}},
+};
 
-static PetscErrorCode create_cr(SbElement e)
+PetscErrorCode SbElementRegister(const SbElementType *type)
 {
-  PetscFunctionBeginUser;
-  e->nodes_per[2] = 1;
-  e->gamma1 = 0.6; /* chosen in docs/reports/locking.md */
-  e->ops = (SbElementOps){tabulate_face, 1. / 4, 2. / 5, -1. / 20, 0., {{0.}}};
-  for (int k = 0; k < 16; k++)
-    e->ops.vertex[k / 4][k % 4] = k / 4 == k % 4 ? -2. : 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscInt i = 0;
 
-static PetscErrorCode create_dg(SbElement e)
-{
   PetscFunctionBeginUser;
-  PetscCall(create_cr(e));
-  e->nodes_per[2] = 0;
-  e->nodes_per[3] = 4;
-  e->gamma0 = 4.;
-  e->weak = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement),
-                                 PetscInt nrows, const SbOption rows[])
-{
-  PetscFunctionBeginUser;
-  if (!SbElementList)
-    PetscCall(PetscRegisterFinalize(destroy_list));
-  PetscCall(PetscFunctionListAdd(&SbElementList, name, create));
-  if (nrows)
-    PetscCall(SbOptionsRegister("body", name, nrows, rows));
+  // Repeated registration is allowed: SbOptionsReset() may have removed the options.
+  while (i < ntype && types[i] != type)
+    i++;
+  PetscCheck(i < SB_ELEMENT_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for element %s",
+             type->element.name);
+  if (i == ntype) {
+    SbAppend(sizeof(SbElementNames), SbElementNames, "%s%s", ntype ? "|" : "", type->element.name);
+    types[ntype++] = type;
+  }
+  if (type->nrow)
+    PetscCall(SbOptionsRegister("body", type->element.name, type->nrow, type->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbElementRegisterAll(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbElementRegister("p1", create_p1, 0, NULL));
-  PetscCall(SbElementRegister("p2", create_p2, PETSC_STATIC_ARRAY_LENGTH(p2_rows), p2_rows));
-  PetscCall(SbElementRegister("cr", create_cr, 1, face_rows + 1));
-  PetscCall(SbElementRegister("dg", create_dg, PETSC_STATIC_ARRAY_LENGTH(face_rows), face_rows));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++)
+    PetscCall(SbElementRegister(&elements[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbElementTypes(const char *names[SB_ELEMENT_TYPES])
+{
+  for (PetscInt i = 0; i < ntype; i++)
+    names[i] = types[i]->element.name;
+  return ntype;
+}
+
+const SbElementType *SbElementFind(const char *name)
+{
+  for (PetscInt i = 0; i < ntype; i++)
+    if (!strcmp(types[i]->element.name, name))
+      return types[i];
+  return NULL;
 }
 
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *element)
 {
-  PetscErrorCode (*create)(SbElement) = NULL;
+  const SbElementType *type = SbElementFind(name);
   int choice;
   SbScope scope;
   SbElement e;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListFind(SbElementList, name, &create));
-  if (!create) {
+  if (!type) {
+    const char *names[SB_ELEMENT_TYPES];
     char all[256];
 
-    PetscCall(SbListAdvise(SbElementList, name, sizeof(all), all));
+    SbAdviseSorted(name, SbElementTypes(names), names, sizeof(all), all);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "there is no element \"%s\": choose one of %s", name,
             all);
   }
   PetscCall(PetscNew(&e));
-  PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
+  *e = type->element;
   PetscCall(SbLogNamed("Elem", name, &e->event));
-  PetscCall((*create)(e));
   *element = e;
   if (!body)
     PetscFunctionReturn(PETSC_SUCCESS);

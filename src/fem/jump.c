@@ -127,7 +127,7 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
     const PetscInt cell = face->cell[side];
     const SbMaterial law = s->material[s->mesh->cell_material[cell]];
 
-    k1[side] = 2. * (rest ? law->mu : j->modulus[cell]) * area / j->V[cell];
+    k1[side] = 2. * (rest ? SbMaterialShearModulus(law) : j->modulus[cell]) * area / j->V[cell];
     k0[side] = SbMaterialWaveModulus(law) * area / j->V[cell];
   }
   if (face->cell[1] == SUPPORT) {
@@ -153,7 +153,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     for (PetscInt l = 0; l < s->batch_n[k]; l++)
       j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
   for (PetscInt c = 0; c < mesh->ncell; c++)
-    j->modulus[c] = s->material[mesh->cell_material[c]]->mu;
+    j->modulus[c] = SbMaterialShearModulus(s->material[mesh->cell_material[c]]);
 
   /* list the faces with an owned node, sorted by body */
   for (PetscInt body = 0; body < mesh->nbody; body++) {
@@ -211,6 +211,7 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
                               PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
+  const PetscReal mu = SbMaterialShearModulus(m);
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b];
   PetscReal before[SB_BATCH];
@@ -221,7 +222,7 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
     if (!keep)
-      modulus[l] = m->mu;
+      modulus[l] = mu;
   }
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
@@ -235,9 +236,9 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
       square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(m->mu / factor))
+  if (largest >= 0.5 * PetscSqr(mu / factor))
     SbStretches((const SbPack *)F, U, stretch, V);
-  for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(m->mu / factor); l++) {
+  for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(mu / factor); l++) {
     PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
 
     for (int k = 0; k < 27; k++)

@@ -304,9 +304,9 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
     const SbMaterial m = region->material;
     const PetscReal factor = stage->shift_k + stage->shift_v * s->beta[region->body];
 
-    o->lambda[r] = factor * m->lambda;
-    o->mu[r] = factor * m->mu;
-    stiffest = PetscMax(stiffest, factor * m->E);
+    o->lambda[r] = factor * SbMaterialVolumetricModulus(m);
+    o->mu[r] = factor * SbMaterialShearModulus(m);
+    stiffest = PetscMax(stiffest, factor * SbMaterialYoungModulus(m));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (int q = 0; q < (region->quadratic ? 4 : 1); q++) {
         const PetscInt at = 9 * (sb_rotation_points(s) * b + q);

@@ -1,7 +1,7 @@
 /*
   Cells of P2: strains at the four points of SbRuleQuadratic, and the volumetric energy.
 
-  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the
+  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps). With theta at each of the
   points all of them would be constrained near nu = 1/2, and the element would lock. Here the energy
   of a cell is
 
@@ -77,7 +77,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   const PetscBool cubic =
     (PetscBool)(m->jacobian && !at->step); /* det F is cubic: more points than the law's */
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
-  const PetscReal lambda = m->lambda;
+  const PetscReal lambda = SbMaterialVolumetricModulus(m);
 
   for (int l = 0; l < SB_BATCH; l++)
     pressure[l] = 0.;
@@ -95,16 +95,16 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
     }
     if (m->linear || m->ops.frame || m->ops.spin) {
       // theta = R : F - 3, with its derivative
-      m->ops.volumetric(m, here, D);
+      m->ops.dilatation_gradient(m, here, D);
       for (int l = 0; l < SB_BATCH; l++)
         p[l] = 3. * lambda;
       for (int k = 0; k < 9; k++)
         for (int l = 0; l < SB_BATCH; l++)
           p[l] -= lambda * D[k][l] * here[k][l];
     } else {
-      m->ops.pressure(m, here, p);
+      SbMaterialPressure(m, here, p);
       if (b)
-        m->ops.volumetric(m, here, D);
+        m->ops.dilatation_gradient(m, here, D);
     }
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal weight = cubic ? rule->weight[q] : at->weight[q][l];
@@ -163,20 +163,20 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
     if (psi)
       m->ops.energy(m, (const SbPack *)F[q], psi[q]);
     if (pressure)
-      m->ops.pressure(m, (const SbPack *)F[q], pressure[q]);
+      SbMaterialPressure(m, (const SbPack *)F[q], pressure[q]);
   }
   if (m == region->material)
     return;
 
   /* contribution of the mean theta */
-  const PetscReal lambda = region->material->lambda;
+  const PetscReal lambda = SbMaterialVolumetricModulus(region->material);
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   for (int q = 0; q < at.n; q++) {
     SbPack D[9];
 
     if (P)
-      region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
+      region->material->ops.dilatation_gradient(region->material, (const SbPack *)F[q], D);
     for (int k = 0; P && k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++)
         P[q][k][l] += p[l] * D[k][l];
@@ -213,13 +213,13 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbRegion *region = s->batch_region[b];
     const SbMaterial m = region->material;
-    const PetscReal lambda = m->lambda;
+    const PetscReal lambda = SbMaterialVolumetricModulus(m);
     const SbPoints at = SbBatchPoints(s, b);
     SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p;
     SbPack change = {0.};
 
     /* regions whose tangents use these pressures */
-    if (region->quadratic ? region->pointwise == m : !m->ops.curvature)
+    if (region->quadratic ? region->pointwise == m : !m->ops.dilatation_hessian)
       continue;
     SbBatchGradients(s, b, u, PETSC_FALSE, x, F);
     if (step)
@@ -227,8 +227,8 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
     if (region->quadratic)
       SbQuadraticVolume(m, &at, (const SbPack *)x, (const SbPack(*)[9])F, p, step ? D : NULL);
     else {
-      m->ops.pressure(m, (const SbPack *)F[0], p);
-      m->ops.volumetric(m, (const SbPack *)F[0], D);
+      SbMaterialPressure(m, (const SbPack *)F[0], p);
+      m->ops.dilatation_gradient(m, (const SbPack *)F[0], D);
       for (int l = 0; l < SB_BATCH; l++)
         p[l] = -p[l];
     }

@@ -21,7 +21,7 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
                     const SbStage *stage, PetscReal f[])
 {
   const SbMaterial m = region->pointwise;
-  const PetscReal lambda = region->material->lambda;
+  const PetscReal lambda = SbMaterialVolumetricModulus(region->material);
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {

@@ -113,8 +113,8 @@ static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
     W[l] = factor * V[l];
 }
 
-/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on its
-   moduli. */
+/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.dilatation_gradient), and the
+   factor on its moduli. */
 typedef struct {
   SbPack D[9];
   PetscReal factor;
@@ -169,12 +169,12 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
     /* a full tangent dP/dF, without its volumetric part; damping is added */
     m->ops.tangent(m, F, C);
     if (split) {
-      m->ops.volumetric(m, F, split->D);
+      m->ops.dilatation_gradient(m, F, split->D);
       split->factor = x->stiffness;
       remove_volumetric(x->lambda, (const SbPack *)split->D, C);
     }
-    if (x->pressure && m->ops.curvature)
-      m->ops.curvature(m, F, *x->pressure, C);
+    if (x->pressure && m->ops.dilatation_hessian)
+      m->ops.dilatation_hessian(m, F, *x->pressure, C);
     scaled_volumes(V, x->stiffness, W);
     SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
     if (x->damping == 0.)
@@ -339,8 +339,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const PetscReal inertia = s->consistent_mass ? m->density * shift : 0.;
   const Factors factors = {.stiffness = stage->shift_k,
                            .damping = stage->shift_v * s->beta[region->body],
-                           .lambda = m->lambda,
-                           .mu = m->mu};
+                           .lambda = SbMaterialVolumetricModulus(m),
+                           .mu = SbMaterialShearModulus(m)};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept;
   Split *split = out && faces && factors.lambda > 0. ? &kept : NULL;
@@ -357,8 +357,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
 
       if (!m->linear)
         SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
-      if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
-        m->ops.pressure(m, (const SbPack *)F[0], p);
+      if (s->linear_pressure && m->ops.dilatation_hessian && m->tangent == SB_TANGENT_EXACT) {
+        SbMaterialPressure(m, (const SbPack *)F[0], p);
         for (int l = 0; l < SB_BATCH; l++)
           p[l] += s->pressure[b][l];
         at.pressure = &p;

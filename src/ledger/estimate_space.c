@@ -623,11 +623,11 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
     const PetscInt body = mesh->cell_body[c];
 
     if (model->element[body]->nodes_per[1]) {
-      est->cell2[c] = quadratic_off(est, c, law->mu, K);
+      est->cell2[c] = quadratic_off(est, c, SbMaterialShearModulus(law), K);
       sum[body][SHEAR_OFF] += est->cell2[c];
       sum[body][STRAIN] += cell_volume(mesh, c) * est->psi[c];
     } else
-      est->cell2[c] = add_cell(est, c, law->mu, K, sum[body]);
+      est->cell2[c] = add_cell(est, c, SbMaterialShearModulus(law), K, sum[body]);
   }
   if (est->residual) {
     const PetscReal *force;

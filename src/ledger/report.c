@@ -155,7 +155,7 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
     return;
 
   /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
-  if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * law->mu) {
+  if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * SbMaterialShearModulus(law)) {
     SbAppend(
       ROOM, w,
       "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",

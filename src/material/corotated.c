@@ -25,8 +25,8 @@
 SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                        SbPack psi)
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack R[9];
 
   SbPolar(F, R);
@@ -45,8 +45,8 @@ SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPa
 SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                        SbPack P[restrict 9])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack R[9];
 
   SbPolar(F, R);
@@ -61,18 +61,20 @@ SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbPa
   }
 }
 
-SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                         SbPack p)
+/* theta = tr(S - I) = R : F - 3 */
+SB_KERNEL static void dilatation_corotated(const struct _p_SbMaterial *m,
+                                           const SbPack F[restrict 9], SbPack theta)
 {
   SbPack R[9];
 
+  (void)m;
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9];
 
     SbPackGet(9, F, l, f);
     SbPackGet(9, R, l, r);
-    p[l] = -m->lambda * (SbDot9(r, f) - 3);
+    theta[l] = SbDot9(r, f) - 3;
   }
 }
 
@@ -138,8 +140,8 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
 SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                      SbPack R[restrict 9], SbPack W[restrict 9])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack S[6], kappa;
 
   SbPolar(F, R);
@@ -160,8 +162,8 @@ SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack
 SB_KERNEL static void tangent_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack C[restrict 81])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack R[9], W[9], ZW[27];
 
   spin_corotated(m, F, R, W);
@@ -196,12 +198,21 @@ SB_KERNEL static void tangent_corotated(const struct _p_SbMaterial *m, const SbP
   }
 }
 
-void SbMaterialCreate_Corotated(SbMaterial m)
-{
-  m->ops = (SbMaterialOps){.energy = energy_corotated,
-                           .stress = stress_corotated,
-                           .pressure = pressure_corotated,
-                           .spin = spin_corotated,
-                           .tangent = tangent_corotated,
-                           .volumetric = frame_corotated};
-}
+static const SbOption rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive "
+   "definite); "
+   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
+};
+
+const SbMaterialType SbMaterialCorotated = {
+  .name = "corotated",
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.energy = energy_corotated,
+          .stress = stress_corotated,
+          .tangent = tangent_corotated,
+          .spin = spin_corotated,
+          .dilatation = dilatation_corotated,
+          .dilatation_gradient = frame_corotated},
+};

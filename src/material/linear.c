@@ -21,8 +21,8 @@ SB_INLINE void strain(const SbPack F[9], int l, PetscReal e[9])
 SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack psi)
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
@@ -36,8 +36,8 @@ SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack P[restrict 9])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
@@ -49,11 +49,12 @@ SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack 
   }
 }
 
-SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                      SbPack p)
+/* theta = tr(eps) */
+static void dilatation_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack theta)
 {
+  (void)m;
   for (int l = 0; l < SB_BATCH; l++)
-    p[l] = -m->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
+    theta[l] = (F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1);
 }
 
 static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
@@ -72,7 +73,7 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
     for (int k = 0; k < 9; k++) {
       const int turned = 3 * (k % 3) + k / 3;
       const PetscReal c =
-        m->mu * ((i == k) + (i == turned)) + m->lambda * (i % 4 == 0 && k % 4 == 0);
+        m->rest->mu * ((i == k) + (i == turned)) + m->rest->lambda * (i % 4 == 0 && k % 4 == 0);
 
       for (int l = 0; l < SB_BATCH; l++)
         C[9 * i + k][l] = c;
@@ -80,13 +81,13 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
   }
 }
 
-void SbMaterialCreate_Linear(SbMaterial m)
-{
-  m->ops = (SbMaterialOps){.energy = energy_linear,
-                           .stress = stress_linear,
-                           .pressure = pressure_linear,
-                           .frame = frame_linear,
-                           .tangent = tangent_linear,
-                           .volumetric = frame_linear};
-  m->linear = PETSC_TRUE;
-}
+const SbMaterialType SbMaterialLinear = {
+  .name = "linear",
+  .linear = PETSC_TRUE,
+  .ops = {.energy = energy_linear,
+          .stress = stress_linear,
+          .tangent = tangent_linear,
+          .frame = frame_linear,
+          .dilatation = dilatation_linear,
+          .dilatation_gradient = frame_linear},
+};

@@ -1,12 +1,17 @@
 /*
-  The material laws: their names and options, creation, choice of the tangent, damping.
+  The registry of material laws, and their creation by name; stiffness at rest, choice of the
+  tangent, damping.
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
 #include "sblog.h"
 
-PetscFunctionList SbMaterialList = NULL;
+#define LISTED(law) &law,
+static const SbMaterialType *const laws[] = {SB_MATERIAL_LAWS(LISTED)};
+static const SbMaterialType *types[SB_MATERIAL_TYPES];
+static PetscInt ntype;
+char SbMaterialNames[SB_MATERIAL_TYPES * SB_NAME_MAX];
 
 static const SbOption body_rows[] = {
   {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
@@ -15,35 +20,26 @@ static const SbOption body_rows[] = {
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
    "mass per volume in the reference configuration"},
 };
-/* of laws with and without a warped tangent */
-static const SbOption tangents[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
-   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive "
-   "definite); "
-   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
-  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
-   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, "
-   "for CG"},
-};
 
-static PetscErrorCode destroy_list(void)
+PetscErrorCode SbMaterialRegister(const SbMaterialType *type)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListDestroy(&SbMaterialList));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscInt i = 0;
 
-PetscErrorCode SbMaterialRegister(const char *law, void (*create)(SbMaterial),
-                                  const SbOption *tangent)
-{
   PetscFunctionBeginUser;
-  if (!SbMaterialList)
-    PetscCall(PetscRegisterFinalize(destroy_list));
-  PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
-  if (tangent)
-    PetscCall(SbOptionsRegister("body", law, 1, tangent));
-  if (tangent)
-    PetscCall(SbOptionsRegister("inclusion", law, 1, tangent));
+
+  // Repeated registration is allowed: SbOptionsReset() may have removed the options.
+  while (i < ntype && types[i] != type)
+    i++;
+  PetscCheck(i < SB_MATERIAL_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for material law %s",
+             type->name);
+  if (i == ntype) {
+    SbAppend(sizeof(SbMaterialNames), SbMaterialNames, "%s%s", ntype ? "|" : "", type->name);
+    types[ntype++] = type;
+  }
+  if (type->nrow) {
+    PetscCall(SbOptionsRegister("body", type->name, type->nrow, type->row));
+    PetscCall(SbOptionsRegister("inclusion", type->name, type->nrow, type->row));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,38 +48,71 @@ PetscErrorCode SbMaterialRegisterAll(void)
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
   PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, NULL));
-  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated, &tangents[0]));
-  PetscCall(SbMaterialRegister("stvk", SbMaterialCreate_StVK, &tangents[1]));
-  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean, &tangents[1]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(laws); i++)
+    PetscCall(SbMaterialRegister(laws[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbMaterialTypes(const char *names[SB_MATERIAL_TYPES])
+{
+  for (PetscInt i = 0; i < ntype; i++)
+    names[i] = types[i]->name;
+  return ntype;
+}
+
+const SbMaterialType *SbMaterialFind(const char *law)
+{
+  for (PetscInt i = 0; i < ntype; i++)
+    if (!strcmp(types[i]->name, law))
+      return types[i];
+  return NULL;
+}
+
+/* A material of a type, with the constants of the law still to be read. */
+static PetscErrorCode create(const SbMaterialType *type, PetscReal E, PetscReal nu,
+                             PetscReal density, SbMaterial *material)
+{
+  SbMaterial m;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&m));
+  m->type = type;
+  m->ops = type->ops;
+  m->linear = type->linear;
+  m->softens = type->softens;
+  m->jacobian = type->jacobian;
+  PetscCall(SbLogNamed("Mat", type->name, &m->event));
+  m->density = density;
+  PetscCall(PetscNew(&m->rest));
+  m->rest->E = E;
+  m->rest->nu = nu;
+  m->rest->mu = E / (2 * (1 + nu));
+  m->rest->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
+  if (type->size)
+    PetscCall(PetscCalloc(type->size, &m->data));
+  PetscCall(SbMaterialSetTangent(m, m->ops.spin ? SB_TANGENT_WARPED : SB_TANGENT_EXACT));
+  *material = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
                                        PetscReal density, SbMaterial *material)
 {
-  void (*create)(SbMaterial) = NULL;
-  SbMaterial m;
+  const SbMaterialType *type = SbMaterialFind(law);
+  SbScope nobody;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListFind(SbMaterialList, law, &create));
-  PetscCheck(create, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
-  PetscCall(PetscNew(&m));
-  PetscCall(PetscStrncpy(m->law, law, sizeof(m->law)));
-  PetscCall(SbLogNamed("Mat", law, &m->event));
-  m->E = E;
-  m->nu = nu;
-  m->mu = E / (2 * (1 + nu));
-  m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
-  m->density = density;
-  create(m);
-  PetscCall(SbMaterialSetTangent(m, m->ops.spin ? SB_TANGENT_WARPED : SB_TANGENT_EXACT));
-  *material = m;
+  PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
+  PetscCall(create(type, E, nu, density, material));
+  SbScopeSet(&nobody, "body", law, "");
+  if (type->ops.setfromoptions)
+    PetscCall((*type->ops.setfromoptions)(*material, &nobody));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
 {
+  const SbMaterialType *type = SbMaterialFind(law);
   SbScope scope;
   PetscReal E, nu, density;
   int choice;
@@ -94,9 +123,12 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));
-  PetscCall(SbMaterialCreateElastic(law, E, nu, density, material));
+  PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
+  PetscCall(create(type, E, nu, density, material));
   m = *material;
   PetscCall(PetscStrncpy(m->name, body->instance, sizeof(m->name)));
+  if (type->ops.setfromoptions)
+    PetscCall((*type->ops.setfromoptions)(m, &scope));
   if (SbOptionFind(&scope, "tangent")) {
     /* auto, then the tangents of the law: all or, without a warped one, the two exact ones */
     PetscCall(SbOptionChoice(&scope, "tangent", &choice));
@@ -113,6 +145,8 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   if (!*m)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
+  PetscCall(PetscFree((*m)->rest));
+  PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -121,23 +155,70 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
   if (!m->shear) {
-    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, &m->shear));
+    PetscCall(create(m->type, 2 * m->rest->mu, 0., m->density, &m->shear));
     PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
+    if (m->type->size)
+      PetscCall(PetscMemcpy(m->shear->data, m->data, m->type->size));
   }
   *shear = m->shear;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbMaterialSetLame(SbMaterial m, PetscReal lambda, PetscReal mu)
+{
+  m->rest->lambda = lambda;
+  m->rest->mu = mu;
+  m->rest->E = mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  m->rest->nu = lambda / (2 * (lambda + mu));
+}
+
+PetscReal SbMaterialYoungModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->E;
+}
+
+PetscReal SbMaterialPoisson(const struct _p_SbMaterial *m)
+{
+  return m->rest->nu;
+}
+
+PetscReal SbMaterialShearModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->mu;
+}
+
+PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->lambda;
+}
+
+PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->lambda + 2. * m->rest->mu / 3.;
+}
+
+PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->lambda + 2. * m->rest->mu;
+}
+
+void SbMaterialPressure(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p)
+{
+  m->ops.dilatation(m, F, p);
+  for (int l = 0; l < SB_BATCH; l++)
+    p[l] *= -m->rest->lambda;
 }
 
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
 {
   PetscFunctionBeginUser;
   PetscCheck(!m->linear || kind == SB_TANGENT_EXACT, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "material law %s has one tangent only: do not choose one", m->law);
+             "material law %s has one tangent only: do not choose one", m->type->name);
   PetscCheck(kind != SB_TANGENT_WARPED || m->ops.spin, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "material law %s has no warped tangent: choose exact or exact_spd", m->law);
+             "material law %s has no warped tangent: choose exact or exact_spd", m->type->name);
   m->tangent = kind;
   if (m->ops.spin)
-    m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.volumetric : NULL;
+    m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.dilatation_gradient : NULL;
   if (m->shear)
     PetscCall(SbMaterialSetTangent(m->shear, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -146,8 +227,8 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
 SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                        const SbPack H[restrict 9], SbPack dP[restrict 9])
 {
-  const PetscReal lambda = m->lambda;
-  const PetscReal mu = m->mu;
+  const PetscReal lambda = m->rest->lambda;
+  const PetscReal mu = m->rest->mu;
   SbPack R[9];
 
   SbMaterialRotation(m, F, R);

@@ -1,13 +1,35 @@
 /*
-  material_impl.h - shared by the laws: constructors, projection of an isotropic tangent.
+  material_impl.h - shared by the laws: their list, the stiffness at rest, the projection of an
+  isotropic tangent.
 */
 #pragma once
 #include <sbmaterial.h>
 
-void SbMaterialCreate_Linear(SbMaterial m);
-void SbMaterialCreate_Corotated(SbMaterial m);
-void SbMaterialCreate_StVK(SbMaterial m);
-void SbMaterialCreate_NeoHookean(SbMaterial m);
+/* The laws, each a constant SbMaterialType in a file of its own: a new one is a line here. */
+#define SB_MATERIAL_LAWS(LAW) \
+  LAW(SbMaterialLinear)       \
+  LAW(SbMaterialCorotated)    \
+  LAW(SbMaterialStVK)         \
+  LAW(SbMaterialNeoHookean)
+
+#define SB_DECLARE_LAW(law) extern const SbMaterialType law;
+SB_MATERIAL_LAWS(SB_DECLARE_LAW)
+#undef SB_DECLARE_LAW
+
+/* Stiffness at rest: Young's modulus, Pa, and Poisson's ratio as given, and what follows from them;
+   or, where a law calls SbMaterialSetLame(), the other way round. */
+struct _p_SbElastic {
+  PetscReal E, nu;
+  PetscReal lambda, mu; /* Lame parameters, Pa; lambda 0: without the volumetric part */
+};
+
+/* Option row of a law without a warped tangent. */
+#define SB_MATERIAL_TANGENT_ROW                                                          \
+  {                                                                                      \
+    "tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",                  \
+      "tangent stiffness: exact; exact_spd, exact with each cell projected to positive " \
+      "semi-definite, for CG"                                                            \
+  }
 
 /* r = R of a lane, S = sym(R^T F) as 00 01 02 11 12 22. */
 SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, PetscReal r[9],

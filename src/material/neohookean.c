@@ -27,8 +27,8 @@
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack psi)
 {
-  const PetscReal a = 4 * m->mu / 3;
-  const PetscReal b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * m->rest->mu / 3;
+  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
   SbPack x;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -53,8 +53,8 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbP
 SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack P[restrict 9])
 {
-  const PetscReal a = 4 * m->mu / 3;
-  const PetscReal b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * m->rest->mu / 3;
+  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
@@ -69,10 +69,11 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbP
   }
 }
 
-/* J - 1 from H = F - I, as in the energy. */
-SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                          SbPack p)
+/* theta = J - 1, from H = F - I as in the energy. */
+SB_KERNEL static void dilatation_neohookean(const struct _p_SbMaterial *m,
+                                            const SbPack F[restrict 9], SbPack theta)
 {
+  (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal h[9], c[9];
 
@@ -81,15 +82,15 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
     h[4] -= 1;
     h[8] -= 1;
     SbMatCofactor(h, c);
-    p[l] = -m->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
+    theta[l] = h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c);
   }
 }
 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * m->mu / 3;
-  const PetscReal b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * m->rest->mu / 3;
+  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -119,8 +120,8 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                          SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * m->mu / 3;
-  const PetscReal b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * m->rest->mu / 3;
+  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
   SbPack cof[9], pF[9], shear, stretch;
 
   if (m->tangent == SB_TANGENT_EXACT_SPD) {
@@ -158,8 +159,10 @@ SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const Sb
   }
 }
 
-SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m,
-                                            const SbPack F[restrict 9], SbPack D[restrict 9])
+/* d theta/dF = cof F */
+SB_KERNEL static void dilatation_gradient_neohookean(const struct _p_SbMaterial *m,
+                                                     const SbPack F[restrict 9],
+                                                     SbPack D[restrict 9])
 {
   (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
@@ -187,20 +190,24 @@ SB_KERNEL void SbAddCofactorTangent(const SbPack F[restrict 9], const SbPack p,
   }
 }
 
-static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
-                                 SbPack C[81])
+static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m, const SbPack F[9],
+                                          const SbPack p, SbPack C[81])
 {
   (void)m;
   SbAddCofactorTangent(F, p, C);
 }
 
-void SbMaterialCreate_NeoHookean(SbMaterial m)
-{
-  m->ops = (SbMaterialOps){.energy = energy_neohookean,
-                           .stress = stress_neohookean,
-                           .pressure = pressure_neohookean,
-                           .tangent = tangent_neohookean,
-                           .volumetric = volumetric_neohookean,
-                           .curvature = curvature_neohookean};
-  m->jacobian = PETSC_TRUE;
-}
+static const SbOption rows[] = {SB_MATERIAL_TANGENT_ROW};
+
+const SbMaterialType SbMaterialNeoHookean = {
+  .name = "neohookean",
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .jacobian = PETSC_TRUE,
+  .ops = {.energy = energy_neohookean,
+          .stress = stress_neohookean,
+          .tangent = tangent_neohookean,
+          .dilatation = dilatation_neohookean,
+          .dilatation_gradient = dilatation_gradient_neohookean,
+          .dilatation_hessian = dilatation_hessian_neohookean},
+};

@@ -23,8 +23,8 @@ SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal 
 SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack psi)
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -38,8 +38,8 @@ SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack P[restrict 9])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9], p[9];
@@ -53,22 +53,24 @@ SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[
   }
 }
 
-SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                    SbPack p)
+/* theta = tr(E) */
+SB_KERNEL static void dilatation_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                      SbPack theta)
 {
+  (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
 
     green_strain(F, l, f, e);
-    p[l] = -m->lambda * (e[0] + e[4] + e[8]);
+    theta[l] = e[0] + e[4] + e[8];
   }
 }
 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -97,8 +99,8 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                    SbPack C[restrict 81])
 {
-  const PetscReal mu = m->mu;
-  const PetscReal lambda = m->lambda;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
   SbPack S[9], B[9]; /* B = mu F F^T */
 
   if (m->tangent == SB_TANGENT_EXACT_SPD) {
@@ -135,16 +137,16 @@ SB_KERNEL static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F
   }
 }
 
-/* theta = tr(F^T F - I) / 2 */
-static void volumetric_stvk(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9])
+/* d theta/dF = F */
+static void dilatation_gradient_stvk(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9])
 {
   (void)m;
   memcpy(D, F, 9 * sizeof(SbPack));
 }
 
 /* d^2 theta/dF^2 is the identity. */
-static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
-                           SbPack C[81])
+static void dilatation_hessian_stvk(const struct _p_SbMaterial *m, const SbPack F[9],
+                                    const SbPack p, SbPack C[81])
 {
   const PetscBool filter = (PetscBool)(m->tangent == SB_TANGENT_EXACT_SPD);
 
@@ -154,13 +156,17 @@ static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], con
       C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
 }
 
-void SbMaterialCreate_StVK(SbMaterial m)
-{
-  m->ops = (SbMaterialOps){.energy = energy_stvk,
-                           .stress = stress_stvk,
-                           .pressure = pressure_stvk,
-                           .tangent = tangent_stvk,
-                           .volumetric = volumetric_stvk,
-                           .curvature = curvature_stvk};
-  m->softens = PETSC_TRUE;
-}
+static const SbOption rows[] = {SB_MATERIAL_TANGENT_ROW};
+
+const SbMaterialType SbMaterialStVK = {
+  .name = "stvk",
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .softens = PETSC_TRUE,
+  .ops = {.energy = energy_stvk,
+          .stress = stress_stvk,
+          .tangent = tangent_stvk,
+          .dilatation = dilatation_stvk,
+          .dilatation_gradient = dilatation_gradient_stvk,
+          .dilatation_hessian = dilatation_hessian_stvk},
+};

@@ -43,23 +43,26 @@ static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, 
                               PetscReal mass[2])
 {
   const SbBody *body = &m->body[b];
+  const SbMaterial law = m->material[b];
   PetscInt n = 0;
 
-  mass[0] = mass[1] = m->material[b]->density * body->volume;
+  mass[0] = mass[1] = law->density * body->volume;
   (void)snprintf(name, size, "%s", body->name);
   for (PetscInt k = 0; k < m->nbody && body->copy_of[0]; k++) {
     const SbBody *other = &m->body[k];
+    const SbMaterial other_law = m->material[k];
 
     if (strcmp(other->copy_of, body->copy_of) || strcmp(other->element, body->element) ||
         other->ncell != body->ncell || out->body_nodes[k] != out->body_nodes[b] ||
-        strcmp(m->material[k]->law, m->material[b]->law) ||
-        m->material[k]->E != m->material[b]->E || m->material[k]->nu != m->material[b]->nu ||
-        m->material[k]->density != m->material[b]->density)
+        other_law->type != law->type ||
+        SbMaterialYoungModulus(other_law) != SbMaterialYoungModulus(law) ||
+        SbMaterialPoisson(other_law) != SbMaterialPoisson(law) ||
+        other_law->density != law->density)
       continue;
     if (k < b)
       return PETSC_FALSE;
-    mass[0] = PetscMin(mass[0], m->material[k]->density * other->volume);
-    mass[1] = PetscMax(mass[1], m->material[k]->density * other->volume);
+    mass[0] = PetscMin(mass[0], other_law->density * other->volume);
+    mass[1] = PetscMax(mass[1], other_law->density * other->volume);
     if (++n > 1)
       (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
   }
@@ -104,7 +107,8 @@ static void print_bodies(SbModel m, SbOutput out)
     else
       SbFormat(sizeof(kg), kg, "%.5g", mass[0]);
     (void)PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name,
-                      material->law, material->E, material->nu, material->density, kg);
+                      material->type->name, SbMaterialYoungModulus(material),
+                      SbMaterialPoisson(material), material->density, kg);
   }
   (void)PetscPrintf(PETSC_COMM_SELF, "\n");
 }

@@ -91,7 +91,8 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
         "'young': $g, 'poisson': $g, 'density': $g}",
         body->name, body->mesh, body->ncell, body->nvert, body->volume, body->min_dihedral,
         body->max_radius_ratio, body->element, out->body_nodes[b], 3 * out->body_nodes[b],
-        material->law, material->E, material->nu, material->density);
+        material->type->name, SbMaterialYoungModulus(material), SbMaterialPoisson(material),
+        material->density);
   }
 
   // settings; the solver is the current one: a fallback may have replaced it

@@ -16,9 +16,6 @@
 
 #define NAME_LENGTH 31 /* PETSc allows 63 characters of an option's name in YAML files */
 
-/* Materials registered by SbMaterialRegisterAll(), for the manual. */
-#define LAWS "linear|corotated|stvk|neohookean"
-
 const SbOption SbRunRows[] = {
   {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, separated by commas"},
   {"sets", SB_OPTION_NAMES, 1, "", "", "",
@@ -52,11 +49,11 @@ const SbOption SbBodyRows[] = {
    "degrees [scale [vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scales multiply, "
    "rotations "
    "compose, translations and velocities add up; empty: one body"},
-  {"element", SB_OPTION_STRING, 1, "", "p1", "p1|p2|cr|dg",
+  {"element", SB_OPTION_STRING, 1, "", "p1", SbElementNames,
    "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate "
    "where the "
    "solution is smooth"},
-  {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
+  {"material", SB_OPTION_STRING, 1, "", "", SbMaterialNames, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
    "sets or volume groups whose tets have another material, -inclusion_<name>_..."},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0,0,0", "",
@@ -76,7 +73,7 @@ const SbOption SbBodyRows[] = {
   {0},
 };
 const SbOption SbInclusionRows[] = {
-  {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
+  {"material", SB_OPTION_STRING, 1, "", "", SbMaterialNames, "material law, required"},
   {0},
 };
 
@@ -152,20 +149,19 @@ static PetscErrorCode read_names(const char *key, const char *what, PetscInt *n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads a word that must be a name in a list of types. */
-static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunctionList list,
-                                char word[SB_NAME_MAX])
+/* Reads a word that must be one of the names of n types, which are sorted here. */
+static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscInt n,
+                                const char *names[], char word[SB_NAME_MAX])
 {
   char option[3 * SB_NAME_MAX], all[512];
-  void (*constructor)(void) = NULL;
 
   PetscFunctionBeginUser;
   SbOptionName(scope, key, sizeof(option), option);
   PetscCall(SbOptionString(scope, key, SB_NAME_MAX, word));
-  PetscCall(PetscFunctionListFind(list, word, &constructor));
-  if (constructor)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbListAdvise(list, word, sizeof(all), all));
+  for (PetscInt i = 0; i < n; i++)
+    if (!strcmp(names[i], word))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  SbAdviseSorted(word, n, names, sizeof(all), all);
   PetscCheck(word[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: one of %s", option, all);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s", option, word, all);
 }
@@ -187,6 +183,7 @@ static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormul
 static PetscErrorCode read_body(SbModel model, PetscInt i)
 {
   SbBody *body = &model->body[i];
+  const char *elements[SB_ELEMENT_TYPES], *laws[SB_MATERIAL_TYPES];
   char(*inclusions)[SB_NAME_MAX], law[SB_NAME_MAX];
   PetscInt n;
   SbScope scope;
@@ -208,8 +205,8 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
              "angle in degrees",
              body->name);
   PetscCall(SbOptionReals(&scope, "translate", body->translate));
-  PetscCall(read_type(&scope, "element", SbElementList, body->element));
-  PetscCall(read_type(&scope, "material", SbMaterialList, body->material));
+  PetscCall(read_type(&scope, "element", SbElementTypes(elements), elements, body->element));
+  PetscCall(read_type(&scope, "material", SbMaterialTypes(laws), laws, body->material));
   PetscCall(SbElementCreate(body->element, &scope, &model->element[i]));
   PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
   body->density = model->material[i]->density;
@@ -239,7 +236,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
     PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
   for (PetscInt k = 0; k < n; k++) {
     SbScopeSet(&scope, "inclusion", "", inclusions[k]);
-    PetscCall(read_type(&scope, "material", SbMaterialList, law));
+    PetscCall(read_type(&scope, "material", SbMaterialTypes(laws), laws, law));
     PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
     body->inclusion[body->ninclusion++].material = model->nmaterial++;
   }

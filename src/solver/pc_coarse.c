@@ -195,7 +195,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     if (p->coarse->N)
       PetscCall(SbCoarseCreateSolver(p->coarse, (PetscBool)!spread));
     for (PetscInt r = 0; r < s->nregion; r++)
-      nu = PetscMax(nu, s->region[r].material->nu);
+      nu = PetscMax(nu, SbMaterialPoisson(s->region[r].material));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
     p->simple = (PetscBool)(nu > NU_ICC);
     PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_in));

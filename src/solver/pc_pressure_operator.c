@@ -2,9 +2,9 @@
   The tangent with a separate volumetric part: K = A + B^T C^-1 B.
 
   Every law's tangent is A + sum over cells of lambda / V b b^T, b_a = V D grad psi_a
-  (SbMaterialOps.volumetric). A does not contain lambda and is stored; a row of B is the vector b of
-  a cell; C is diagonal, V / lambda of each cell. K x is computed from these, without cancellation
-  of terms with lambda.
+  (SbMaterialOps.dilatation_gradient). A does not contain lambda and is stored; a row of B is the
+  vector b of a cell; C is diagonal, V / lambda of each cell. K x is computed from these, without
+  cancellation of terms with lambda.
 
   In the vectors of the iteration the pressures p of the cells follow the displacements of the
   nodes. A cell's pressure belongs to the rank that owns the cell; B^T p updates those of the ghost

@@ -180,9 +180,9 @@ static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
     const PetscInt *per = s->region[r].element->nodes_per;
     const SbMaterial m = s->region[r].material;
 
-    most[0] = PetscMax(most[0], m->nu);
+    most[0] = PetscMax(most[0], SbMaterialPoisson(m));
     if (!per[0])
-      most[1] = PetscMax(most[1], m->nu);
+      most[1] = PetscMax(most[1], SbMaterialPoisson(m));
     if (per[3])
       most[2] = 1.;
     if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT)

@@ -283,7 +283,8 @@ static PetscErrorCode set_up_snes(SbRun run)
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial law = m->material[b];
 
-    force += (law->E + 0.01 * law->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
+    force += (SbMaterialYoungModulus(law) + 0.01 * SbMaterialVolumetricModulus(law)) *
+             PetscPowReal(m->body[b].volume, 2. / 3.);
   }
 
   /* PETSc's line searches need PETSc's Newton loop, and TSALPHA2 has its own stages */

@@ -866,7 +866,8 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
     n->run = run;
     n->least = 0.;
     for (PetscInt b = 0; b < m->nbody; b++)
-      n->least += 4. * PETSC_MACHINE_EPSILON * m->material[b]->E * m->body[b].volume;
+      n->least +=
+        4. * PETSC_MACHINE_EPSILON * SbMaterialYoungModulus(m->material[b]) * m->body[b].volume;
   }
   PetscCheck(
     ours || !m->npotential, m->comm, PETSC_ERR_USER_INPUT,

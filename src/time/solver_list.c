@@ -298,9 +298,9 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
 
   /* properties of the bodies that may cause ill-conditioning: "; nu is up to 0.4999" */
   for (PetscInt k = 0; k < m->nmaterial; k++) {
-    nu = PetscMax(nu, m->material[k]->nu);
-    soft = PetscMin(soft, m->material[k]->E);
-    stiff = PetscMax(stiff, m->material[k]->E);
+    nu = PetscMax(nu, SbMaterialPoisson(m->material[k]));
+    soft = PetscMin(soft, SbMaterialYoungModulus(m->material[k]));
+    stiff = PetscMax(stiff, SbMaterialYoungModulus(m->material[k]));
   }
   for (PetscInt b = 0; b < m->nbody; b++) {
     nsliver += m->body[b].nsliver;

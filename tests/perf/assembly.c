@@ -56,8 +56,8 @@ static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9]
   }
   SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.frame(m, (const SbPack *)F, R);
-  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->lambda, m->mu,
-                        (const SbPack *)R, K);
+  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], SbMaterialVolumetricModulus(m),
+                        SbMaterialShearModulus(m), (const SbPack *)R, K);
 }
 
 static PetscErrorCode bare_kernel(Bench *w)

@@ -62,7 +62,8 @@ static void bare_kernel(Case *c, const PetscReal u[])
       SbQuadraticAt(SbRuleQuadratic.L[q], (const SbPack *)U, at);
       SbCellGradient(g, (const SbPack *)at, 1., F);
       m->ops.frame(m, (const SbPack *)F, R);
-      SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbPack *)R, B[q]);
+      SbCellBlocksIsotropic(g, W, SbMaterialVolumetricModulus(m), SbMaterialShearModulus(m),
+                            (const SbPack *)R, B[q]);
     }
     SbQuadraticBlocks(&SbRuleQuadratic, (const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
   }

@@ -213,12 +213,15 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[4 * NVALUE])
 int main(int argc, char **argv)
 {
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
-  static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
+  const char *laws[SB_MATERIAL_TYPES];
+  PetscInt nlaw;
   PetscReal alone[4 * NVALUE], together[4 * NVALUE];
 
   SB_TEST_BEGIN(argc, argv);
+  PetscCall(SbRegisterAll());
+  nlaw = SbMaterialTypes(laws);
   for (int e = 0; e < 4; e++) {
-    for (int l = 0; l < 4; l++)
+    for (PetscInt l = 0; l < nlaw; l++)
       PetscCall(check_patch(elements[e], laws[l]));
     PetscCall(check_materials(elements[e]));
   }

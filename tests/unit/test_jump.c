@@ -124,8 +124,9 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
     }
   }
   return 0.5 * area / h *
-         (e->gamma1 * 2. * law->mu * square +
-          e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
+         (e->gamma1 * 2. * SbMaterialShearModulus(law) * square +
+          e->gamma0 * (2. * SbMaterialShearModulus(law) + SbMaterialVolumetricModulus(law)) *
+            SbDot3(mean, mean));
 }
 
 /* Energy of a constrained DG face: its mean against that of the rigid support. */
@@ -135,7 +136,8 @@ static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
   const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
   const PetscReal *corner[3];
   const PetscReal area = face_corners(s->mesh, i, corner);
-  const PetscReal k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
+  const PetscReal k = (2. * SbMaterialShearModulus(law) + SbMaterialVolumetricModulus(law)) * area /
+                      cell_volume(s->mesh, i / 4);
   PetscReal square = 0.;
 
   for (int c = 0; c < 3; c++)

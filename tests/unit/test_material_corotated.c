@@ -1,13 +1,12 @@
 // @ranks 1
-/* Co-rotated material: published homogeneous states, requirements of every material, the three
-   tangents, degenerate F. */
+/* Co-rotated material: published homogeneous states, the three tangents, degenerate F. */
 #include "material_checks.h"
 
 static void test_states(SbMaterial m)
 {
   const PetscReal values[5] = {0.1, 0.5, 0.8, 1.2, 2};
-  const PetscReal l = m->lambda;
-  const PetscReal mu = m->mu;
+  const PetscReal l = SbMaterialVolumetricModulus(m);
+  const PetscReal mu = SbMaterialShearModulus(m);
 
   for (int k = 0; k < 5; k++) {
     const PetscReal a = values[k];
@@ -32,7 +31,8 @@ static void test_states(SbMaterial m)
                             q};
 
     check_stress(m, F, P, "uniaxial stress");
-    SB_CHECK_NEAR(energy_of(m, F), (l / 2 + mu) * (a - 1) * (a - 1), 1e-12 * m->E, "energy");
+    SB_CHECK_NEAR(energy_of(m, F), (l / 2 + mu) * (a - 1) * (a - 1),
+                  1e-12 * SbMaterialYoungModulus(m), "energy");
     check_stress(m, G, S, "shear stress");
   }
 }
@@ -56,13 +56,13 @@ static PetscErrorCode test_warped(SbMaterial m)
     SbMatTransposeMul(R, H, B);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
-        S[3 * i + j] =
-          m->mu * (B[3 * i + j] + B[3 * j + i]) + (i == j ? m->lambda * (B[0] + B[4] + B[8]) : 0);
+        S[3 * i + j] = SbMaterialShearModulus(m) * (B[3 * i + j] + B[3 * j + i]) +
+                       (i == j ? SbMaterialVolumetricModulus(m) * (B[0] + B[4] + B[8]) : 0);
       }
     }
     SbMatMul(R, S, P);
     damping_of(m, F, H, dP);
-    SB_CHECK(difference(9, P, dP) < 1e-13 * (m->E + m->lambda), "damping stress is off by %g",
+    SB_CHECK(difference(9, P, dP) < 1e-13 * stress_scale(m), "damping stress is off by %g",
              difference(9, P, dP));
   }
   PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
@@ -91,8 +91,8 @@ static PetscErrorCode test_degenerate(SbMaterial m)
     stress_of(m, F[k], P);
     for (int i = 0; i < 9; i++)
       SB_CHECK(isfinite(P[i]), "stress of degenerate F %d is %g", k, P[i]);
-    SB_CHECK(energy_of(m, F[k]) > 0.1 * m->mu, "energy of degenerate F %d is %g", k,
-             energy_of(m, F[k]));
+    SB_CHECK(energy_of(m, F[k]) > 0.1 * SbMaterialShearModulus(m),
+             "energy of degenerate F %d is %g", k, energy_of(m, F[k]));
   }
   PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -114,9 +114,9 @@ int main(int argc, char **argv)
     SB_CHECK(m->tangent == SB_TANGENT_WARPED && m->ops.frame,
              "the warped tangent is not the default");
     test_states(m);
+    check_inversion(m, PETSC_TRUE);
     PetscCall(test_warped(m));
     PetscCall(test_degenerate(m));
-    PetscCall(check_law(m, PETSC_TRUE));
     PetscCall(SbMaterialDestroy(&m));
   }
   PetscCall(PetscRandomDestroy(&the_random));

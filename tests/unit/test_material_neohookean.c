@@ -1,7 +1,7 @@
 // @ranks 1
 /*
   Stable neo-Hookean: the energy as published, homogeneous states calculated by hand, the
-  small-strain limit, and the checks for every material.
+  small-strain limit.
 */
 #include "material_checks.h"
 
@@ -9,8 +9,8 @@
    3a/(4b). */
 static PetscReal printed_energy(SbMaterial m, const PetscReal F[9])
 {
-  const PetscReal a = 4 * m->mu / 3;
-  const PetscReal b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * SbMaterialShearModulus(m) / 3;
+  const PetscReal b = SbMaterialVolumetricModulus(m) + 5 * SbMaterialShearModulus(m) / 6;
   const PetscReal alpha = 1 + 3 * a / (4 * b);
   const PetscReal I1 = SbDot9(F, F);
   const PetscReal J = SbMatDet(F);
@@ -22,8 +22,8 @@ static PetscReal printed_energy(SbMaterial m, const PetscReal F[9])
 static void test_states(SbMaterial m)
 {
   const PetscReal values[5] = {-0.4, 0.5, 0.8, 1.2, 2};
-  const PetscReal mu = m->mu;
-  const PetscReal b = m->lambda + 5 * mu / 6;
+  const PetscReal mu = SbMaterialShearModulus(m);
+  const PetscReal b = SbMaterialVolumetricModulus(m) + 5 * mu / 6;
 
   for (int k = 0; k < 5; k++) {
     const PetscReal s = values[k];
@@ -40,7 +40,7 @@ static void test_states(SbMaterial m)
     check_stress(m, F, P, "uniaxial stress");
     check_stress(m, G, S, "shear stress");
     random_deformation(0.8, D);
-    SB_CHECK_NEAR(energy_of(m, D), printed_energy(m, D), 1e-12 * (m->E + m->lambda),
+    SB_CHECK_NEAR(energy_of(m, D), printed_energy(m, D), 1e-12 * stress_scale(m),
                   "energy as printed");
   }
 }
@@ -56,11 +56,12 @@ static void test_small_strains(SbMaterial m)
   for (int n = 3; n < 25; n++) {
     const PetscReal t = ldexp(1, -n);
     const PetscReal tr = H[0] + H[4] + H[8];
-    PetscReal hooke = m->lambda / 2 * tr * tr;
+    PetscReal hooke = SbMaterialVolumetricModulus(m) / 2 * tr * tr;
 
     for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++)
-        hooke += m->mu / 4 * (H[3 * i + j] + H[3 * j + i]) * (H[3 * i + j] + H[3 * j + i]);
+        hooke += SbMaterialShearModulus(m) / 4 * (H[3 * i + j] + H[3 * j + i]) *
+                 (H[3 * i + j] + H[3 * j + i]);
     for (int k = 0; k < 9; k++)
       F[k] = (k % 4 == 0) + t * H[k];
     const PetscReal error = fabs(energy_of(m, F) / (t * t * hooke) - 1);
@@ -89,8 +90,8 @@ int main(int argc, char **argv)
                                                : 0,
                                       1000, &m));
     test_states(m);
+    check_inversion(m, PETSC_TRUE);
     test_small_strains(m);
-    PetscCall(check_law(m, PETSC_TRUE));
     SB_CHECK_ERROR(SbMaterialSetTangent(m, SB_TANGENT_WARPED), PETSC_ERR_USER, "neohookean");
     PetscCall(SbMaterialDestroy(&m));
   }

@@ -1,13 +1,12 @@
 // @ranks 1
-/* St. Venant-Kirchhoff: published homogeneous states and requirements of every material. It does
-   not recover from an inversion. */
+/* St. Venant-Kirchhoff: published homogeneous states. */
 #include "material_checks.h"
 
 static void test_states(SbMaterial m)
 {
   const PetscReal values[5] = {0.1, 0.5, 0.8, 1.2, 2};
-  const PetscReal l = m->lambda;
-  const PetscReal mu = m->mu;
+  const PetscReal l = SbMaterialVolumetricModulus(m);
+  const PetscReal mu = SbMaterialShearModulus(m);
 
   for (int k = 0; k < 5; k++) {
     const PetscReal a = values[k];
@@ -23,8 +22,8 @@ static void test_states(SbMaterial m)
       q + mu * g * g, mu * g + (l / 2 + mu) * g * g * g, 0, mu * g, q + mu * g * g, 0, 0, 0, q};
 
     check_stress(m, F, P, "uniaxial stress");
-    SB_CHECK_NEAR(energy_of(m, F), (l / 2 + mu) * (a * a - 1) * (a * a - 1) / 4, 1e-12 * m->E,
-                  "energy");
+    SB_CHECK_NEAR(energy_of(m, F), (l / 2 + mu) * (a * a - 1) * (a * a - 1) / 4,
+                  1e-12 * SbMaterialYoungModulus(m), "energy");
     check_stress(m, G, S, "shear stress");
   }
 }
@@ -39,7 +38,6 @@ int main(int argc, char **argv)
   for (int k = 0; k < 3; k++) {
     PetscCall(SbMaterialCreateElastic("stvk", 5e3, k == 0 ? 0.3 : k == 1 ? 0.49 : 0, 1000, &m));
     test_states(m);
-    PetscCall(check_law(m, PETSC_FALSE));
     SB_CHECK_ERROR(SbMaterialSetTangent(m, SB_TANGENT_WARPED), PETSC_ERR_USER, "stvk");
     PetscCall(SbMaterialDestroy(&m));
   }

@@ -4,14 +4,12 @@
 #include "../scene.h"
 
 /* Linear elasticity with twice the stiffness of E and nu. */
-static void create_doubled(SbMaterial m)
+static PetscErrorCode options_doubled(SbMaterial m, const SbScope *scope)
 {
-  void (*create)(SbMaterial);
-
-  (void)PetscFunctionListFind(SbMaterialList, "linear", &create);
-  create(m);
-  m->mu *= 2.;
-  m->lambda *= 2.;
+  PetscFunctionBeginUser;
+  (void)scope;
+  SbMaterialSetLame(m, 2. * SbMaterialVolumetricModulus(m), 2. * SbMaterialShearModulus(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One tet fixed at its base: the apex moves along z with w^2 = (lambda + 2 mu) / (rho H^2 / 4), the
@@ -90,12 +88,17 @@ static PetscErrorCode check_body(const char *body)
 
 int main(int argc, char **argv)
 {
+  static SbMaterialType doubled;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_oscillator("linear", 1., 0., 0., "", 0.25));
   PetscCall(check_oscillator("linear", 1., 3., 0.02, "", 0.25));
 
   /* the stable step uses the stiffness of the material, not E and nu */
-  PetscCall(SbMaterialRegister("doubled", create_doubled, NULL));
+  doubled = *SbMaterialFind("linear");
+  doubled.name = "doubled";
+  doubled.ops.setfromoptions = options_doubled;
+  PetscCall(SbMaterialRegister(&doubled));
   PetscCall(check_oscillator("doubled", 2., 0., 0., "", 0.25));
 
   /* bound of the consistent mass: 1/5 of the lumped one, here 1/20 of the tet */

@@ -165,7 +165,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
               "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
               element, law));
   m = t.model->material[0];
-  eps = ratio * m->mu / (3. * SbMaterialBulkModulus(m));
+  eps = ratio * SbMaterialShearModulus(m) / (3. * SbMaterialBulkModulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++)
     u[i] = -eps * t.model->space->node_x[i];

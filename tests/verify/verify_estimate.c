@@ -79,7 +79,7 @@ static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9]
   for (int k = 0; k < 9; k++)
     square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
   *trace = s[0] + s[4] + s[8];
-  return (square - *trace * *trace / 3.) / (4. * m->mu);
+  return (square - *trace * *trace / 3.) / (4. * SbMaterialShearModulus(m));
 }
 
 /* Stresses of a solved run, linear in each cell; for P2 the deviator is linear and the pressure is
@@ -308,7 +308,7 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
     SbCross(p, q, N);
     for (int k = 0; k < 3; k++)
       jump += PetscSqr(SbDot3(s.P[c][0] + 3 * k, N) - SbDot3(s.P[other][0] + 3 * k, N));
-    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / law->mu;
+    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / SbMaterialShearModulus(law);
   }
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(stress_free(&s));

@@ -32,7 +32,7 @@ static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *er
 {
   SbSpace s = t->model->space;
   const SbMaterial m = t->model->material[0];
-  const PetscReal modulus = 2. * (m->mu + m->lambda);
+  const PetscReal modulus = 2. * (SbMaterialShearModulus(m) + SbMaterialVolumetricModulus(m));
   const PetscReal *u;
   PetscReal *sigma;
 
