@@ -98,6 +98,27 @@ typedef const char *SbErrorText;
   #define SB_TS_DT_RENAMED 1
 #endif
 
+/* The partition operation of a PetscPartitioner, as SB_PARTITION_SIGNATURE(f) { ... } with these
+   names of its arguments, and its call; graphs have no weights here. */
+#if PETSC_VERSION_LT(3, 19, 0)
+  #define SB_PARTITION_SIGNATURE(f)                                                   \
+    PetscErrorCode f(PetscPartitioner partitioner, PetscInt nparts, PetscInt n,       \
+                     PETSC_UNUSED PetscInt start[], PETSC_UNUSED PetscInt adjacent[], \
+                     PETSC_UNUSED PetscSection vertex_weights,                        \
+                     PETSC_UNUSED PetscSection part_weights, PetscSection section, IS *points)
+  #define SbPartitionerPartition(part, nparts, n, start, adjacent, section, points) \
+    PetscPartitionerPartition(part, nparts, n, start, adjacent, NULL, NULL, section, points)
+#else
+  #define SB_PARTITION_SIGNATURE(f)                                                   \
+    PetscErrorCode f(PetscPartitioner partitioner, PetscInt nparts, PetscInt n,       \
+                     PETSC_UNUSED PetscInt start[], PETSC_UNUSED PetscInt adjacent[], \
+                     PETSC_UNUSED PetscSection vertex_weights,                        \
+                     PETSC_UNUSED PetscSection edge_weights,                          \
+                     PETSC_UNUSED PetscSection part_weights, PetscSection section, IS *points)
+  #define SbPartitionerPartition(part, nparts, n, start, adjacent, section, points) \
+    PetscPartitionerPartition(part, nparts, n, start, adjacent, NULL, NULL, NULL, section, points)
+#endif
+
 /* PetscHasExternalPackage(), also where CHOLMOD and UMFPACK are only known as SuiteSparse as a
    whole. */
 static inline PetscErrorCode SbHasPackage(const char name[], PetscBool *has)

@@ -44,6 +44,7 @@ struct _p_SbSpace {
   MPI_Comm comm;
   PetscMPIInt rank, size; /* in comm */
   SbMesh mesh;            /* borrowed */
+  DM dm; /* that of the mesh with the section of the nodes, three unknowns "displacement" each */
   PetscInt Nnode, nnode_owned, nnode;
   PetscInt gnode_start;
   PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */

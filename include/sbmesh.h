@@ -3,6 +3,7 @@
   with the help of METIS, and held as plain arrays with one layer of overlap.
 */
 #pragma once
+#include <petscdm.h>
 #include "sbbase.h"
 
 #define SB_SET_MAX 63 /* named sets that one scenario may use: one bit each, bit 0 is taken */
@@ -137,6 +138,10 @@ typedef struct {
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
   MPI_Comm comm;
+  /* DMPLEX: point c is cell c, ncell + v vertex v, behind them faces and edges if an element has
+     nodes there; with overlap, point star forest, rest coordinates and labels (src/mesh/plex.c) */
+  DM dm;
+  PetscInt *face_point, *edge_point; /* [ncell][4], [ncell][6]; NULL without faces and edges */
   PetscSF cell_sf,
     vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
   PetscInt nbody;
@@ -175,19 +180,16 @@ struct _p_SbMesh {
 
   Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both
   must outlive the mesh).
-  Options read: -mesh_partitioner, -mesh_report (one line of checks and quality per body on rank 0).
-  Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names body, file, line or cell,
-  and what to do. Fatal: unreadable or truncated file, no tets, other volume cells, 2D mesh, NaN or
-  infinite coordinate, degenerate tet, duplicate tet, face shared by three tets, set that selects
-  nothing. Repaired and reported: unused vertices, negative orientation. Reported: several connected
-  parts, non-manifold surface edges.
+  Options read: -petscpartitioner_type, -mesh_reading, -mesh_report (one line of checks and quality
+  per body on rank 0). Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names
+  body, file, line or cell, and what to do. Fatal: unreadable or truncated file, no tets, other
+  volume cells, 2D mesh, NaN or infinite coordinate, degenerate tet, duplicate tet, face shared by
+  three tets, set that selects nothing. Repaired and reported: unused vertices, negative
+  orientation. Reported: several connected parts, non-manifold surface edges.
 */
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset,
                             SbSet set[], SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
-/* Edges of the local cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03
-   12 13 23; PetscFree(). Not collective. */
-PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
 /* Star forest of the leaves 0, 1, ... n - 1 with the roots root[n], of which this rank has the next
    nroot. Collective; the caller destroys it. */
 PetscErrorCode SbForestCreate(MPI_Comm comm, PetscInt nroot, PetscInt n, const PetscInt root[],

@@ -1,27 +1,30 @@
 /*
-  The nodes of a space, their owners, and the four nodes of each cell.
+  The nodes of a space, their owners, and the nodes of each cell: a PetscSection on the mesh's
+  DMPLEX.
 
   P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices, and its
-  arrays are borrowed. P2 also has nodes at the edges; one of the cells around an edge decides the
-  owner, and all ranks with a cell there make the same choice. CR has one node per face, DG four per
-  cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
-  and, of the CR faces between it and another rank, about every second one.
+  arrays are borrowed. P2 also has nodes at the edges. CR has one node per face, DG four per cell,
+  on its faces; node a of a cell lies opposite vertex a.
 
   A boundary face of a DG cell that an effect prescribes in all directions has an additional node,
   the support node, which the effect prescribes. It acts as a rigid neighbour: the mean of the two
   sides is the support's displacement, and the face terms (jump.c) connect the cell to it. The
-  cell's force on it is the reaction.
+  cell's force on it is the reaction. It is at the face, behind the face's own node, if any.
 
-  Owned nodes are numbered in the order of the cells. Each rank numbers its own nodes; two
-  broadcasts over the cells distribute the numbers: the first gives a cell the numbers owned by the
-  rank of its neighbour, the second sends complete cells to the ghosts, including faces whose other
-  side is not on this rank.
+  The section has three unknowns per node, at the points of the plex: vertices, edges, faces, cells.
+  Its points are in the order in which the cells meet them, which keeps the nodes of a cell close
+  to each other; the point star forest says whose they are. Owned nodes follow from the global
+  section; copies get local numbers behind them, by global number.
 */
+#include <petscdmplex.h>
 #include "fem_impl.h"
 #include "sbtet.h"
 
 #define UNKNOWN (-1)
-#define OWN (-2) /* this rank numbers it */
+/* Where the node of a slot of a cell is: its point, and its number among the nodes of the point. */
+typedef struct {
+  PetscInt point, nth;
+} Place;
 
 /* The face of cell `other` that it shares with `cell`. */
 static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
@@ -50,43 +53,72 @@ static PetscInt *table_entry(SbSpace s, PetscInt cell, PetscInt slot)
   return s->dirichlet_node ? &s->dirichlet_node[4 * cell + slot / 2] : NULL;
 }
 
-/* What has the node of each slot: vertex, face, support or edge, counted through; UNKNOWN: there is
-   none. A support is that of a face in one of the `prescribed` sets. */
-static PetscErrorCode find_items(SbSpace s, uint64_t prescribed, PetscInt item[], PetscInt *nitem)
+/* The place of a slot, point UNKNOWN if the cell has no such node. A support is that of a face in
+   one of the `prescribed` sets. */
+static Place place_of(SbSpace s, uint64_t prescribed, PetscInt c, PetscInt slot)
 {
   const SbMesh mesh = s->mesh;
-  const PetscInt nface = 4 * mesh->ncell;
-  const PetscInt slots = slots_per_cell(s);
-  PetscInt nedge = 0;
-  PetscInt *edge = NULL;
+  const SbElement e = SbSpaceCellElement(s, c);
+  const PetscInt face = 4 * c + slot / 2;
+  const Place none = {UNKNOWN, 0};
 
-  PetscFunctionBeginUser;
-  if (s->edge_node)
-    PetscCall(SbMeshEdges(mesh, &nedge, &edge));
-  for (PetscInt i = 0; i < slots * mesh->ncell; i++) {
-    const PetscInt c = i / slots;
-    const PetscInt slot = i % slots;
-    const PetscInt face = 4 * c + slot / 2;
-    const SbElement e = SbSpaceCellElement(s, c);
+  // edges
+  if (slot >= 8)
+    return e->nodes_per[1] ? (Place){mesh->edge_point[6 * c + slot - 8], 0} : none;
 
-    item[i] = UNKNOWN;
-    if (slot >= 8) {
-      if (e->nodes_per[1])
-        item[i] = mesh->nvert + 2 * nface + edge[6 * c + slot - 8];
-    } else if (slot % 2) {
-      if (e->weak && (mesh->face_set[face] & SB_ON_BOUNDARY) && (mesh->face_set[face] & prescribed))
-        item[i] = mesh->nvert + nface + face;
-    } else if (e->nodes_per[0]) {
-      item[i] = mesh->cell[face];
-    } else {
-      const PetscInt other = e->nodes_per[2] ? s->neighbour[face] : -1;
+  // supports
+  if (slot % 2) {
+    const PetscBool supported = (PetscBool)(e->weak && (mesh->face_set[face] & SB_ON_BOUNDARY) &&
+                                            (mesh->face_set[face] & prescribed));
 
-      item[i] =
-        mesh->nvert + (other >= 0 && other < c ? 4 * other + face_towards(s, other, c) : face);
-    }
+    return supported ? (Place){mesh->face_point[face], e->nodes_per[2] ? 1 : 0} : none;
   }
-  *nitem = mesh->nvert + 2 * nface + nedge;
-  PetscCall(PetscFree(edge));
+
+  // vertices, faces, cells
+  if (e->nodes_per[0])
+    return (Place){mesh->ncell + mesh->cell[face], 0};
+  if (e->nodes_per[2])
+    return (Place){mesh->face_point[face], 0};
+  return (Place){c, slot / 2};
+}
+
+/* A section with three unknowns, "displacement", per node: count[pEnd - pStart]. perm: NULL, or the
+   points in the order of their unknowns; taken over. */
+static PetscErrorCode create_section(MPI_Comm comm, PetscInt pStart, PetscInt pEnd,
+                                     const PetscInt count[], PetscInt perm[], PetscSection *section)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscSectionCreate(comm, section));
+  PetscCall(PetscSectionSetNumFields(*section, 1));
+  PetscCall(PetscSectionSetFieldName(*section, 0, "displacement"));
+  PetscCall(PetscSectionSetFieldComponents(*section, 0, 3));
+  PetscCall(PetscSectionSetChart(*section, pStart, pEnd));
+  for (PetscInt p = pStart; p < pEnd; p++) {
+    const PetscInt n = 3 * (count ? count[p - pStart] : 1);
+
+    if (!n)
+      continue;
+    PetscCall(PetscSectionSetDof(*section, p, n));
+    PetscCall(PetscSectionSetFieldDof(*section, p, 0, n));
+  }
+  if (perm) {
+    IS order;
+
+    PetscCall(ISCreateGeneral(PETSC_COMM_SELF, pEnd - pStart, perm, PETSC_OWN_POINTER, &order));
+    PetscCall(PetscSectionSetPermutation(*section, order));
+    PetscCall(ISDestroy(&order));
+  }
+  PetscCall(PetscSectionSetUp(*section));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM of the space: that of the mesh with a section. Takes the section over. */
+static PetscErrorCode create_dm(SbSpace s, PetscSection section)
+{
+  PetscFunctionBeginUser;
+  PetscCall(DMClone(s->mesh->dm, &s->dm));
+  PetscCall(DMSetLocalSection(s->dm, section));
+  PetscCall(PetscSectionDestroy(&section));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,68 +128,53 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
   const SbMesh mesh = s->mesh;
   const PetscInt slots = slots_per_cell(s);
   const PetscInt nslot = slots * mesh->ncell;
-  const PetscInt nslot_owned = slots * mesh->ncell_owned;
-  PetscInt *item, *number, *first, *last, *at, *ghost;
-  PetscInt nitem = 0;
+  PetscInt *count, *perm, *number, *ghost;
+  PetscInt npoint;
+  PetscInt nmet = 0;
   PetscInt nghost = 0;
+  PetscInt size;
+  PetscSection section, global;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(nslot, &item, nslot, &number));
-  PetscCall(find_items(s, prescribed, item, &nitem));
-  PetscCall(PetscMalloc3(nitem, &first, nitem, &last, nitem, &at));
-  for (PetscInt e = 0; e < nitem; e++) {
-    first[e] = PETSC_MAX_INT;
-    last[e] = -1;
-    at[e] = e < mesh->nvert_owned ? OWN : UNKNOWN;
-  }
 
-  /* of faces and edges every second one belongs to the rank of its lowest cell, others to that of
-     the highest: all ranks agree */
+  // points in the order of the cells, with the number of their nodes; then those without nodes
+  PetscCall(DMPlexGetChart(mesh->dm, NULL, &npoint));
+  PetscCall(PetscCalloc1(npoint, &count));
+  PetscCall(PetscMalloc1(npoint, &perm));
   for (PetscInt i = 0; i < nslot; i++) {
-    if (item[i] < mesh->nvert)
+    const Place at = place_of(s, prescribed, i / slots, i % slots);
+
+    if (at.point == UNKNOWN)
       continue;
-    first[item[i]] = PetscMin(first[item[i]], mesh->cell_orig[i / slots]);
-    last[item[i]] = PetscMax(last[item[i]], mesh->cell_orig[i / slots]);
+    if (!count[at.point])
+      perm[nmet++] = at.point;
+    count[at.point] = PetscMax(count[at.point], at.nth + 1);
   }
-  for (PetscInt i = 0; i < nslot_owned; i++) {
-    const PetscInt e = item[i];
-    const PetscInt orig = mesh->cell_orig[i / slots];
-
-    if (e >= mesh->nvert && orig == ((first[e] + last[e]) % 2 ? first[e] : last[e]))
-      at[e] = OWN;
-  }
-
-  for (PetscInt i = 0; i < nslot_owned; i++)
-    if (item[i] != UNKNOWN && at[item[i]] == OWN)
-      at[item[i]] = s->nnode_owned++;
+  for (PetscInt p = 0; p < npoint; p++)
+    if (!count[p])
+      perm[nmet++] = p;
+  PetscCall(create_section(s->comm, 0, npoint, count, perm, &section));
+  PetscCall(PetscFree(count));
+  PetscCall(create_dm(s, section));
+  PetscCall(DMGetGlobalSection(s->dm, &global));
+  PetscCall(PetscSectionGetConstrainedStorageSize(global, &size));
+  s->nnode_owned = size / 3;
   PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
   s->gnode_start -= s->nnode_owned;
-  for (PetscInt e = 0; e < nitem; e++)
-    if (at[e] >= 0)
-      at[e] += s->gnode_start;
 
-  /* the first broadcast completes owned cells by numbers of other ranks, the second one the
-     ghosts */
-  for (int round = 0; round < 2; round++) {
-    for (PetscInt i = 0; i < nslot_owned; i++) {
-      number[i] = item[i] == UNKNOWN ? UNKNOWN : at[item[i]];
-      PetscCheck(!round || item[i] == UNKNOWN || number[i] != UNKNOWN, PETSC_COMM_SELF,
-                 PETSC_ERR_PLIB, "No rank has numbered node %d of cell %d", (int)(i % slots),
-                 (int)(i / slots));
-    }
-    PetscCall(SbForestBroadcast(mesh->cell_sf, slots, MPIU_INT, number, number));
-    for (PetscInt i = 0; i < nslot; i++)
-      if (number[i] != UNKNOWN)
-        at[item[i]] = number[i];
-  }
-
-  /* the ghosts; local numbers in the place of global ones */
-  ghost = item;
+  // global number of each slot; those of other ranks are the ghosts
+  PetscCall(PetscMalloc2(nslot, &number, nslot, &ghost));
   for (PetscInt i = 0; i < nslot; i++) {
-    const PetscInt own = number[i] - s->gnode_start;
+    const Place at = place_of(s, prescribed, i / slots, i % slots);
+    PetscInt offset;
 
-    if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned))
+    number[i] = UNKNOWN;
+    if (at.point == UNKNOWN)
+      continue;
+    PetscCall(PetscSectionGetOffset(global, at.point, &offset));
+    number[i] = (offset < 0 ? -(offset + 1) : offset) / 3 + at.nth;
+    if (offset < 0)
       ghost[nghost++] = number[i];
   }
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
@@ -166,6 +183,8 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
+
+  // local numbers into the tables of the cells
   for (PetscInt i = 0; i < nslot; i++) {
     PetscInt *node = table_entry(s, i / slots, i % slots);
     PetscInt own = number[i] - s->gnode_start;
@@ -180,8 +199,27 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
     }
     *node = own;
   }
-  PetscCall(PetscFree2(item, number));
-  PetscCall(PetscFree3(first, last, at));
+  PetscCall(PetscFree2(number, ghost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cell across each face, -1: none here, from the supports of the faces. */
+static PetscErrorCode find_neighbours(SbSpace s)
+{
+  const SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell + 1, &s->neighbour));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt *cell;
+    PetscInt n;
+
+    PetscCall(DMPlexGetSupportSize(mesh->dm, mesh->face_point[i], &n));
+    PetscCall(DMPlexGetSupport(mesh->dm, mesh->face_point[i], &cell));
+    s->neighbour[i] = -1;
+    if (n == 2)
+      s->neighbour[i] = cell[cell[0] == i / 4 ? 1 : 0];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -304,6 +342,7 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
 {
   const SbMesh mesh = s->mesh;
   PetscBool quadratic = PETSC_FALSE;
+  PetscSection section;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < mesh->nbody; b++) {
@@ -324,25 +363,24 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     s->node_body = mesh->vert_body;
     s->node_set = mesh->vert_set;
     s->node_orig = mesh->vert_orig;
+    PetscCall(
+      create_section(s->comm, mesh->ncell, mesh->ncell + mesh->nvert, NULL, NULL, &section));
+    PetscCall(create_dm(s, section));
   } else {
     uint64_t prescribed = 0; /* sets that an effect prescribes; none if no body has support nodes */
 
     for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++)
       if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
         prescribed |= SB_SET_BIT(k / mesh->nbody);
-    if (s->faces) {
-      SbFaces faces;
+    if (s->faces)
+      PetscCall(find_neighbours(s));
 
-      PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
-      s->neighbour = faces.neighbour;
-      faces.neighbour = NULL;
-      PetscCall(SbFacesDestroy(&faces));
-    }
-    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
+    // one entry more: a table without entries, on a rank without cells, is not a missing one
+    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell + 1, &s->cell_node));
     if (quadratic)
-      PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
+      PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell + 1, &s->edge_node));
     if (prescribed)
-      PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
+      PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell + 1, &s->dirichlet_node));
     PetscCall(number_nodes(s, prescribed));
     PetscCall(describe_nodes(s));
   }
@@ -353,6 +391,7 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
 PetscErrorCode SbLayoutDestroy(SbSpace s)
 {
   PetscFunctionBeginUser;
+  PetscCall(DMDestroy(&s->dm));
   if (!s->vertices) {
     PetscCall(PetscFree(s->gnode));
     PetscCall(PetscFree(s->cell_node));

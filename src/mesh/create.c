@@ -1,14 +1,15 @@
 /* create.c - the mesh of a scenario, from the mesh files to the numbered local meshes of all
    ranks. */
+#include <petscdmplex.h>
 #include "mesh_impl.h"
 #include "sbsurface.h"
 #include "sblog.h"
 
 const SbOption SbMeshRows[] = {
-  {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
-   "how the mesh is partitioned: METIS (small interfaces between ranks; computed on rank 0), "
-   "recursive "
-   "bisection (in parallel), auto: METIS up to 50,000 tets"},
+  {"petscpartitioner_type", SB_OPTION_STRING, 1, "", "", "",
+   "how the mesh is cut into parts, one for each rank: metis (small interfaces; computed on rank "
+   "0), bisection (recursive coordinate bisection, in parallel), or a type of PETSc: ptscotch, "
+   "parmetis, simple, ...; empty: metis up to 50,000 tets, else bisection"},
   {"mesh_reading", SB_OPTION_CHOICE, 1, "", "auto", "auto|rank0|slabs",
    "how several ranks read an .h5 mesh of supple-mesh: rank0, rank 0 reads it whole; slabs, every "
    "rank reads "
@@ -27,16 +28,16 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbMergedMesh merged;
   SbLocalMesh local;
   SbReading reading;
-  int partitioner;
+  PetscPartitioner partitioner;
   PetscBool full;
   PetscBool all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
-  PetscCall(SbOptionChoice(&SbRunScope, "mesh_partitioner", &partitioner));
   PetscCall(SbOptionChoice(&SbRunScope, "mesh_reading", &reading));
   PetscCall(SbOptionBool(&SbRunScope, "mesh_report", &full));
+  PetscCall(SbPartitionerPrepare(comm));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
@@ -67,11 +68,16 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++)
     all = (PetscBool)(all || body[b].other_nodes);
-  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
+  PetscCall(PetscPartitionerCreate(comm, &partitioner));
+  PetscCall(SbDistribute(partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
+  PetscCall(SbPlexCreate(m, all));
+  PetscCall(DMPlexSetPartitioner(m->dm, partitioner));
+  PetscCall(PetscPartitionerDestroy(&partitioner));
   PetscCall(SbMeshCurve(m, merged.ncurved, merged.curved, merged.edge_off));
   PetscCall(SbMergedMeshDestroy(&merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
+  PetscCall(DMViewFromOptions(m->dm, NULL, "-dm_view"));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,6 +89,9 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscFunctionBeginUser;
   if (!m)
     PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMDestroy(&m->dm));
+  PetscCall(PetscFree(m->face_point));
+  PetscCall(PetscFree(m->edge_point));
   PetscCall(PetscSFDestroy(&m->cell_sf));
   PetscCall(PetscSFDestroy(&m->vert_sf));
   PetscCall(PetscFree5(m->gvert, m->vert_orig, m->vert_body, m->vert_set, m->x));

@@ -167,7 +167,7 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
     PetscFunctionReturn(PETSC_SUCCESS);
 
   // from the ranks that read them to all that have the cells, ghosts included
-  PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
+  PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell + 1, &mesh->edge_off));
   PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     if (!(mesh->cell_set[c] & SB_CURVED))

@@ -217,9 +217,10 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
+PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMergedMesh *w,
                             SbLocalMesh *local)
 {
+  const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
   PetscInt *orig, *number, *order, *position;
@@ -238,7 +239,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
 
   // partition the mesh, and take over its arrays, on one rank without a copy
   PetscCall(PetscMalloc1(w->ncell, &dest));
-  PetscCall(SbPartition(comm, type, w, dest));
+  PetscCall(SbPartition(partitioner, w, dest));
   PetscCall(PetscFree2(w->neighbour, w->remote));
   w->cell = NULL;
   w->data = NULL;

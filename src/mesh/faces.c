@@ -116,25 +116,26 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 
 /* Counting sort: each edge is in the bucket of its lower vertex, where equal higher vertices are
    one edge. */
-PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
+PetscErrorCode SbTetEdges(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt *nedge,
+                          PetscInt **edge)
 {
-  const PetscInt n = 6 * mesh->ncell;
+  const PetscInt n = 6 * ncell;
   PetscInt *low, *high, *start, *item;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(n, &low, n, &high));
   PetscCall(PetscMalloc1(n, edge));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *v = mesh->cell + 4 * (i / 6);
+    const PetscInt *v = cell + 4 * (i / 6);
     const PetscInt a = v[SbTetEdge[i % 6][0]];
     const PetscInt b = v[SbTetEdge[i % 6][1]];
 
     low[i] = PetscMin(a, b);
     high[i] = PetscMax(a, b);
   }
-  PetscCall(SbBucketByKey(n, low, mesh->nvert, &start, &item));
+  PetscCall(SbBucketByKey(n, low, nvert, &start, &item));
   *nedge = 0;
-  for (PetscInt v = 0; v < mesh->nvert; v++) {
+  for (PetscInt v = 0; v < nvert; v++) {
     for (PetscInt i = start[v]; i < start[v + 1]; i++) {
       PetscInt j = start[v];
 

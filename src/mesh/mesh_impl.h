@@ -4,6 +4,7 @@
   distribute.c sends the cells to their owners.
 */
 #pragma once
+#include <petscpartitioner.h>
 #include <petscsf.h>
 #include "sbtet.h"
 
@@ -170,13 +171,14 @@ PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbB
                              SbPart *part);
 PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
 
-typedef enum {
-  SB_PARTITION_AUTO, /* METIS for small meshes, recursive bisection for others */
-  SB_PARTITION_METIS,
-  SB_PARTITION_BISECTION
-} SbPartitioner;
-/* Owner rank of each cell: part[ncell]. Collective. */
-PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged,
+/* Our types of PetscPartitioner. Prepare: registers them and checks -petscpartitioner_type; error:
+   a type that there is not. Collective. */
+#define SB_PARTITIONER_METIS "metis"
+#define SB_PARTITIONER_BISECTION "bisection"
+PetscErrorCode SbPartitionerPrepare(MPI_Comm comm);
+/* Owner rank of each cell: part[ncell]; the type: that of the option, or metis for small meshes,
+   else bisection. Collective. */
+PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *merged,
                            PetscMPIInt part[]);
 
 /* Mesh before renumbering: owned cells, then ghosts; their vertices, then others; by original
@@ -192,10 +194,12 @@ typedef struct {
 PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *local);
 /* Distributes the merged mesh, of which only the curved cells remain. `all`: ghosts are all cells
    that share a vertex with an owned cell, else those with an owned vertex. Collective. */
-PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
+PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMergedMesh *merged,
                             SbLocalMesh *local);
 /* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
+/* plex.c: the DMPLEX of the numbered mesh; sides: with faces and edges. Collective. */
+PetscErrorCode SbPlexCreate(SbMesh mesh, PetscBool sides);
 /* Reverse Cuthill-McKee order: order[i] is the vertex with new number i. Cell vertices of -1 are
    ignored. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);

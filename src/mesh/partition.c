@@ -1,22 +1,30 @@
 /*
-  partition.c - mesh partitioning: the owner rank of each tet.
+  partition.c - the owner rank of each tet, by a PetscPartitioner (-petscpartitioner_type): PETSc's
+  types, and two of our own.
 
-  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is
-  on one rank while the others wait. Recursive coordinate bisection runs in parallel: it halves the
-  set of tet centres at the median along the longest axis of their bounding box, recursively.
-  Medians are those of a sample that all ranks have, selected by a hash of the original numbers,
-  hence independent of the number of ranks. Then each tet at an interface moves to the part of most
-  of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as many
-  faces as METIS, in a tenth of the time.
+  The dual graph of the tets, which PETSc would take minutes to find, is given to it: faces are
+  matched already. Rank r holds the r-th block of original numbers, wherever the tets were read, so
+  that the parts do not depend on that.
+
+  metis: METIS on the graph of all tets, on rank 0; PETSc is not always built with ParMETIS. Few
+  faces are cut, but the whole graph is on one rank while the others wait.
+
+  bisection: recursive coordinate bisection in parallel. It halves the set of tet centres at the
+  median along the longest axis of their bounding box, recursively. Medians are those of a sample
+  that all ranks have, selected by a hash of the original numbers, hence independent of the number
+  of ranks. Then each tet at an interface moves to the part of most of its neighbours. It cuts 1.0
+  (bars) to 1.8 times (1,240,000 tets of a bunny) as many faces as METIS, in a tenth of the time.
 
   References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning
   irregular graphs", 1998; Berger and Bokhari, "A partitioning strategy for nonuniform problems on
   multiprocessors", 1987.
 */
 #include <metis.h>
+#include <petscpartitioner.h>
+#include <petsc/private/partitionerimpl.h> /* a type of one's own has no public interface */
 #include "mesh_impl.h"
 
-#define MOST 50000    /* largest mesh for METIS by default, tets: it takes 0.05 s */
+#define METIS_MOST 50000 /* largest mesh for METIS by default, tets: it takes 0.05 s */
 #define SAMPLE 1024   /* sampled tets per part, at least: part sizes are within 3 % of the mean */
 #define SAMPLES 65536 /* sampled tets of all parts together, at least */
 #define SWEEPS 4      /* number of sweeps that improve the interfaces */
@@ -94,151 +102,364 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the graph on rank 0, by original numbers: the result is alike for any distribution of
-   cells. */
-static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf,
-                                PetscMPIInt part[])
+/* What a PetscPartitioner returns, from the part of each of n graph vertices. */
+static PetscErrorCode return_parts(PetscInt n, const PetscMPIInt part[], PetscInt nparts,
+                                   PetscSection section, IS *points)
 {
-  PetscInt *orig, *remote, *across, *all, N;
-  idx_t *start, *adj, *result;
-  PetscMPIInt rank, size, *owner;
-  PetscSF forest;
+  PetscInt *key, *start, *item;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  N = rank ? 0 : w->Ncell;
-  PetscCall(PetscMalloc3(w->ncell, &orig, w->nremote, &remote, 4 * (size_t)w->ncell, &across));
-  PetscCall(
-    PetscMalloc5(4 * (size_t)N, &all, 4 * (size_t)N, &adj, N + 1, &start, N, &result, N, &owner));
-  for (PetscInt c = 0; c < w->ncell; c++)
-    orig[c] = w->data[c].orig;
-  PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, orig, remote));
-  for (PetscInt s = 0; s < 4 * w->ncell; s++) {
-    const PetscInt n = w->neighbour[s];
-
-    across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
-  }
-  PetscCall(SbForestCreate(comm, N, w->ncell, orig, &forest));
-  PetscCall(SbForestReduce(forest, 4, MPIU_INT, across, all));
-  if (!rank) {
-    idx_t n = (idx_t)N;
-    idx_t ncon = 1;
-    idx_t np = (idx_t)size;
-    idx_t cut, options[METIS_NOPTIONS];
-    idx_t k = 0;
-    int status;
-
-    // graph in compressed row form, partitioned by METIS
-    for (PetscInt s = 0; s < 4 * N; s++) {
-      if (s % 4 == 0)
-        start[s / 4] = k;
-      if (all[s] >= 0)
-        adj[k++] = (idx_t)all[s];
-    }
-    start[n] = k;
-    METIS_SetDefaultOptions(options);
-    options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
-    status = METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options,
-                                 &cut, result);
-    PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB,
-               "METIS_PartGraphKway() failed with %d", status);
-    for (PetscInt c = 0; c < N; c++)
-      owner[c] = (PetscMPIInt)result[c];
-  }
-  PetscCall(SbForestBroadcast(forest, 1, MPI_INT, owner, part));
-  PetscCall(PetscSFDestroy(&forest));
-  PetscCall(PetscFree3(orig, remote, across));
-  PetscCall(PetscFree5(all, adj, start, result, owner));
+  PetscCall(PetscMalloc1(n, &key));
+  for (PetscInt i = 0; i < n; i++)
+    key[i] = part[i];
+  PetscCall(SbBucketByKey(n, key, nparts, &start, &item));
+  for (PetscInt p = 0; p < nparts; p++)
+    PetscCall(PetscSectionSetDof(section, p, start[p + 1] - start[p]));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, item, PETSC_OWN_POINTER, points));
+  PetscCall(PetscFree(key));
+  PetscCall(PetscFree(start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w,
-                           PetscMPIInt part[])
+/* Star forest from n items of each rank to all N of them on rank 0, in the order of the ranks. */
+static PetscErrorCode gather_forest(MPI_Comm comm, PetscInt n, PetscInt *N, PetscSF *forest)
 {
-  PetscMPIInt size;
+  PetscInt before;
+  PetscSFNode *root;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(&n, N, 1, MPIU_INT, MPI_SUM, comm));
+  PetscCall(PetscMalloc1(n, &root));
+  for (PetscInt i = 0; i < n; i++)
+    root[i] = (PetscSFNode){0, before - n + i};
+  PetscCall(PetscSFCreate(comm, forest));
+  PetscCall(
+    PetscSFSetGraph(*forest, rank ? 0 : *N, n, NULL, PETSC_COPY_VALUES, root, PETSC_OWN_POINTER));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Type metis. */
+static SB_PARTITION_SIGNATURE(partition_metis)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
+  PetscInt N, Nadjacent, *degree, *first, *next;
+  PetscMPIInt rank, *part, *owner;
+  PetscSF vertices, edges;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+
+  // the graph of all ranks on rank 0
+  PetscCall(gather_forest(comm, n, &N, &vertices));
+  PetscCall(gather_forest(comm, start[n], &Nadjacent, &edges));
+  if (rank)
+    N = Nadjacent = 0;
+  PetscCall(PetscMalloc2(n, &degree, n, &part));
+  PetscCall(PetscMalloc3(N + 1, &first, Nadjacent, &next, N, &owner));
+  for (PetscInt i = 0; i < n; i++)
+    degree[i] = start[i + 1] - start[i];
+  PetscCall(SbForestReduce(vertices, 1, MPIU_INT, degree, first + (rank ? 0 : 1)));
+  PetscCall(SbForestReduce(edges, 1, MPIU_INT, adjacent, next));
+  if (!rank) {
+    idx_t nvertex = (idx_t)N;
+    idx_t ncon = 1;
+    idx_t np = (idx_t)nparts;
+    idx_t cut, options[METIS_NOPTIONS];
+    idx_t *xadj, *adjncy, *result;
+    int status;
+
+    // in METIS' integers
+    PetscCall(PetscMalloc3(N + 1, &xadj, Nadjacent, &adjncy, N, &result));
+    xadj[0] = 0;
+    for (PetscInt i = 0; i < N; i++)
+      xadj[i + 1] = xadj[i] + (idx_t)first[i + 1];
+    for (PetscInt i = 0; i < Nadjacent; i++)
+      adjncy[i] = (idx_t)next[i];
+    METIS_SetDefaultOptions(options);
+    options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
+    status = METIS_PartGraphKway(&nvertex, &ncon, xadj, adjncy, NULL, NULL, NULL, &np, NULL, NULL,
+                                 options, &cut, result);
+    PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB,
+               "METIS_PartGraphKway() failed with %d", status);
+    for (PetscInt i = 0; i < N; i++)
+      owner[i] = (PetscMPIInt)result[i];
+    PetscCall(PetscFree3(xadj, adjncy, result));
+  }
+
+  // parts back to the ranks of the vertices
+  PetscCall(SbForestBroadcast(vertices, 1, MPI_INT, owner, part));
+  PetscCall(return_parts(n, part, nparts, section, points));
+  PetscCall(PetscSFDestroy(&vertices));
+  PetscCall(PetscSFDestroy(&edges));
+  PetscCall(PetscFree2(degree, part));
+  PetscCall(PetscFree3(first, next, owner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Type bisection: its data is the merged mesh, whose tets are the graph's vertices. */
+static SB_PARTITION_SIGNATURE(partition_bisection)
+{
+  const SbMergedMesh *w = (const SbMergedMesh *)partitioner->data;
+  const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
+  const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * nparts, SAMPLES);
+  PetscReal(*mine)[3], (*all)[3];
+  PetscInt nsample = 0;
+  PetscInt total;
+  uint64_t bound = UINT64_MAX;
+  PetscMPIInt *part, *now, *across;
   PetscSF sf;
   Tree tree = {.nnode = 1};
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCheck(w && w->ncell == n, PETSC_COMM_SELF, PETSC_ERR_SUP,
+             "The partitioner bisection cuts meshes of supple, by the places of their tets");
 
-  /* METIS requires at least two parts, and more cells than parts */
+  // bisection tree with a leaf for each part, from a sample of the tets
+  if (wanted < w->Ncell)
+    bound = UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
+  for (PetscInt c = 0; c < n; c++)
+    nsample += SbMix(w->data[c].orig) <= bound;
+  PetscCall(PetscMalloc1(nsample, &mine));
+  nsample = 0;
+  for (PetscInt c = 0; c < n; c++)
+    if (SbMix(w->data[c].orig) <= bound)
+      centre(w, c, mine[nsample++]);
+  PetscCall(SbAllgatherv(comm, MPIU_REAL, 3 * nsample, mine, &total, &all, NULL));
+  PetscCall(PetscFree(mine));
+  PetscCall(PetscMalloc1(2 * (size_t)nparts, &tree.node));
+  PetscCall(split(&tree, 0, total / 3, all, nparts));
+  PetscCall(PetscFree(all));
+
+  // leaf that contains each cell centre
+  PetscCall(PetscMalloc3(n, &part, n, &now, w->nremote, &across));
+  for (PetscInt c = 0; c < n; c++) {
+    const Node *node = tree.node;
+    PetscReal x[3];
+
+    centre(w, c, x);
+    while (node->axis >= 0)
+      node = tree.node + node->next + (x[node->axis] >= node->cut);
+    part[c] = (PetscMPIInt)node->next;
+  }
+  PetscCall(PetscFree(tree.node));
+
+  // move a cell to the part of most of its neighbours, if that cuts fewer faces
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(
+    PetscSFSetGraph(sf, n, w->nremote, NULL, PETSC_USE_POINTER, w->remote, PETSC_USE_POINTER));
+  for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    PetscCall(SbForestBroadcast(sf, 1, MPI_INT, part, across));
+    PetscCall(PetscArraycpy(now, part, n));
+    for (PetscInt c = 0; c < n; c++) {
+      PetscMPIInt other[4];
+      PetscInt nother = 0;
+      PetscInt own = 0;
+
+      for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
+        const PetscInt k = w->neighbour[s];
+
+        if (k < 0)
+          continue;
+        other[nother] = k < n ? now[k] : across[k - n];
+        own += other[nother++] == now[c];
+      }
+      for (PetscInt i = 0; i < nother && own < 2; i++) {
+        PetscInt there = 0;
+
+        for (PetscInt j = 0; j < nother; j++)
+          there += other[j] == other[i];
+        if (there > own + 1)
+          part[c] = other[i];
+      }
+    }
+  }
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(return_parts(n, part, nparts, section, points));
+  PetscCall(PetscFree3(part, now, across));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_metis(PetscPartitioner partitioner)
+{
+  PetscFunctionBeginUser;
+  partitioner->ops->partition = partition_metis;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_bisection(PetscPartitioner partitioner)
+{
+  PetscFunctionBeginUser;
+  partitioner->noGraph = PETSC_TRUE;
+  partitioner->ops->partition = partition_bisection;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Registers our types; PETSc frees its list only if the package was initialised before. */
+static PetscErrorCode register_types(void)
+{
+  PetscErrorCode (*create)(PetscPartitioner);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPartitionerInitializePackage());
+  PetscCall(PetscFunctionListFind(PetscPartitionerList, SB_PARTITIONER_METIS, &create));
+  if (create)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscPartitionerRegister(SB_PARTITIONER_METIS, create_metis));
+  PetscCall(PetscPartitionerRegister(SB_PARTITIONER_BISECTION, create_bisection));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Checks a type that the user gives: PETSc's own messages are long, and come on all ranks. */
+static PetscErrorCode check_type(MPI_Comm comm, const char *type)
+{
+  static const char *const packages[] = {"chaco", "parmetis", "ptscotch"};
+  PetscErrorCode (*create)(PetscPartitioner);
+
+  PetscFunctionBeginUser;
+  PetscCheck(strcmp(type, PETSCPARTITIONERSHELL), comm, PETSC_ERR_USER_INPUT,
+             "-petscpartitioner_type shell: it needs a program that gives the parts");
+  PetscCall(PetscFunctionListFind(PetscPartitionerList, type, &create));
+  if (!create) {
+    char advice[512];
+
+    PetscCall(SbListAdvise(PetscPartitionerList, type, sizeof(advice), advice));
+    SETERRQ(comm, PETSC_ERR_USER_INPUT, "-petscpartitioner_type %s: there is no such type; %s",
+            type, advice);
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(packages); i++) {
+    PetscBool has = PETSC_TRUE;
+
+    if (!strcmp(type, packages[i]))
+      PetscCall(SbHasPackage(packages[i], &has));
+    PetscCheck(has, comm, PETSC_ERR_USER_INPUT,
+               "-petscpartitioner_type %s: PETSc was built without it; metis and bisection are "
+               "always there",
+               type);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPartitionerPrepare(MPI_Comm comm)
+{
+  char type[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(register_types());
+  PetscCall(SbOptionString(&SbRunScope, "petscpartitioner_type", sizeof(type), type));
+  if (type[0])
+    PetscCall(check_type(comm, type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The dual graph by blocks of original numbers: start[n + 1], adjacent[]; forest: from the blocks
+   to the cells of the merged mesh. Collective. */
+static PetscErrorCode create_graph(MPI_Comm comm, const SbMergedMesh *w, PetscInt *n,
+                                   PetscInt **start, PetscInt **adjacent, PetscSF *forest)
+{
+  PetscInt N = w->Ncell;
+  PetscInt *orig, *remote, *across, *all;
+  PetscInt k = 0;
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+
+  // original numbers across each face
+  PetscCall(PetscMalloc3(w->ncell, &orig, w->nremote, &remote, 4 * (size_t)w->ncell, &across));
+  for (PetscInt c = 0; c < w->ncell; c++)
+    orig[c] = w->data[c].orig;
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(PetscSFSetGraph(sf, w->ncell, w->nremote, NULL, PETSC_USE_POINTER, w->remote,
+                            PETSC_USE_POINTER));
+  PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, orig, remote));
+  PetscCall(PetscSFDestroy(&sf));
+  for (PetscInt s = 0; s < 4 * w->ncell; s++) {
+    const PetscInt c = w->neighbour[s];
+
+    across[s] = -1;
+    if (c >= 0)
+      across[s] = c < w->ncell ? orig[c] : remote[c - w->ncell];
+  }
+
+  // to the ranks of the blocks
+  *n = PETSC_DECIDE;
+  PetscCall(PetscSplitOwnership(comm, n, &N));
+  PetscCall(SbForestCreate(comm, *n, w->ncell, orig, forest));
+  PetscCall(PetscMalloc1(4 * (size_t)*n, &all));
+  PetscCall(SbForestReduce(*forest, 4, MPIU_INT, across, all));
+  PetscCall(PetscFree3(orig, remote, across));
+  PetscCall(PetscMalloc1(*n + 1, start));
+  PetscCall(
+    PetscMalloc1(4 * (size_t)*n + 1, adjacent)); /* PETSc wants an address of an empty one, too */
+  for (PetscInt s = 0; s < 4 * *n; s++) {
+    if (s % 4 == 0)
+      (*start)[s / 4] = k;
+    if (all[s] >= 0)
+      (*adjacent)[k++] = all[s];
+  }
+  (*start)[*n] = k;
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, PetscMPIInt part[])
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
+  PetscMPIInt size, *block;
+  PetscInt n = w->ncell;
+  PetscInt *start = NULL;
+  PetscInt *adjacent = NULL;
+  const PetscInt *point;
+  PetscBool in_place;
+  PetscSF forest = NULL;
+  PetscSection section;
+  IS points;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscPartitionerSetType(
+    partitioner, w->Ncell <= METIS_MOST ? SB_PARTITIONER_METIS : SB_PARTITIONER_BISECTION));
+  PetscCall(PetscPartitionerSetFromOptions(partitioner));
+
+  // one rank; fewer cells than ranks, which some types do not allow
   if (size == 1 || w->Ncell <= size) {
     for (PetscInt c = 0; c < w->ncell; c++)
       part[c] = size == 1 ? 0 : (PetscMPIInt)w->data[c].orig;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscSFCreate(comm, &sf));
-  PetscCall(PetscSFSetGraph(sf, w->ncell, w->nremote, NULL, PETSC_USE_POINTER, w->remote,
-                            PETSC_USE_POINTER));
-  if (type == SB_PARTITION_METIS || (type == SB_PARTITION_AUTO && w->Ncell <= MOST)) {
-    PetscCall(cut_graph(comm, w, sf, part));
-  } else {
-    const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
-    const uint64_t bound =
-      wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
-    PetscReal(*mine)[3], (*all)[3];
-    PetscInt n = 0;
-    PetscInt total;
-    PetscMPIInt *now, *across;
+  PetscCall(PetscObjectTypeCompare((PetscObject)partitioner, SB_PARTITIONER_BISECTION, &in_place));
+  if (in_place)
+    partitioner->data = (void *)w;
+  else
+    PetscCall(create_graph(comm, w, &n, &start, &adjacent, &forest));
+  PetscCall(PetscSectionCreate(comm, &section));
+  PetscCall(SbPartitionerPartition(partitioner, size, n, start, adjacent, section, &points));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(adjacent));
+  if (in_place)
+    partitioner->data = NULL;
 
-    // bisection tree with a leaf for each rank, from a sample of the tets
-    for (PetscInt c = 0; c < w->ncell; c++)
-      n += SbMix(w->data[c].orig) <= bound;
-    PetscCall(PetscMalloc1(n, &mine));
-    n = 0;
-    for (PetscInt c = 0; c < w->ncell; c++)
-      if (SbMix(w->data[c].orig) <= bound)
-        centre(w, c, mine[n++]);
-    PetscCall(SbAllgatherv(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
-    PetscCall(PetscFree(mine));
-    PetscCall(PetscMalloc1(2 * (size_t)size, &tree.node));
-    PetscCall(split(&tree, 0, total / 3, all, size));
-    PetscCall(PetscFree(all));
+  // part of each vertex of the graph, then of each cell
+  PetscCall(PetscMalloc1(n, &block));
+  PetscCall(ISGetIndices(points, &point));
+  for (PetscMPIInt p = 0; p < size; p++) {
+    PetscInt first, count;
 
-    // leaf that contains each cell centre
-    for (PetscInt c = 0; c < w->ncell; c++) {
-      const Node *node = tree.node;
-      PetscReal x[3];
-
-      centre(w, c, x);
-      while (node->axis >= 0)
-        node = tree.node + node->next + (x[node->axis] >= node->cut);
-      part[c] = (PetscMPIInt)node->next;
-    }
-    PetscCall(PetscFree(tree.node));
-
-    // move a cell to the part of most of its neighbours, if that cuts fewer faces
-    PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-      PetscCall(SbForestBroadcast(sf, 1, MPI_INT, part, across));
-      PetscCall(PetscArraycpy(now, part, w->ncell));
-      for (PetscInt c = 0; c < w->ncell; c++) {
-        PetscMPIInt other[4];
-        PetscInt nother = 0;
-        PetscInt own = 0;
-
-        for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
-          const PetscInt k = w->neighbour[s];
-
-          if (k < 0)
-            continue;
-          other[nother] = k < w->ncell ? now[k] : across[k - w->ncell];
-          own += other[nother++] == now[c];
-        }
-        for (PetscInt i = 0; i < nother && own < 2; i++) {
-          PetscInt there = 0;
-
-          for (PetscInt j = 0; j < nother; j++)
-            there += other[j] == other[i];
-          if (there > own + 1)
-            part[c] = other[i];
-        }
-      }
-    }
-    PetscCall(PetscFree2(now, across));
+    PetscCall(PetscSectionGetOffset(section, p, &first));
+    PetscCall(PetscSectionGetDof(section, p, &count));
+    for (PetscInt i = first; i < first + count; i++)
+      block[point[i]] = p;
   }
-  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(ISRestoreIndices(points, &point));
+  PetscCall(ISDestroy(&points));
+  PetscCall(PetscSectionDestroy(&section));
+  if (in_place)
+    PetscCall(PetscArraycpy(part, block, n));
+  else
+    PetscCall(SbForestBroadcast(forest, 1, MPI_INT, block, part));
+  PetscCall(PetscSFDestroy(&forest));
+  PetscCall(PetscFree(block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

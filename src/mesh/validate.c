@@ -7,6 +7,7 @@
   numbers are a permutation if each occurs once; this is checked by the sums of the numbers and of
   their hashes.
 */
+#include <petscdmplex.h>
 #include "mesh_impl.h"
 
 #define CHECK(cond, ...) PetscCheck(cond, PETSC_COMM_SELF, PETSC_ERR_PLIB, __VA_ARGS__)
@@ -150,6 +151,7 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
           "Cells are out of order at %" PetscInt_FMT, c);
   }
   PetscCall(check_sums(mesh));
+  PetscCall(DMPlexCheck(mesh->dm));
 
   // ghost vertices have the data of their owners
   PetscCall(PetscMalloc2(3 * (size_t)mesh->nvert, &x, mesh->nvert, &orig));

@@ -31,9 +31,6 @@ PetscErrorCode SbRegisterAll(void)
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
 
-  /* otherwise PETSc does not free partitioners that are registered before the first use */
-  PetscCall(PetscPartitionerInitializePackage());
-
   /* in the order of the manual */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(tables); i++)
     PetscCall(SbOptionsRegister(tables[i].klass, "", PETSC_DECIDE, tables[i].rows));

@@ -423,7 +423,7 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   char(*names)[SB_NAME_MAX];
   PetscInt n;
   PetscErrorCode ierr = PETSC_SUCCESS;
-  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report",
+  static const char *const keys[] = {"mass", "petscpartitioner_type", "mesh_reading", "mesh_report",
                                      "validate"};
 
   PetscFunctionBeginUser;

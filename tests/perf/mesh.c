@@ -8,9 +8,10 @@
   messages).
 
   read: the file to arrays on rank 0; read_and_check: with the checks of a run, all bodies in the
-  merged mesh; distribute: partition and migration; number: local numbering. Memory is the largest
-  resident size within a phase (VmHWM, reset before it), of rank 0 and of the largest other rank,
-  less that of the process at its start. One run per process: freed pages may remain.
+  merged mesh; distribute: partition and migration; number: local numbering; plex: the DMPLEX.
+  Memory is the largest resident size within a phase (VmHWM, reset before it), of rank 0 and of the
+  largest other rank, less that of the process at its start. One run per process: freed pages may
+  remain.
 */
 #include "perf.h"
 #include <sbsurface.h>
@@ -98,6 +99,7 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   SbMergedMesh whole, curved;
   SbMesh mesh;
   SbLocalMesh local;
+  PetscPartitioner partitioner;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&p, sizeof(p)));
@@ -118,11 +120,17 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   whole.curved = NULL;
   whole.edge_off = NULL;
   phase_begin(&p);
-  PetscCall(SbDistribute(PETSC_COMM_WORLD, SB_PARTITION_AUTO, PETSC_FALSE, &whole, &local));
+  PetscCall(SbPartitionerPrepare(PETSC_COMM_WORLD));
+  PetscCall(PetscPartitionerCreate(PETSC_COMM_WORLD, &partitioner));
+  PetscCall(SbDistribute(partitioner, PETSC_FALSE, &whole, &local));
+  PetscCall(PetscPartitionerDestroy(&partitioner));
   PetscCall(phase_end(&p, "distribute"));
   phase_begin(&p);
   PetscCall(SbMeshNumber(mesh, &local));
   PetscCall(phase_end(&p, "number"));
+  phase_begin(&p);
+  PetscCall(SbPlexCreate(mesh, PETSC_FALSE));
+  PetscCall(phase_end(&p, "plex"));
   phase_begin(&p);
   PetscCall(SbMeshCurve(mesh, curved.ncurved, curved.curved, curved.edge_off));
   PetscCall(PetscFree(curved.curved));

@@ -110,7 +110,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   SbMergedMesh whole;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
+  PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", partitioner));
   PetscCall(make_scene(body, set));
   PetscCall(make_scene(body_again, set_again));
   body[0].other_nodes = face_nodes;
@@ -136,7 +136,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   PetscCall(SbMeshDestroy(&mesh));
   SB_CHECK(!mesh, "the mesh is gone");
   PetscCall(SbMeshDestroy(&mesh));
-  PetscCall(PetscOptionsClearValue(NULL, "-mesh_partitioner"));
+  PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_type"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,9 +5,10 @@
 
 /* Partitions a box of rank 0; returns the largest part, the sum over all parts, and the faces
    between parts, in cells. */
-static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, PetscInt *cells,
+static PetscErrorCode cut(const char *mesh, const char *type, PetscInt *most, PetscInt *cells,
                           PetscInt *faces)
 {
+  PetscPartitioner partitioner;
   SbMergedMesh whole;
   SbBody body = test_body("b", mesh);
   PetscMPIInt *part;
@@ -16,10 +17,16 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
 
   PetscFunctionBeginUser;
   PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 1, &body, 0, NULL, &whole));
-  if (test_rank)
+  if (test_rank) /* arrays stay the caller's */
     whole.nvert = whole.ncell = 0;
   PetscCall(PetscMalloc1(whole.ncell, &part));
-  PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
+  if (type)
+    PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", type));
+  PetscCall(SbPartitionerPrepare(PETSC_COMM_WORLD));
+  PetscCall(PetscPartitionerCreate(PETSC_COMM_WORLD, &partitioner));
+  PetscCall(SbPartition(partitioner, &whole, part));
+  PetscCall(PetscPartitionerDestroy(&partitioner));
+  PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_type"));
   for (PetscInt c = 0; c < whole.ncell; c++) {
     SB_CHECK(part[c] >= 0 && part[c] < test_size, "cell %d goes to rank %d", (int)c, (int)part[c]);
     count[part[c]]++;
@@ -46,7 +53,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
   border has 72 faces. METIS promises parts of at most 1 % above the mean, bisection is rougher. No
   border may be longer than twice the shortest possible one.
 */
-static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
+static PetscErrorCode test_bar(const char *type, PetscReal slack)
 {
   PetscInt most, cells, faces;
 
@@ -100,13 +107,15 @@ int main(int argc, char **argv)
   PetscInt most, cells, faces;
 
   SB_TEST_BEGIN(argc, argv);
+  PetscCall(SbOptionsRegister("", "", PETSC_DECIDE, SbMeshRows));
   PetscCall(test_route());
-  PetscCall(test_bar(SB_PARTITION_METIS, 0.01));
-  PetscCall(test_bar(SB_PARTITION_AUTO, 0.01));
-  PetscCall(test_bar(SB_PARTITION_BISECTION, 0.03));
+  PetscCall(test_bar("metis", 0.01));
+  PetscCall(test_bar(NULL, 0.01));
+  PetscCall(test_bar("bisection", 0.03));
 
   /* with two cells each of two ranks gets one */
-  PetscCall(cut("tests/data/two_tets.msh", SB_PARTITION_METIS, &most, &cells, &faces));
+  PetscCall(cut("tests/data/two_tets.msh", "metis", &most, &cells, &faces));
   SB_CHECK(most == (test_size == 1 ? 2 : 1), "%d cells on one rank", (int)most);
+  PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -144,7 +144,7 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   if (!test_rank)
     PetscCall(make_mesh(path, random));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
+  PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", partitioner));
   PetscCall(create(path, "rank0", body[0], set[0], &a));
   PetscCall(create(path, "slabs", body[1], set[1], &b));
   SB_CHECK(a->Nvert == b->Nvert && a->Ncell == b->Ncell && a->nvert == b->nvert &&
@@ -191,7 +191,7 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
            "%d parts, '%s'", (int)body[1][1].npart, body[1][1].note);
   PetscCall(SbMeshDestroy(&a));
   PetscCall(SbMeshDestroy(&b));
-  PetscCall(PetscOptionsClearValue(NULL, "-mesh_partitioner"));
+  PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_type"));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* all ranks have read the file */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,0 +1,518 @@
+/*
+  plex.c - the DMPLEX of a scene: topology, rest coordinates, overlap, point star forest, labels.
+
+  Each rank builds its part from the cells that distribute.c has sent it and number.c has ordered:
+  point c is cell c of SbMesh, point ncell + v its vertex v; faces and edges follow where an element
+  has nodes there. Cones are written directly: faces and edges are found by counting sorts
+  (faces.c), six times as fast as DMPlexInterpolate(), and strata of labels are set as wholes.
+
+  PETSc's tet has its faces' normals outside with the vertices in the order 0 2 1 3 of a tet of
+  SbMesh. Cones of faces and edges are in ascending order of original numbers, so that they are the
+  same on all ranks.
+
+  Owners. Cells and vertices: distribute.c. The ends of a face or edge may have several owners: it
+  belongs to the rank of its cell with the lowest original number, or of that with the highest one,
+  every second time. The owner of a cell knows all cells around its faces and edges (the overlap is
+  complete) and so their owners; a broadcast over the cells brings an owner's numbers to the cells
+  next to it, a second one to their copies.
+
+  Labels: body, material (number of the material of the tets of an inclusion, else that of the
+  body), boundary (1), and each set of the scenario by its name (1). Faces are in them where the
+  mesh has faces.
+*/
+#include <petscdmplex.h>
+#include "mesh_impl.h"
+
+enum {
+  NFACE = 4,
+  NEDGE = 6,
+  NSIDE = NFACE + NEDGE /* faces and edges of a tet */
+};
+
+/* Vertices of a tet in PETSc's order, and its faces as cones have them: vertices in that order. */
+static const int plex_vertex[4] = {0, 2, 1, 3};
+static const int plex_face[NFACE][3] = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {2, 1, 3}};
+static const int plex_opposite[NFACE] = {3, 2, 1, 0};
+
+/* Faces and edges of this rank's cells while the plex is built; numbers from zero on. */
+typedef struct {
+  PetscInt nface, nedge;
+  PetscInt *face;      /* [ncell][4] face opposite each vertex */
+  PetscInt *edge;      /* [ncell][6] edges 01 02 03 12 13 23 */
+  PetscInt *face_vert; /* [nface][3] vertices, original numbers ascending */
+  PetscInt *face_edge; /* [nface][3] edges 01 12 02 of these */
+  PetscInt *edge_vert; /* [nedge][2] likewise */
+} Sides;
+
+static PetscErrorCode sides_destroy(Sides *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(s->face_vert));
+  PetscCall(PetscFree(s->face_edge));
+  PetscCall(PetscFree(s->edge_vert));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers the edge of a tet between its vertices a and b, 0..3. */
+static int edge_between(int a, int b)
+{
+  static const int edge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
+
+  return edge[a][b];
+}
+
+/* Sorts the corners of a face, 0..3 of a tet, by the original numbers of their vertices. */
+static void sort_corners(const PetscInt orig[], const PetscInt vert[4], int corner[3])
+{
+  for (int i = 1; i < 3; i++)
+    for (int j = i; j > 0 && orig[vert[corner[j]]] < orig[vert[corner[j - 1]]]; j--) {
+      const int keep = corner[j];
+
+      corner[j] = corner[j - 1];
+      corner[j - 1] = keep;
+    }
+}
+
+/* Numbers faces and edges in the order of the cells, and finds their vertices. */
+static PetscErrorCode find_sides(SbMesh mesh, Sides *s)
+{
+  SbFaces faces;
+
+  PetscFunctionBeginUser;
+
+  // a face gets its number from the first of its cells
+  PetscCall(SbFacesCreate(mesh->nvert, mesh->ncell, mesh->cell, &faces));
+  PetscCall(PetscMalloc1(NFACE * (size_t)mesh->ncell, &s->face));
+  s->nface = 0;
+  for (PetscInt i = 0; i < NFACE * mesh->ncell; i++) {
+    const PetscInt c = i / NFACE;
+    const PetscInt other = faces.neighbour[i];
+    int f = 0;
+
+    if (other < 0 || other > c) {
+      s->face[i] = s->nface++;
+      continue;
+    }
+    while (f < 3 && faces.neighbour[NFACE * other + f] != c)
+      f++;
+    s->face[i] = s->face[NFACE * other + f];
+  }
+  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(SbTetEdges(mesh->nvert, mesh->ncell, mesh->cell, &s->nedge, &s->edge));
+
+  // vertices of faces and edges, edges of faces; the last cell of each decides, as all agree
+  PetscCall(PetscMalloc1(3 * (size_t)s->nface, &s->face_vert));
+  PetscCall(PetscMalloc1(3 * (size_t)s->nface, &s->face_edge));
+  PetscCall(PetscMalloc1(2 * (size_t)s->nedge, &s->edge_vert));
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    const PetscInt *v = mesh->cell + 4 * (size_t)c;
+
+    for (int f = 0; f < NFACE; f++) {
+      const PetscInt at = 3 * s->face[NFACE * c + f];
+      int k[3] = {(f + 1) % 4, (f + 2) % 4, (f + 3) % 4};
+
+      sort_corners(mesh->vert_orig, v, k);
+      for (int i = 0; i < 3; i++) {
+        s->face_vert[at + i] = v[k[i]];
+        s->face_edge[at + i] = s->edge[NEDGE * c + edge_between(k[i], k[(i + 1) % 3])];
+      }
+    }
+    for (int e = 0; e < NEDGE; e++) {
+      const PetscInt at = 2 * s->edge[NEDGE * c + e];
+      const PetscInt a = v[SbTetEdge[e][0]];
+      const PetscInt b = v[SbTetEdge[e][1]];
+      const PetscBool ordered = (PetscBool)(mesh->vert_orig[a] < mesh->vert_orig[b]);
+
+      s->edge_vert[at] = ordered ? a : b;
+      s->edge_vert[at + 1] = ordered ? b : a;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Orientations of a triangle in the cone of a tet: [i][j] where the vertices of the triangle that
+   come first and second there are its i-th and j-th. */
+static PetscErrorCode triangle_orientations(PetscInt orientation[3][3])
+{
+  static const PetscInt own[3] = {0, 1, 2};
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3; i++)
+    for (PetscInt j = 0; j < 3; j++) {
+      const PetscInt there[3] = {i, j, 3 - i - j};
+
+      orientation[i][j] = 0;
+      if (i != j)
+        PetscCall(
+          DMPolytopeGetVertexOrientation(DM_POLYTOPE_TRIANGLE, own, there, &orientation[i][j]));
+    }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cones of a mesh with faces and edges. */
+static PetscErrorCode fill_cones(SbMesh mesh, const Sides *s, PetscInt cone[],
+                                 PetscInt orientation[])
+{
+  const PetscInt vertices = mesh->ncell;
+  const PetscInt faces = vertices + mesh->nvert;
+  const PetscInt edges = faces + s->nface;
+  PetscInt *face_cone = cone + NFACE * (size_t)mesh->ncell;
+  PetscInt *edge_cone = face_cone + 3 * (size_t)s->nface;
+  PetscInt turned[3][3];
+
+  PetscFunctionBeginUser;
+  PetscCall(triangle_orientations(turned));
+
+  // faces of the cells
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    for (int k = 0; k < NFACE; k++) {
+      const PetscInt face = s->face[NFACE * c + plex_vertex[plex_opposite[k]]];
+      const PetscInt *own = s->face_vert + 3 * face;
+      PetscInt at[2];
+
+      for (int i = 0; i < 2; i++) {
+        const PetscInt v = mesh->cell[4 * (size_t)c + plex_vertex[plex_face[k][i]]];
+
+        at[i] = v == own[0] ? 0 : v == own[1] ? 1 : 2;
+      }
+      cone[NFACE * c + k] = faces + face;
+      orientation[NFACE * c + k] = turned[at[0]][at[1]];
+    }
+  }
+
+  // edges of the faces: the last one runs from the third vertex to the first
+  for (PetscInt i = 0; i < 3 * s->nface; i++) {
+    face_cone[i] = edges + s->face_edge[i];
+    orientation[NFACE * mesh->ncell + i] = i % 3 == 2 ? -1 : 0;
+  }
+  for (PetscInt i = 0; i < 2 * s->nedge; i++)
+    edge_cone[i] = vertices + s->edge_vert[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A stratum of a label: the points first to last - 1. */
+static PetscErrorCode set_range(DMLabel label, PetscInt value, PetscInt first, PetscInt last)
+{
+  IS points;
+
+  PetscFunctionBeginUser;
+  if (last <= first)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, last - first, first, 1, &points));
+  PetscCall(DMLabelSetStratumIS(label, value, points));
+  PetscCall(ISDestroy(&points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points, cones, supports, strata. s: NULL without faces and edges. */
+static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
+{
+  const PetscInt first[5] = {0, mesh->ncell, mesh->ncell + mesh->nvert,
+                             mesh->ncell + mesh->nvert + (s ? s->nface : 0),
+                             mesh->ncell + mesh->nvert + (s ? s->nface + s->nedge : 0)};
+  static const PetscInt cone_size[4] = {4, 0, 3, 2};
+  static const DMPolytopeType type[4] = {DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_POINT,
+                                         DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_SEGMENT};
+  PetscInt *cone, *orientation;
+  DMLabel types;
+  DM dm = mesh->dm;
+
+  PetscFunctionBeginUser;
+  PetscCall(DMPlexSetChart(dm, 0, first[4]));
+  for (int k = 0; k < 4; k++)
+    for (PetscInt p = first[k]; k != 1 && p < first[k + 1]; p++)
+      PetscCall(DMPlexSetConeSize(dm, p, cone_size[k]));
+  PetscCall(DMSetUp(dm));
+  PetscCall(DMPlexGetCones(dm, &cone));
+  PetscCall(DMPlexGetConeOrientations(dm, &orientation));
+  if (s)
+    PetscCall(fill_cones(mesh, s, cone, orientation));
+  for (PetscInt i = 0; !s && i < 4 * mesh->ncell; i++)
+    cone[i] = mesh->ncell + mesh->cell[i - i % 4 + plex_vertex[i % 4]];
+  PetscCall(DMPlexSymmetrize(dm));
+
+  // the types are known: PETSc need not look at every cone
+  PetscCall(DMCreateLabel(dm, "celltype"));
+  PetscCall(DMPlexGetCellTypeLabel(dm, &types));
+  for (int k = 0; k < 4; k++)
+    PetscCall(set_range(types, type[k], first[k], first[k + 1]));
+  PetscCall(DMPlexStratify(dm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_coordinates(SbMesh mesh)
+{
+  PetscSection section;
+  PetscScalar *x;
+  Vec coordinates;
+
+  PetscFunctionBeginUser;
+  PetscCall(DMGetCoordinateSection(mesh->dm, &section));
+  PetscCall(PetscSectionSetNumFields(section, 1));
+  PetscCall(PetscSectionSetFieldComponents(section, 0, 3));
+  PetscCall(PetscSectionSetChart(section, mesh->ncell, mesh->ncell + mesh->nvert));
+  for (PetscInt v = mesh->ncell; v < mesh->ncell + mesh->nvert; v++) {
+    PetscCall(PetscSectionSetDof(section, v, 3));
+    PetscCall(PetscSectionSetFieldDof(section, v, 0, 3));
+  }
+  PetscCall(PetscSectionSetUp(section));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * mesh->nvert, &coordinates));
+  PetscCall(PetscObjectSetName((PetscObject)coordinates, "coordinates"));
+  PetscCall(VecSetBlockSize(coordinates, 3));
+  PetscCall(VecGetArrayWrite(coordinates, &x));
+  PetscCall(PetscArraycpy(x, mesh->x, 3 * (size_t)mesh->nvert));
+  PetscCall(VecRestoreArrayWrite(coordinates, &x));
+  PetscCall(DMSetCoordinatesLocal(mesh->dm, coordinates));
+  PetscCall(VecDestroy(&coordinates));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Owner and number there of the sides of all cells, own[ncell][NSIDE]. Collective. */
+static PetscErrorCode own_sides(SbMesh mesh, const Sides *s, PetscSFNode own[])
+{
+  const PetscInt nside = s->nface + s->nedge;
+  PetscInt *low, *high;
+  PetscSFNode *side;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
+  PetscCall(PetscMalloc3(nside, &low, nside, &high, nside, &side));
+  for (PetscInt i = 0; i < nside; i++) {
+    low[i] = PETSC_MAX_INT;
+    high[i] = -1;
+    side[i] = (PetscSFNode){-1, -1};
+  }
+
+  // lowest and highest original number of the cells at each side; own: those that this rank decides
+  for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
+    const PetscInt c = i / NSIDE;
+    const PetscInt k = i % NSIDE;
+    const PetscInt at =
+      k < NFACE ? s->face[NFACE * c + k] : s->nface + s->edge[NEDGE * c + k - NFACE];
+
+    own[i].index = at;
+    low[at] = PetscMin(low[at], mesh->cell_orig[c]);
+    high[at] = PetscMax(high[at], mesh->cell_orig[c]);
+  }
+  for (PetscInt i = 0; i < NSIDE * mesh->ncell_owned; i++) {
+    const PetscInt at = own[i].index;
+    const PetscBool lowest = (PetscBool)((low[at] + high[at]) % 2);
+
+    if (mesh->cell_orig[i / NSIDE] == (lowest ? low[at] : high[at]))
+      side[at] = (PetscSFNode){rank, at};
+  }
+
+  // the first round completes owned cells, the second one their copies
+  for (int round = 0; round < 2; round++) {
+    PetscSFNode *sent;
+
+    PetscCall(PetscMalloc1(NSIDE * (size_t)mesh->ncell, &sent));
+    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++)
+      sent[i] = side[own[i].index];
+    PetscCall(SbForestBroadcast(mesh->cell_sf, NSIDE * sizeof(*sent) / sizeof(PetscInt), MPIU_INT,
+                                sent, sent));
+    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++)
+      if (sent[i].rank >= 0)
+        side[own[i].index] = sent[i];
+    PetscCall(PetscFree(sent));
+  }
+  for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
+    own[i] = side[own[i].index];
+    PetscCheck(own[i].rank >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "No rank owns side %d of cell %" PetscInt_FMT, (int)(i % NSIDE), i / NSIDE);
+  }
+  PetscCall(PetscFree3(low, high, side));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends the leaves of a star forest; points of a rank start at first[rank][k]. */
+static PetscErrorCode append_leaves(PetscSF sf, PetscInt k, const PetscInt first[][3],
+                                    PetscMPIInt rank, PetscInt *n, PetscInt leaf[],
+                                    PetscSFNode root[])
+{
+  PetscInt nleaf;
+  const PetscInt *item;
+  const PetscSFNode *from;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSFGetGraph(sf, NULL, &nleaf, &item, &from));
+  for (PetscInt i = 0; i < nleaf; i++) {
+    leaf[*n] = first[rank][k] + (item ? item[i] : i);
+    root[*n] = (PetscSFNode){from[i].rank, first[from[i].rank][k] + from[i].index};
+    (*n)++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The point star forest, from the owners of points to their copies. Collective. */
+static PetscErrorCode set_point_forest(SbMesh mesh, const Sides *s)
+{
+  const PetscInt nside = s ? s->nface + s->nedge : 0;
+  const PetscInt mine[3] = {0, mesh->ncell, mesh->ncell + mesh->nvert};
+  PetscInt(*first)[3]; /* [size] first cell, vertex and face of each rank */
+  PetscInt n = 0;
+  PetscInt nghost = mesh->ncell - mesh->ncell_owned + mesh->nvert - mesh->nvert_owned + nside;
+  PetscInt *leaf;
+  PetscSFNode *root;
+  PetscMPIInt rank, size;
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
+  if (size == 1)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(size, &first));
+  PetscCallMPI(MPI_Allgather(mine, 3, MPIU_INT, first, 3, MPIU_INT, mesh->comm));
+  PetscCall(PetscMalloc1(nghost, &leaf));
+  PetscCall(PetscMalloc1(nghost, &root));
+  PetscCall(append_leaves(mesh->cell_sf, 0, first, rank, &n, leaf, root));
+  PetscCall(append_leaves(mesh->vert_sf, 1, first, rank, &n, leaf, root));
+  if (s) {
+    PetscSFNode *own;
+    PetscBool *known;
+
+    PetscCall(PetscMalloc1(NSIDE * (size_t)mesh->ncell, &own));
+    PetscCall(PetscCalloc1(nside, &known));
+    PetscCall(own_sides(mesh, s, own));
+    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
+      const PetscInt c = i / NSIDE;
+      const PetscInt k = i % NSIDE;
+      const PetscInt at =
+        k < NFACE ? s->face[NFACE * c + k] : s->nface + s->edge[NEDGE * c + k - NFACE];
+
+      if (known[at] || own[i].rank == rank)
+        continue;
+      known[at] = PETSC_TRUE;
+      leaf[n] = first[rank][2] + at;
+      root[n++] = (PetscSFNode){own[i].rank, first[own[i].rank][2] + own[i].index};
+    }
+    PetscCall(PetscFree(own));
+    PetscCall(PetscFree(known));
+  }
+  PetscCall(PetscFree(first));
+  PetscCall(DMGetPointSF(mesh->dm, &sf));
+  PetscCall(PetscSFSetGraph(sf, mesh->ncell + mesh->nvert + nside, n, leaf, PETSC_OWN_POINTER, root,
+                            PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetUp(sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Strata of a label from key[n] of the points first, first + 1, ...; negative: in none. */
+static PetscErrorCode set_strata(DMLabel label, PetscInt n, const PetscInt key[], PetscInt nkey)
+{
+  PetscInt *start, *item;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBucketByKey(n, key, nkey, &start, &item));
+  for (PetscInt k = 0; k < nkey; k++) {
+    IS points;
+
+    if (start[k] == start[k + 1])
+      continue;
+    PetscCall(ISCreateGeneral(PETSC_COMM_SELF, start[k + 1] - start[k], item + start[k],
+                              PETSC_COPY_VALUES, &points));
+    PetscCall(DMLabelSetStratumIS(label, k, points));
+    PetscCall(ISDestroy(&points));
+  }
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(item));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Labels of the bodies, their materials, the boundary and the sets. */
+static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
+{
+  const PetscInt nface = s ? s->nface : 0;
+  const PetscInt npoint = mesh->ncell + mesh->nvert + nface;
+  PetscInt *key;
+  PetscInt nmaterial = mesh->nbody;
+  DMLabel label;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    nmaterial += mesh->body[b].ninclusion;
+
+  // cells and vertices of the bodies, cells of the materials
+  PetscCall(DMCreateLabel(mesh->dm, "body"));
+  PetscCall(DMGetLabel(mesh->dm, "body", &label));
+  PetscCall(PetscMalloc1(npoint, &key));
+  if (mesh->nbody == 1) {
+    PetscCall(set_range(label, 0, 0, mesh->ncell + mesh->nvert));
+  } else {
+    PetscCall(PetscArraycpy(key, mesh->cell_body, mesh->ncell));
+    PetscCall(PetscArraycpy(key + mesh->ncell, mesh->vert_body, mesh->nvert));
+    PetscCall(set_strata(label, mesh->ncell + mesh->nvert, key, mesh->nbody));
+  }
+  PetscCall(DMCreateLabel(mesh->dm, "material"));
+  PetscCall(DMGetLabel(mesh->dm, "material", &label));
+  if (nmaterial == 1)
+    PetscCall(set_range(label, 0, 0, mesh->ncell));
+  else
+    PetscCall(set_strata(label, mesh->ncell, mesh->cell_material, nmaterial));
+
+  // the boundary, then the sets: bit k of the masks
+  for (PetscInt k = 0; k <= mesh->nset; k++) {
+    const uint64_t bit = k ? SB_SET_BIT(k - 1) : SB_ON_BOUNDARY;
+    char name[SB_NAME_MAX + 8] = "boundary";
+    PetscBool taken = PETSC_FALSE;
+
+    for (PetscInt p = 0; p < npoint; p++)
+      key[p] = -1;
+    for (PetscInt c = 0; k && c < mesh->ncell; c++)
+      key[c] = mesh->cell_set[c] & bit ? 1 : -1;
+    for (PetscInt v = 0; k && v < mesh->nvert; v++)
+      key[mesh->ncell + v] = mesh->vert_set[v] & bit ? 1 : -1;
+    for (PetscInt i = 0; (!k || s) && i < NFACE * mesh->ncell; i++) {
+      if (!(mesh->face_set[i] & bit))
+        continue;
+      for (int a = 0; !k && a < 3; a++)
+        key[mesh->ncell + mesh->cell[i - i % 4 + SbFaceVertex[i % 4][a]]] = 1;
+      if (s)
+        key[mesh->ncell + mesh->nvert + s->face[i]] = 1;
+    }
+
+    // a set may have the name of another label
+    if (k)
+      PetscCall(PetscStrncpy(name, mesh->set[k - 1].name, sizeof(name)));
+    PetscCall(DMHasLabel(mesh->dm, name, &taken));
+    if (taken)
+      (void)snprintf(name, sizeof(name), "set_%s", mesh->set[k - 1].name);
+    PetscCall(DMCreateLabel(mesh->dm, name));
+    PetscCall(DMGetLabel(mesh->dm, name, &label));
+    PetscCall(set_strata(label, npoint, key, 2));
+  }
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPlexCreate(SbMesh mesh, PetscBool sides)
+{
+  Sides s = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(DMCreate(mesh->comm, &mesh->dm));
+  PetscCall(DMSetType(mesh->dm, DMPLEX));
+  PetscCall(PetscObjectSetName((PetscObject)mesh->dm, "mesh"));
+  PetscCall(DMSetDimension(mesh->dm, 3));
+  PetscCall(DMSetCoordinateDim(mesh->dm, 3));
+  if (sides)
+    PetscCall(find_sides(mesh, &s));
+  PetscCall(create_topology(mesh, sides ? &s : NULL));
+  PetscCall(set_coordinates(mesh));
+  PetscCall(set_point_forest(mesh, sides ? &s : NULL));
+  PetscCall(DMPlexSetOverlap(mesh->dm, NULL, 1));
+  PetscCall(DMPlexDistributeSetDefault(mesh->dm, PETSC_FALSE));
+  PetscCall(set_labels(mesh, sides ? &s : NULL));
+
+  // points of the faces and edges of each cell
+  for (PetscInt i = 0; sides && i < NFACE * mesh->ncell; i++)
+    s.face[i] += mesh->ncell + mesh->nvert;
+  for (PetscInt i = 0; sides && i < NEDGE * mesh->ncell; i++)
+    s.edge[i] += mesh->ncell + mesh->nvert + s.nface;
+  mesh->face_point = s.face;
+  mesh->edge_point = s.edge;
+  PetscCall(sides_destroy(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
