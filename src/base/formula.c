@@ -22,7 +22,9 @@ static PetscReal step_of(PetscReal a)
 
 static PetscReal clamp_of(PetscReal a, PetscReal lo, PetscReal hi)
 {
-  return a < lo ? lo : (a > hi ? hi : a);
+  if (a < lo)
+    return lo;
+  return a > hi ? hi : a;
 }
 
 static PetscReal ramp_of(PetscReal a)
