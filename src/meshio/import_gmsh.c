@@ -358,7 +358,12 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
       s->binary = g.binary;
       if (elements && !im->x)
         SB_SCAN_ERROR(s, "section %s before the nodes", name);
-      PetscCall((nodes ? read_nodes : elements ? read_elements : read_entities)(&g));
+      if (nodes)
+        PetscCall(read_nodes(&g));
+      else if (elements)
+        PetscCall(read_elements(&g));
+      else
+        PetscCall(read_entities(&g));
       s->binary = PETSC_FALSE;
     } else if (!strcmp(name, "$PartitionedEntities"))
       SB_SCAN_ERROR(

@@ -201,21 +201,25 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   SbScan part;
   SbNumberType type;
   Bytes b = {.at = tag.close, .end = s->end, .text = PETSC_TRUE};
+  static const char *const kinds[] = {"Int", "UInt", "Float"};
+  static const char letters[] = "iuf";
   char format[16], name[64], kind[32];
-  PetscBool text;
+  PetscBool text, sized;
   size_t want, length;
   int64_t offset, room;
 
   PetscFunctionBeginUser;
   s->token = tag.open;
   attribute(tag, "type", sizeof(kind), kind);
-  type.kind = !strncmp(kind, "Int", 3)     ? 'i'
-              : !strncmp(kind, "UInt", 4)  ? 'u'
-              : !strncmp(kind, "Float", 5) ? 'f'
-                                           : 0;
+  type.kind = 0;
+  for (int i = 0; i < 3; i++)
+    if (!strncmp(kind, kinds[i], strlen(kinds[i])))
+      type.kind = letters[i];
   type.size = atoi(kind + strcspn(kind, "0123456789")) / 8;
-  if (!type.kind || (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8) ||
-      (type.kind == 'f' && type.size < 4))
+  sized = (PetscBool)(type.size == 4 || type.size == 8);
+  if (type.kind != 'f' && (type.size == 1 || type.size == 2))
+    sized = PETSC_TRUE;
+  if (!type.kind || !sized)
     SB_SCAN_ERROR(s, "an array of type '%s'; expected one as Float64 or Int32", kind);
   attribute(tag, "format", sizeof(format), format);
   attribute(tag, "Name", sizeof(name), name);
@@ -235,7 +239,10 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   } else
     SB_SCAN_ERROR(s, "an array of format '%s'; expected ascii, binary or appended", format);
   text = (PetscBool)(!format[0] || !strcmp(format, "ascii"));
-  room = text ? (b.end - b.at) / 2 + 1 : (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
+  if (text)
+    room = (b.end - b.at) / 2 + 1;
+  else
+    room = (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
   if (n > room)
     SB_SCAN_ERROR(
       s, "array '%s' should hold %lld numbers, which is more than the file can contain there", name,
