@@ -162,14 +162,19 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   size_t *packed = NULL;
   size_t at = 0;
   unsigned char *in = NULL;
+  PetscBool small;
 
   PetscFunctionBeginUser;
   PetscCall(take_length(v, b, name, &nblock));
   PetscCall(take_length(v, b, name, &size));
   PetscCall(take_length(v, b, name, &last));
   full = nblock - (nblock && last);
-  if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
-      full * size + (nblock ? last : 0) != want)
+
+  // bounds first, so that the sum cannot overflow
+  small = (PetscBool)(nblock <= (size_t)(b->end - b->at) && last <= want);
+  if (size && full > want / size)
+    small = PETSC_FALSE;
+  if (!small || full * size + (nblock ? last : 0) != want)
     SB_SCAN_ERROR(
       v->scan, "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all",
       name, nblock, size, last, want);

@@ -131,8 +131,10 @@ static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], in
       for (PetscInt k = 0; k < n && quality > best; k++) {
         const PetscInt d = left[k];
 
-        if (d != a && d != b && d != c && seen_area(p, a, b, d, NULL) >= 0 &&
-            seen_area(p, b, c, d, NULL) >= 0 && seen_area(p, c, a, d, NULL) >= 0)
+        if (d == a || d == b || d == c)
+          continue;
+        if (seen_area(p, a, b, d, NULL) >= 0 && seen_area(p, b, c, d, NULL) >= 0 &&
+            seen_area(p, c, a, d, NULL) >= 0)
           quality = 0;
       }
       if (quality > best) {
