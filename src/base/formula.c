@@ -218,8 +218,8 @@ static PetscErrorCode expression(Parser *p, const char *operators)
 
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
-  PetscReal stack[SB_FORMULA_STACK + 2],
-    *a = stack; /* a: the last value; the first is at stack[1] */
+  PetscReal stack[SB_FORMULA_STACK + 2]; /* the first value is at stack[1] */
+  PetscReal *a = stack;                  /* the last value */
 
   if (!f->step)
     return SbFormulaEvalTable(f, t);

@@ -172,7 +172,8 @@ PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const Petsc
 {
   const PetscInt *v[2] = {a, b};
   PetscReal const *c[2][3];
-  int ncommon = 0, own[2] = {3, 3}; /* with two common corners: position of the third one */
+  int ncommon = 0;
+  int own[2] = {3, 3}; /* with two common corners: position of the third one */
   int common[2] = {0, 0};
 
   for (int i = 0; i < 3; i++) {

@@ -143,7 +143,8 @@ PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
 PetscErrorCode SbDeckBuild(SbDeck *d)
 {
   SbImport *im = d->im;
-  PetscInt *point = NULL, group; /* [nvert] item of each node that is in a set, -1: none */
+  PetscInt *point = NULL; /* [nvert] item of each node that is in a set, -1: none */
+  PetscInt group;
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));

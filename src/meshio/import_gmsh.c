@@ -241,7 +241,8 @@ static PetscErrorCode read_elements(Gmsh *g)
   int64_t nnode;
   int64_t last_tag = 0;
   int64_t last_dim = -1;
-  PetscInt tags, last_tags = 0; /* of the last group: usually that of the next element too */
+  PetscInt tags;
+  PetscInt last_tags = 0; /* of the last group: usually that of the next element too */
 
   PetscFunctionBeginUser;
   PetscCall(read_totals(g, "number of elements", &nblock, &total));

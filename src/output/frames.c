@@ -443,7 +443,8 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   SbFrames fr = out->frames;
   List l = {0};
   PetscInt k = 0;
-  int64_t mesh = 0, shown = -1; /* meshes of a frame and of the one before, as in fr->mesh */
+  int64_t mesh = 0;   /* mesh of a frame, as in fr->mesh */
+  int64_t shown = -1; /* and of the one before */
   PetscBool other;
   char message[SB_MESSAGE_MAX] = "";
 
@@ -536,7 +537,8 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   char path[PETSC_MAX_PATH_LEN];
   SbFrames fr = out->frames;
   PetscBool has = PETSC_FALSE; /* the file has the mesh */
-  PetscInt most = 1, wide;     /* components of a cell field; points of a cell */
+  PetscInt most = 1;           /* components of a cell field */
+  PetscInt wide;               /* points of a cell */
 
   PetscFunctionBeginUser;
   if (!out->nfield)

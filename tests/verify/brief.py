@@ -422,7 +422,8 @@ ROWS: dict[str, Callable[[], None]] = {
 # What the program does not do yet, as the table says it; no other row may say "not there yet".
 NOT_YET = {
     "contact by KSP with projected constraints":
-        "Not there yet: projected constraints between bodies and within one; they meet by a barrier",
+        "Not there yet: projected constraints between bodies and within one; they meet by a "
+        "barrier",
     "penalty and Lagrange multipliers":
         "Not there yet: multipliers, penalty and augmented Lagrangian between bodies and within "
         "one; they meet by a barrier",
@@ -468,7 +469,8 @@ def main() -> None:
             print("failed:", failed[-1], flush=True)
     shutil.rmtree(OUT / "run", ignore_errors=True)
     if failed:
-        sys.exit(f"{len(failed)} of {len(ROWS)} rows: " + "; ".join(failed).replace("\n", " ")[:1500])
+        text = "; ".join(failed).replace("\n", " ")
+        sys.exit(f"{len(failed)} of {len(ROWS)} rows: {text[:1500]}")
 
 
 if __name__ == "__main__":
