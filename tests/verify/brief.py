@@ -160,7 +160,7 @@ def any_ranks() -> None:
     text = run(BAR | {"body_bar_mesh": "box:0.1,0.1,0.1:1"}, ranks=8)
     tets = int(re.search(r"^bar +p1 +(\d+)", text, re.M)[1])
     check(tets < 8, f"{tets} tets are not fewer than ranks")
-    check("Petsc Release Version 3." in call([SUPPLE, "-version"]), "the version of PETSc")
+    check(re.search(r"Petsc (Release|Development)", call([SUPPLE, "-version"])), "no PETSc")
 
 
 def packages() -> None:
@@ -194,11 +194,11 @@ def dmplex() -> None:
     check(len(counts) == 2 and sum(counts) > ncell, f"cells per rank {counts}: not distributed "
           f"with an overlap, of {ncell} in all")
     motion = []
-    for partitioner in ("metis", "simple"):
+    for partitioner in ("metis", "simple", "bisection"):
         text = run(BAR, "-petscpartitioner_type", partitioner, ranks=2)
         check("nobody read" not in text, f"-petscpartitioner_type {partitioner} is not read")
         motion.append(last()["max_displacement"])
-    check(numpy.allclose(*motion, rtol=1e-6), f"partitioners give motions {motion}")
+    check(numpy.allclose(motion, motion[0], rtol=1e-6), f"partitioners give motions {motion}")
 
 
 def stiffness() -> None:
