@@ -71,11 +71,15 @@ const SbField *SbFieldGetAll(PetscInt *n);
   Collective.
 
   Before the model is set up, so that nothing is computed for a run whose results have no place.
+  Input:
+    scenario - option file that names the run in reports, and its folder where -output_dir does not;
+               "" without one
+
   Options read: -output_..., -checkpoint_..., -restart, -probes, -probe_<name>_at, -progress,
   -quiet. Errors: PETSC_ERR_USER for an unknown field; PETSC_ERR_FILE_OPEN when the folder cannot be
   made or written.
 */
-PetscErrorCode SbOutputSetFromOptions(SbRun run);
+PetscErrorCode SbOutputSetFromOptions(SbRun run, const char *scenario);
 
 /*
   SbOutputAttach - attaches the monitors asked for and, with -restart, loads the checkpoint.

@@ -15,7 +15,7 @@ typedef struct {
   const char *scenario; /* first word of the command line when it is no option */
   PetscBool version;
   PetscInt nfile;
-  const char *file[16]; /* [nfile] scenario and other option files that can be read */
+  const char *file[16]; /* [nfile] scenario and other option files that can be read, in order */
   char
     problem[PETSC_MAX_PATH_LEN + 256]; /* what is wrong with the command line; "" when nothing is */
 } SbCommand;
@@ -26,7 +26,7 @@ typedef struct {
 
   Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_table FILE; `-help petsc`
   becomes PETSc's own -help. Nothing at all is a request for help, and nothing to run. A first word
-  that is no option names the scenario; it stays, for PetscGetArgs(), and PETSc passes over it. A
+  that is no option names the scenario; it stays, and PETSc passes over it. A
   word that belongs to no option and an option file that cannot be read (rank 0 looks) are described
   in command->problem, because PETSc cannot report an error before PetscInitialize(); an
   -options_file that cannot be read is taken out.

@@ -112,7 +112,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     PetscCall(SbRunCreate(scene.model, &scene.run));
     PetscCall(SbLedgerSetFromOptions(scene.run, &scene.ledger));
     PetscCall(SbRemeshSetFromOptions(scene.model, &scene.remesh));
-    PetscCall(SbOutputSetFromOptions(scene.run));
+    PetscCall(SbOutputSetFromOptions(scene.run, command.nfile ? command.file[0] : ""));
     PetscCall(SbOptionsCheck());
     PetscCall(SbSceneCheck(scene.model));
 

@@ -25,7 +25,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   } else if (line.version) {
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple-mesh %s\n", SB_VERSION));
   } else {
-    PetscCall(SbToolSetFromOptions(argc, argv, &line, &tool));
+    PetscCall(SbToolSetFromOptions(&line, &tool));
     PetscCall(SbToolRun(&tool));
   }
   PetscCall(SbOptionsReset());

@@ -53,7 +53,7 @@ static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, 
   PetscCall(SbSceneCreate(comm, &scene->model));
   PetscCall(test_scene_run(scene));
   if (dir)
-    PetscCall(SbOutputSetFromOptions(scene->run));
+    PetscCall(SbOutputSetFromOptions(scene->run, ""));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));

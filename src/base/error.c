@@ -47,11 +47,9 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
     if ((int)n == ours[i])
       return PETSC_TRUE;
 
-  /* errors in options and option files, which PETSc raises under other codes */
-  return (PetscBool)((function && (!strncmp(function, "PetscOptionsInsert", 18) ||
-                                   !strncmp(function, "PetscOptionsStringTo", 20) ||
-                                   !strncmp(function, "PetscOptionsSetValue", 20) ||
-                                   !strcmp(function, "PetscParseLayerYAML"))));
+  // errors in options and option files, which PETSc raises under other codes
+  return (PetscBool)(function && SbHasPrefix(function, "PetscOptionsInsert PetscOptionsStringTo "
+                                                       "PetscOptionsSetValue PetscParseLayerYAML"));
 }
 
 /* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc
@@ -59,25 +57,41 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
 static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file,
                                  size_t size, char given[])
 {
-  const char *rooms[] = {"src/ksp/", "src/snes/", "src/ts/", "src/mat/", "src/vec/", "src/dm/"};
+  static const char *const rooms[] = {"src/ksp/", "src/snes/", "src/ts/",
+                                      "src/mat/", "src/vec/",  "src/dm/"};
+  static const int codes[] = {PETSC_ERR_SUP,
+                              PETSC_ERR_ARG_WRONG,
+                              PETSC_ERR_ARG_WRONGSTATE,
+                              PETSC_ERR_ARG_OUTOFRANGE,
+                              PETSC_ERR_ARG_INCOMP,
+                              PETSC_ERR_ARG_NULL,
+                              PETSC_ERR_USER,
+                              PETSC_ERR_ARG_UNKNOWN_TYPE,
+                              PETSC_ERR_MISSING_FACTOR};
   PetscBool petsc = PETSC_FALSE;
+  PetscBool choice = PETSC_FALSE;
 
+  // raised by PETSc's solvers or containers, under a code of a wrong choice
   given[0] = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rooms); i++)
-    petsc = (PetscBool)(petsc || (file && strstr(file, rooms[i])));
-  if (!petsc ||
-      (n != PETSC_ERR_SUP && n != PETSC_ERR_ARG_WRONG && n != PETSC_ERR_ARG_WRONGSTATE &&
-       n != PETSC_ERR_ARG_OUTOFRANGE && n != PETSC_ERR_ARG_INCOMP && n != PETSC_ERR_ARG_NULL &&
-       n != PETSC_ERR_USER && n != PETSC_ERR_ARG_UNKNOWN_TYPE && n != PETSC_ERR_MISSING_FACTOR))
+  for (size_t i = 0; file && i < PETSC_STATIC_ARRAY_LENGTH(rooms); i++)
+    if (strstr(file, rooms[i]))
+      petsc = PETSC_TRUE;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(codes); i++)
+    if ((int)n == codes[i])
+      choice = PETSC_TRUE;
+  if (!petsc || !choice)
     return PETSC_FALSE;
+
+  // the types that the user gave
   for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
     const char *name = SbTheOptions.user[i].name;
     const char *value = SbTheOptions.user[i].value;
     const size_t length = strlen(name);
+    const PetscBool type = (PetscBool)(length > 5 && !strcmp(name + length - 5, "_type"));
+    const PetscBool solver = (PetscBool)(strstr(name, "ksp_") || strstr(name, "pc_") ||
+                                         strstr(name, "snes_") || strstr(name, "mat_"));
 
-    if (length > 5 && !strcmp(name + length - 5, "_type") &&
-        (strstr(name, "ksp_") || strstr(name, "pc_") || strstr(name, "snes_") ||
-         strstr(name, "mat_")))
+    if (type && solver)
       SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value ? value : "");
   }
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
@@ -219,8 +233,8 @@ int SbErrorFinish(PetscErrorCode ierr)
     SPEAKER,
     FAILED
   }; /* SPEAKER, encoded: lowest rank with a user error, else with any error */
-  const int failed = ierr ? 1 : state.posted ? state.code : 0;
   int mine[2], all[2];
+  int failed = 0;
   int done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;
@@ -228,6 +242,12 @@ int SbErrorFinish(PetscErrorCode ierr)
 
   if (state.at_end)
     (*state.at_end)();
+
+  // the lowest rank that failed speaks for all
+  if (ierr)
+    failed = 1;
+  else if (state.posted)
+    failed = state.code;
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
   mine[SPEAKER] = -rank - (state.pending ? 0 : size) - (failed ? 0 : 2 * size);

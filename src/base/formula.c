@@ -22,7 +22,9 @@ static PetscReal step_of(PetscReal a)
 
 static PetscReal clamp_of(PetscReal a, PetscReal lo, PetscReal hi)
 {
-  return a < lo ? lo : (a > hi ? hi : a);
+  if (a < lo)
+    return lo;
+  return a > hi ? hi : a;
 }
 
 static PetscReal ramp_of(PetscReal a)
@@ -216,8 +218,8 @@ static PetscErrorCode expression(Parser *p, const char *operators)
 
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
-  PetscReal stack[SB_FORMULA_STACK + 2],
-    *a = stack; /* a: the last value; the first is at stack[1] */
+  PetscReal stack[SB_FORMULA_STACK + 2]; /* the first value is at stack[1] */
+  PetscReal *a = stack;                  /* the last value */
 
   if (!f->step)
     return SbFormulaEvalTable(f, t);

@@ -46,7 +46,8 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
   const char *name = strchr(where[0] == '-' ? where + 1 : where, '_');
   const int n = (int)row->count;
   const PetscBool moved = (PetscBool)!strcmp(row->key, "displacement");
-  const int length = name ? (int)(strlen(name + 1) - (moved ? strlen("_displacement") : 0)) : 0;
+  const int ending = moved ? (int)strlen("_displacement") : 0; /* left out of the names */
+  const int length = name ? (int)strlen(name + 1) - ending : 0;
 
   PetscFunctionBeginUser;
   PetscCheck(live.n + n <= VALUE_MAX && name, PETSC_COMM_SELF, PETSC_ERR_USER,
@@ -61,7 +62,10 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length,
                    name + 1, 'x' + k);
     v->unit = row->unit[0] ? row->unit : "1";
-    v->speed = moved ? &live.speed : !strcmp(row->key, "angle") ? &live.angular_speed : NULL;
+    if (moved)
+      v->speed = &live.speed;
+    else
+      v->speed = strcmp(row->key, "angle") ? NULL : &live.angular_speed;
     v->n = n;
 
     /* keep the value after re-meshing */

@@ -58,15 +58,18 @@ static void guess(const char *name, size_t size, char text[])
     const char *klass = SbTheOptions.row[i].klass;
     const size_t length = strlen(key);
     const size_t end = length > strlen(name) + 1 ? length - strlen(name) : 0;
+    const PetscBool begins = (PetscBool)!strncasecmp(key, name, n);
+    const PetscBool ends = (PetscBool)(end && key[end - 1] == '_' && !strcasecmp(key + end, name));
 
-    if (klass[0] && !strcasecmp(key, name))
-      SbFormat(size, text, "; did you mean -%s_NAME_%s?", klass, key);
-    else if (!klass[0] && more &&
-             ((length == n && !strncasecmp(key, name, n)) ||
-              (end && key[end - 1] == '_' && !strcasecmp(key + end, name))))
-      SbFormat(size, text, "; did you mean -%s?", key);
-    else if (!klass[0] && more && !strncasecmp(key, name, n) && key[n] == '_')
-      SbFormat(size, text, "; -help all lists them");
+    if (klass[0]) {
+      if (!strcasecmp(key, name))
+        SbFormat(size, text, "; did you mean -%s_NAME_%s?", klass, key);
+    } else if (more) {
+      if ((begins && length == n) || ends)
+        SbFormat(size, text, "; did you mean -%s?", key);
+      else if (begins && key[n] == '_')
+        SbFormat(size, text, "; -help all lists them");
+    }
   }
 }
 

@@ -36,6 +36,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
   const SbOption *row = r->row;
   char name[SB_OPTION_NAME_MAX];
   char number[16] = "";
+  const char *between = "";
 
   PetscFunctionBeginUser;
   full_name(r, name);
@@ -43,10 +44,11 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
   // description of the value: "3 numbers", "euler_implicit|newmark"
   if (row->count > 1)
     PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s%s%s%s", name, number,
-                                   row->kind == SB_OPTION_REALS ? "comma-separated "
-                                   : row->count > 1             ? "semicolon-separated "
-                                                                : "",
+  if (row->kind == SB_OPTION_REALS)
+    between = "comma-separated ";
+  else if (row->count > 1)
+    between = "semicolon-separated ";
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s%s%s%s", name, number, between,
                                    kinds[row->kind][0], row->count > 1 ? "s" : ""));
   if (row->range[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "",
@@ -90,12 +92,16 @@ static PetscErrorCode print_options(PetscViewer viewer, const char *topic, int l
       continue;
 
     // headline of a section: "The run", "Every body", "body: corotated"
-    if (!last || strcmp(r->klass, last->klass) || strcmp(r->type, last->type))
-      PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s%s%s%s\n",
-                                       !r->klass[0] ? "The run"
-                                       : r->type[0] ? ""
-                                                    : "Every ",
-                                       r->klass, r->type[0] ? ": " : "", r->type));
+    if (!last || strcmp(r->klass, last->klass) || strcmp(r->type, last->type)) {
+      const char *first = "";
+
+      if (!r->klass[0])
+        first = "The run";
+      else if (!r->type[0])
+        first = "Every ";
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s%s%s%s\n", first, r->klass,
+                                       r->type[0] ? ": " : "", r->type));
+    }
     PetscCall(help_row(viewer, r));
     last = r;
     (*n)++;

@@ -33,12 +33,13 @@ static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r,
                                    PetscBool with_presets)
 {
   const SbOption *row = r->row;
-  const char *mark = strpbrk(r->text, "#\"")
-                       ? "# an option file cannot hold this value; give it on the command line:\n# "
-                     : r->given || (with_presets && r->text[0]) ? ""
-                                                                : "# ";
+  const char *mark = "# ";
 
   PetscFunctionBeginUser;
+  if (strpbrk(r->text, "#\""))
+    mark = "# an option file cannot hold this value; give it on the command line:\n# ";
+  else if (r->given || (with_presets && r->text[0]))
+    mark = "";
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s%s", mark, r->name));
   PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - (int)strlen(r->name))));
   PetscCall(

@@ -24,14 +24,24 @@
 #include "effect_impl.h"
 #include "sbgeometry.h"
 
+/* What a dead load acts on. An item is a tet, a facet or a vertex of a tet. */
 typedef struct {
-  SbFormula density[3];    /* N/m^3 or Pa; of points the total force, N */
-  PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
-  PetscInt ncorner, nitem; /* 4 for tets, 3 for facets, 1 for a vertex of a cell */
-  PetscInt
-    *corner; /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
-  PetscReal
-    *around; /* [nvert] of points: six times the volume of the tets around, times their number */
+  PetscInt ncorner;                                  /* corners of an item: 4, 3 or 1 */
+  const SbPointRule *rule;                           /* integrates over an item */
+  PetscErrorCode (*list)(SbEffect e, SbSpace space); /* fills `corner` of the load */
+} Domain;
+
+typedef struct {
+  const Domain *on;
+  SbFormula density[3]; /* N/m^3 or Pa; of points the total force, N */
+  PetscReal uniform[3]; /* traction: total force, N, from set-up on per area, Pa */
+  PetscInt nitem;
+
+  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscInt *corner;
+
+  /* [nvert] of points: six times the volume of the tets around, times the number of points */
+  PetscReal *around;
   PetscInt n, *node; /* [n] owned nodes of these cells */
   PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
   PetscReal t;       /* s */
@@ -62,35 +72,138 @@ static const SbOption point_force_rows[] = {
    "amplitude: factor on the force, a formula of the time t"},
 };
 
-static PetscErrorCode options_deadload(SbEffect e, const SbScope *scope)
+/* body_force: all corners of the tets. */
+static PetscErrorCode list_tets(SbEffect e, SbSpace space)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+  PetscInt *cells = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_CELLS, &load->nitem, &cells));
+  PetscCall(PetscMalloc1(4 * load->nitem, &load->corner));
+  for (PetscInt i = 0; i < 4 * load->nitem; i++)
+    load->corner[i] = 4 * cells[i / 4] + i % 4;
+  PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* traction: the corners of the facets; a total force becomes one per area. */
+static PetscErrorCode list_facets(SbEffect e, SbSpace space)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+  SbFacet *facets = NULL;
+  PetscReal area = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFacets(space, &e->on, &load->nitem, &facets));
+  PetscCall(PetscMalloc1(3 * load->nitem, &load->corner));
+  for (PetscInt i = 0; i < load->nitem; i++) {
+    for (PetscInt a = 0; a < 3; a++)
+      load->corner[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
+    if (facets[i].cell < space->mesh->ncell_owned)
+      area += facets[i].area;
+  }
+  PetscCall(PetscFree(facets));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
+  for (int i = 0; i < 3; i++)
+    load->uniform[i] /= area;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* point_force: each corner of a tet that is one of the vertices. */
+static PetscErrorCode list_vertices(SbEffect e, SbSpace space)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+  const SbMesh mesh = space->mesh;
+  PetscInt *vertices = NULL;
+  PetscInt n;
+  PetscInt size = 0;
+  PetscReal count = 0; /* of the vertices on all ranks */
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_VERTICES, &n, &vertices));
+  for (PetscInt i = 0; i < n; i++)
+    count += vertices[i] < mesh->nvert_owned;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_REAL, MPI_SUM, space->comm));
+  PetscCall(PetscCalloc1(mesh->nvert, &load->around));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(mesh->cell[i], n, vertices, &at));
+    if (at < 0)
+      continue;
+    PetscCall(SbReserve(load->nitem + 1, sizeof(*load->corner), &size, &load->corner));
+    load->corner[load->nitem++] = i;
+    load->around[mesh->cell[i]] += SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4));
+  }
+  for (PetscInt v = 0; v < mesh->nvert; v++)
+    load->around[v] *= count;
+  PetscCall(PetscFree(vertices));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const SbPointRule at_vertex = {.n = 1, .L = {{1}}, .weight = {1}};
+static const Domain tets = {4, &SbRuleQuintic, list_tets};
+static const Domain facets = {3, &SbRuleFacet, list_facets};
+static const Domain vertices = {1, &at_vertex, list_vertices};
+
+static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+
+  PetscFunctionBeginUser;
+  load->on = &tets;
+  PetscCall(SbEffectFormulas(e, scope, "density", 3, PETSC_TRUE, load->density));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
 {
   DeadLoad *load = (DeadLoad *)e->data;
   PetscBool vector, total;
 
   PetscFunctionBeginUser;
-  load->ncorner = !strcmp(e->type, "body_force") ? 4 : !strcmp(e->type, "traction") ? 3 : 1;
-  if (load->ncorner == 3) {
-    PetscCall(SbOptionGiven(scope, "vector", &vector));
-    PetscCall(SbOptionGiven(scope, "total", &total));
-    PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, "
-               "three numbers)",
-               e->name, e->name, e->name);
-  }
-  PetscCall(SbEffectFormulas(e, scope, load->ncorner == 4 ? "density" : "vector", 3,
-                             (PetscBool)(load->ncorner > 1), load->density));
-  if (load->ncorner == 3)
-    PetscCall(SbOptionReals(scope, "total", load->uniform));
+  load->on = &facets;
+  PetscCall(SbOptionGiven(scope, "vector", &vector));
+  PetscCall(SbOptionGiven(scope, "total", &total));
+  PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, "
+             "three numbers)",
+             e->name, e->name, e->name);
+  PetscCall(SbEffectFormulas(e, scope, "vector", 3, PETSC_TRUE, load->density));
+  PetscCall(SbOptionReals(scope, "total", load->uniform));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+
+  PetscFunctionBeginUser;
+  load->on = &vertices;
+  PetscCall(SbEffectFormulas(e, scope, "vector", 3, PETSC_FALSE, load->density));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Volume or area of a simplex with these edges from its first corner; 1 for a vertex. */
+static PetscReal measure_of(PetscInt ncorner, const PetscReal e[3][3])
+{
+  PetscReal normal[3];
+
+  if (ncorner == 1)
+    return 1;
+  SbCross(e[0], e[1], normal);
+  if (ncorner == 3)
+    return PetscSqrtReal(SbDot3(normal, normal)) / 2;
+  return PetscAbsReal(SbDot3(normal, e[2])) / 6;
 }
 
 /* value = the load at time t. */
 static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
 {
   const SbMesh mesh = space->mesh;
-  const PetscInt nc = load->ncorner;
-  const SbPointRule vertex = {.n = 1, .L = {{1}}, .weight = {1}};
-  const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : nc == 3 ? &SbRuleFacet : &vertex;
+  const PetscInt nc = load->on->ncorner;
+  const SbPointRule *rule = load->on->rule;
 
   load->t = t;
   for (PetscInt i = 0; i < 3 * space->nnode; i++)
@@ -99,14 +212,15 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
     const PetscInt *corner = &load->corner[nc * item];
     const PetscInt cell = corner[0] / 4;
     const PetscBool curved = (PetscBool)(mesh->cell_set[cell] & SB_CURVED);
-    const PetscReal part = /* of a vertex in the cell */
-      nc > 1
-        ? 1
-        : SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
     PetscReal nodes[SB_CELL_NODES][3], x[4][3];
     PetscReal e[3][3] = {{0}};
-    PetscReal normal[3];
+    PetscReal part = 1;
 
+    // the part of a vertex's force that goes to this cell
+    if (load->around)
+      part = SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
+
+    // vertices of the cell
     if (curved)
       SbSpaceCellPositions(space, cell, nodes);
     for (int k = 0; k < 12; k++)
@@ -118,21 +232,21 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
       PetscReal q[3], measure;
       PetscInt n;
 
+      // basis functions and rest position at the point
       for (PetscInt c = 0; c < nc; c++)
         L[corner[c] % 4] = rule->L[k][c];
       n = SbCellBasis(SbSpaceCellElement(space, cell), L, phi);
       for (PetscInt a = 0; a < 3 * n; a++)
         p[a % 3] += phi[a / 3] * space->node_x[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3];
 
-      /* volume or area of the simplex with the derivatives of the map at the point */
+      // volume or area of the simplex with the derivatives of the map at the point
       if (curved)
         SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
       for (PetscInt c = 1; c < nc; c++)
         SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
-      SbCross(e[0], e[1], normal);
-      measure = nc == 4   ? PetscAbsReal(SbDot3(normal, e[2])) / 6
-                : nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2
-                          : part;
+      measure = part * measure_of(nc, (const PetscReal(*)[3])e);
+
+      // the load there, spread over the nodes
       for (int i = 0; i < 3; i++)
         q[i] =
           measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
@@ -145,61 +259,19 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
 static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 {
   DeadLoad *load = (DeadLoad *)e->data;
-  const SbMesh mesh = space->mesh;
-  const PetscInt nc = load->ncorner;
   PetscBool steady = PETSC_TRUE;
   PetscBool *touched;
-  PetscReal total = 0; /* area of the facets, or number of the vertices */
-  PetscInt n;
-  PetscInt size = 0;
-  PetscInt *items = NULL;
-  SbFacet *facets = NULL;
 
   PetscFunctionBeginUser;
-  if (nc == 3)
-    PetscCall(SbEffectFacets(space, &e->on, &n, &facets));
-  else
-    PetscCall(SbEffectItems(space, &e->on, nc == 4 ? SB_ON_CELLS : SB_ON_VERTICES, &n, &items));
-  if (nc == 1) {
-    PetscCall(PetscCalloc1(mesh->nvert, &load->around));
-    for (PetscInt i = 0; i < n; i++)
-      total += items[i] < mesh->nvert_owned;
-    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-      PetscInt at;
+  PetscCall((*load->on->list)(e, space));
 
-      PetscCall(PetscFindInt(mesh->cell[i], n, items, &at));
-      if (at < 0)
-        continue;
-      PetscCall(SbReserve(load->nitem + 1, sizeof(*load->corner), &size, &load->corner));
-      load->corner[load->nitem++] = i;
-      load->around[mesh->cell[i]] += SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4));
-    }
-  } else {
-    load->nitem = n;
-    PetscCall(PetscMalloc1(nc * n, &load->corner));
-    for (PetscInt i = 0; i < n; i++) {
-      for (PetscInt a = 0; a < nc; a++)
-        load->corner[nc * i + a] =
-          nc == 4 ? 4 * items[i] + a : 4 * facets[i].cell + facets[i].corner[a];
-      if (nc == 3 && facets[i].cell < mesh->ncell_owned)
-        total += facets[i].area;
-    }
-  }
-  PetscCall(PetscFree(items));
-  PetscCall(PetscFree(facets));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3 && nc == 3; i++)
-    load->uniform[i] /= total;
-  for (PetscInt v = 0; v < mesh->nvert && nc == 1; v++)
-    load->around[v] *= total;
-
-  /* the owned nodes of these cells: a load on few costs little in a large mesh */
+  // the owned nodes of these cells: a load on few costs little in a large mesh
   PetscCall(PetscCalloc1(space->nnode, &touched));
   for (PetscInt i = 0; i < load->nitem; i++) {
-    const PetscInt cell = load->corner[nc * i] / 4;
+    const PetscInt cell = load->corner[load->on->ncorner * i] / 4;
+    const PetscInt n = SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4;
 
-    for (PetscInt a = 0; a < (SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4);
-         a++)
+    for (PetscInt a = 0; a < n; a++)
       touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
   }
   for (PetscInt i = 0; i < space->nnode_owned; i++)
@@ -210,7 +282,7 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
       load->node[--k] = i;
   PetscCall(PetscFree(touched));
 
-  /* a steady load is integrated once */
+  // a steady load is integrated once
   PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
   for (int i = 0; i < 3; i++)
@@ -255,7 +327,7 @@ const SbEffectType SbEffectBodyForce = {
   .size = sizeof(DeadLoad),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(body_force_rows),
   .row = body_force_rows,
-  .ops = {.setfromoptions = options_deadload,
+  .ops = {.setfromoptions = options_body_force,
           .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},
@@ -266,7 +338,7 @@ const SbEffectType SbEffectTraction = {
   .size = sizeof(DeadLoad),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(traction_rows),
   .row = traction_rows,
-  .ops = {.setfromoptions = options_deadload,
+  .ops = {.setfromoptions = options_traction,
           .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},
@@ -277,7 +349,7 @@ const SbEffectType SbEffectPointForce = {
   .size = sizeof(DeadLoad),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(point_force_rows),
   .row = point_force_rows,
-  .ops = {.setfromoptions = options_deadload,
+  .ops = {.setfromoptions = options_point_force,
           .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},

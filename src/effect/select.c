@@ -32,13 +32,15 @@ static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, SbOnKind ki
   *mask = 0;
   for (PetscInt i = 0; i < on->n; i++) {
     const SbSet *set;
+    PetscInt found;
 
     PetscCall(SbSpaceFindSet(space, on->name[i], on->option, &k[i]));
     set = &space->mesh->set[k[i]];
-    PetscCheck(kind == SB_ON_CELLS    ? set->ncell
-               : kind == SB_ON_FACETS ? set->nfacet
-                                      : set->nvert,
-               space->comm, PETSC_ERR_USER_INPUT,
+    if (kind == SB_ON_CELLS)
+      found = set->ncell;
+    else
+      found = kind == SB_ON_FACETS ? set->nfacet : set->nvert;
+    PetscCheck(found, space->comm, PETSC_ERR_USER_INPUT,
                "%s: set %s selects no %s (%" PetscInt_FMT " vertices, %" PetscInt_FMT
                " boundary facets, %" PetscInt_FMT " tetrahedra): %s",
                on->option, set->name, need[kind], set->nvert, set->nfacet, set->ncell, hint[kind]);

@@ -203,5 +203,7 @@ PetscReal SbQuadraticMass(int a, int b)
     return low == e[0] || low == e[1] ? -1. / 105 : -1. / 70;
   const int *d = SbTetEdge[low - 4];
   const int shared = (d[0] == e[0]) + (d[0] == e[1]) + (d[1] == e[0]) + (d[1] == e[1]);
-  return shared == 2 ? 8. / 105 : shared ? 4. / 105 : 2. / 105;
+  if (shared == 2)
+    return 8. / 105;
+  return shared ? 4. / 105 : 2. / 105;
 }

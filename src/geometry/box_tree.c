@@ -278,7 +278,13 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
         const PetscReal above = group[k][l] - nearest->box[3 + k];
         const PetscReal below = nearest->box[k] - group[3 + k][l];
 
-        d2[l] += !(above <= 0) ? above * above : !(below <= 0) ? below * below : 0;
+        PetscReal gap = 0;
+
+        if (!(above <= 0))
+          gap = above;
+        else if (!(below <= 0))
+          gap = below;
+        d2[l] += gap * gap;
       }
     }
 

@@ -49,7 +49,12 @@ static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *con
     w[k] = 1 - t;
     w[l] = t;
     w[(k + 2) % 3] = 0;
-    place = (SbTriangleFeature)(t <= 0 ? k : t >= 1 ? l : SB_FEATURE_EDGE_0 + k);
+    if (t <= 0)
+      place = (SbTriangleFeature)k;
+    else if (t >= 1)
+      place = (SbTriangleFeature)l;
+    else
+      place = (SbTriangleFeature)(SB_FEATURE_EDGE_0 + k);
   }
   return place;
 }

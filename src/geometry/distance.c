@@ -43,7 +43,10 @@ static inline void try_edge(const PetscReal x[], int vertex, int a, int b, Petsc
   SbSubtract(x + 3 * vertex, x + 3 * a, r);
   ee = SbDot3(e, e);
   er = SbDot3(e, r);
-  t = er <= 0 ? 0 : er >= ee ? 1 : er / ee;
+  if (er <= 0)
+    t = 0;
+  else
+    t = er >= ee ? 1 : er / ee;
 
   // relative to the nearer endpoint, for accuracy
   if (t > 0.5)
@@ -102,9 +105,12 @@ static inline void vertex_triangle(const PetscReal x[], SbDistance *s)
     s->weight[1 + a] = -w[a];
     s->mask |= (w[a] != 0 || feature == SB_FEATURE_FACE) << (1 + a);
   }
-  s->feature = feature == SB_FEATURE_FACE                     ? SB_PAIR_VERTEX_TRIANGLE
-               : (w[0] != 0) + (w[1] != 0) + (w[2] != 0) == 2 ? SB_PAIR_VERTEX_EDGE
-                                                              : SB_PAIR_VERTEX_VERTEX;
+  if (feature == SB_FEATURE_FACE)
+    s->feature = SB_PAIR_VERTEX_TRIANGLE;
+  else if ((w[0] != 0) + (w[1] != 0) + (w[2] != 0) == 2)
+    s->feature = SB_PAIR_VERTEX_EDGE;
+  else
+    s->feature = SB_PAIR_VERTEX_VERTEX;
   for (int k = 0; k < 3; k++)
     s->n[k] = w[0] * r[0][k] + w[1] * r[1][k] + w[2] * r[2][k];
   if (feature != SB_FEATURE_FACE) {
@@ -261,12 +267,12 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   const PetscReal a = factor[0];
   const PetscReal b = factor[1];
   const PetscReal size = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
-  const int least = PetscAbsReal(n[0]) < PetscAbsReal(n[1])
-                      ? (PetscAbsReal(n[0]) < PetscAbsReal(n[2]) ? 0 : 2)
-                      : (PetscAbsReal(n[1]) < PetscAbsReal(n[2]) ? 1 : 2);
+  int least = PetscAbsReal(n[0]) < PetscAbsReal(n[1]) ? 0 : 1;
   PetscReal c[4][3], m[2][3], along[4][2], alpha[3], C[3][2], K[25], bend[2];
 
   // two directions m orthogonal to n; components of c_a along them
+  if (!(PetscAbsReal(n[least]) < PetscAbsReal(n[2])))
+    least = 2;
   point_derivatives(x, s, c);
   for (int k = 0; k < 3; k++)
     m[0][k] = (k == least) - n[least] * n[k];
@@ -364,6 +370,7 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
   for (int a = 0; H && a < 4; a++) {
     const PetscReal *e = a / 2 ? v : u;
     const PetscReal *f = a / 2 ? u : v;
+    const PetscReal ff = a / 2 ? uu : vv;
 
     for (int b = 0; b < 4; b++) {
       const PetscReal sign = a % 2 == b % 2 ? 1 : -1;
@@ -371,7 +378,7 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
       for (int p = 0; p < 3; p++) {
         for (int q = 0; q < 3; q++) {
           const PetscReal dd = a / 2 != b / 2 ? 2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv
-                                              : (p == q) * (a / 2 ? uu : vv) - f[p] * f[q];
+                                              : (p == q) * ff - f[p] * f[q];
 
           H[12 * (3 * a + p) + 3 * b + q] = sign * (2 * dd);
         }

@@ -14,7 +14,7 @@
 
 static int sign_of(long double value, long double bound)
 {
-  return value > bound ? 1 : value < -bound ? -1 : 0;
+  return (value > bound) - (value < -bound);
 }
 
 static int orient_long(const PetscReal a[3], const PetscReal b[3], const PetscReal c[3],
@@ -110,9 +110,12 @@ static PetscBool segments_meet(const int axis[2], const PetscReal a[3], const Pe
   const int cda = orient_plane(axis, c, d, a);
   const int cdb = orient_plane(axis, c, d, b);
 
-  return (PetscBool)((abc * abd < 0 && cda * cdb < 0) || (!abc && between(axis, a, b, c)) ||
-                     (!abd && between(axis, a, b, d)) || (!cda && between(axis, c, d, a)) ||
-                     (!cdb && between(axis, c, d, b)));
+  if (abc * abd < 0 && cda * cdb < 0)
+    return PETSC_TRUE;
+
+  // an endpoint of one on the other
+  return (PetscBool)((!abc && between(axis, a, b, c)) || (!abd && between(axis, a, b, d)) ||
+                     (!cda && between(axis, c, d, a)) || (!cdb && between(axis, c, d, b)));
 }
 
 /* Whether a segment and a triangle in one plane intersect. */
@@ -169,7 +172,8 @@ PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const Petsc
 {
   const PetscInt *v[2] = {a, b};
   PetscReal const *c[2][3];
-  int ncommon = 0, own[2] = {3, 3}; /* with two common corners: position of the third one */
+  int ncommon = 0;
+  int own[2] = {3, 3}; /* with two common corners: position of the third one */
   int common[2] = {0, 0};
 
   for (int i = 0; i < 3; i++) {

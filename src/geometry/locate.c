@@ -199,8 +199,12 @@ PetscReal SbLocatorFind(SbLocator l, const PetscReal p[3], PetscInt *cell, Petsc
     }
     if (d2 > nearest.limit2)
       continue;
-    if (*cell >= 0 && d2 == nearest.limit2 && (depth < deepest || (depth == deepest && c > *cell)))
-      continue;
+
+    // of equally near ones the deepest, of equally deep ones the first
+    if (*cell >= 0 && d2 == nearest.limit2) {
+      if (depth < deepest || (depth == deepest && c > *cell))
+        continue;
+    }
     nearest.limit2 = d2;
     deepest = depth;
     *cell = c;

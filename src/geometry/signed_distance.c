@@ -118,6 +118,9 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
   sign = SbDot3(pseudo, r) < 0 ? -1 : 1;
   length = PetscSqrtReal(SbDot3(pseudo, pseudo));
   for (int i = 0; i < 3; i++)
-    n[i] = d > s->touch ? sign * r[i] / d : length > 0 ? pseudo[i] / length : face[i];
+    if (d > s->touch)
+      n[i] = sign * r[i] / d;
+    else
+      n[i] = length > 0 ? pseudo[i] / length : face[i];
   return sign * d;
 }

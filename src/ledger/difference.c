@@ -52,14 +52,17 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   const SbRun run = l->run;
   const Vec moved = l->w[1];
   PetscReal mass;
+  PetscBool sum;
   Vec R;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(D, &R));
-  if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
-      !run->model->space->consistent_mass) {
-    /* the last tangent, where it is a matrix K + shift M of the free unknowns with the lumped
-       mass */
+
+  // whether the last tangent is a matrix K + shift M of the free unknowns with the lumped mass
+  sum = (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->solver_used->matrix_free);
+  if (run->damped || run->model->space->consistent_mass)
+    sum = PETSC_FALSE;
+  if (sum) {
     PetscCall(VecCopy(D, moved));
     PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
     PetscCall(MatMult(run->J, moved, R));

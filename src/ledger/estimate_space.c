@@ -287,8 +287,13 @@ static PetscErrorCode create_quadratic(SbRecovery r)
     for (int which = 0; which < 2; which++) {
       PetscReal *A = r->factor[s][which];
 
-      for (int k = 1; k < NFIT; k++)
-        A[(NFIT + 1) * k] += (k >= 4 ? RIDGE_SECOND : which ? RIDGE_SLOPE : 1e-12) * A[0];
+      for (int k = 1; k < NFIT; k++) {
+        PetscReal ridge = which ? RIDGE_SLOPE : 1e-12;
+
+        if (k >= 4)
+          ridge = RIDGE_SECOND;
+        A[(NFIT + 1) * k] += ridge * A[0];
+      }
       LAPACKpotrf_("L", &order, A, &order, &info);
       PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "The sums at a vertex are not definite: %d",
                  (int)info);

@@ -148,11 +148,19 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
   const PetscInt *nodes = m->element[body]->nodes_per;
   const SbMaterial law = m->material[body];
   const PetscReal r = l->error[SB_ERROR_SPACE] / PetscSqrtReal(l->stored);
-  const PetscReal times = (nodes[0] ? 14. : nodes[2] ? 0.9 : 0.45) * r * PetscSqrtReal(r);
+  PetscReal c = 0.45; /* bytes of P2 over those of DG */
+  PetscReal times;
 
   /* not for P2 itself, nor for explicit runs, whose steps the smallest distance of nodes bounds */
   if (nodes[1] || !l->run->J)
     return;
+
+  // the time that P2 takes, over that of now
+  if (nodes[0])
+    c = 14.;
+  else if (nodes[2])
+    c = 0.9;
+  times = c * r * PetscSqrtReal(r);
 
   /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
   if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * SbMaterialShearModulus(law)) {

@@ -57,7 +57,9 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
   const char *sides = text + strlen("box:");
   const char *colon = strchr(sides, ':');
   char lengths[PETSC_MAX_PATH_LEN];
-  PetscReal l[3], ncell[3], total = 6; /* side lengths, m */
+  PetscReal l[3]; /* side lengths, m */
+  PetscReal ncell[3];
+  PetscReal total = 6;
   int count;
 
   PetscFunctionBeginUser;

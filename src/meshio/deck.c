@@ -55,12 +55,14 @@ PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, PetscInt other, int64_t f
 {
   SbDeckSet *s = &d->set[set];
   SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
+  const PetscBool labels = (PetscBool)(other < 0 && step == 1);
+  const PetscBool follows =
+    (PetscBool)(before && before->set < 0 && before->step == 1 && first == before->last + 1);
 
   PetscFunctionBeginUser;
 
   /* merge consecutive labels into one range, unless messages need the line of each label */
-  if (before && !d->strict && other < 0 && before->set < 0 && before->step == 1 && step == 1 &&
-      first == before->last + 1)
+  if (labels && follows && !d->strict)
     before->last = last;
   else {
     PetscCall(SbImportGrow(d->im, &s->nrange, sizeof(*s->range), &s->range));
@@ -141,7 +143,8 @@ PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
 PetscErrorCode SbDeckBuild(SbDeck *d)
 {
   SbImport *im = d->im;
-  PetscInt *point = NULL, group; /* [nvert] item of each node that is in a set, -1: none */
+  PetscInt *point = NULL; /* [nvert] item of each node that is in a set, -1: none */
+  PetscInt group;
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));

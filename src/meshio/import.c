@@ -167,6 +167,18 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether two copies come from the same file, read in the same way. memcmp(): padding is 0. */
+static PetscBool same_source(const SbBody *a, const SbBody *b)
+{
+  if (strcmp(a->copy_of, b->copy_of) || strcmp(a->mesh, b->mesh))
+    return PETSC_FALSE;
+  if (a->mesh_step != b->mesh_step || a->scale != b->scale)
+    return PETSC_FALSE;
+
+  // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
+  return (PetscBool)!memcmp(&a->tet, &b->tet, sizeof(b->tet));
+}
+
 PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared,
                                 SbImport *im)
 {
@@ -176,12 +188,8 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first copy of a body keeps the unplaced mesh for the next ones; memcmp(): padding is 0 */
-  // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
-  if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) ||
-      strcmp(before->mesh, body->mesh) || before->mesh_step != body->mesh_step ||
-      memcmp(&before->tet, &body->tet, sizeof(body->tet)) || before->scale != body->scale) {
-    // NOLINTEND(bugprone-suspicious-memory-comparison)
+  /* the first copy of a body keeps the unplaced mesh for the next ones */
+  if (!shared->x || !before || !same_source(before, body)) {
     PetscCall(SbImportDestroy(shared));
     PetscCall(read_body(body, shared));
   }

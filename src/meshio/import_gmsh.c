@@ -241,7 +241,8 @@ static PetscErrorCode read_elements(Gmsh *g)
   int64_t nnode;
   int64_t last_tag = 0;
   int64_t last_dim = -1;
-  PetscInt tags, last_tags = 0; /* of the last group: usually that of the next element too */
+  PetscInt tags;
+  PetscInt last_tags = 0; /* of the last group: usually that of the next element too */
 
   PetscFunctionBeginUser;
   PetscCall(read_totals(g, "number of elements", &nblock, &total));
@@ -358,7 +359,12 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
       s->binary = g.binary;
       if (elements && !im->x)
         SB_SCAN_ERROR(s, "section %s before the nodes", name);
-      PetscCall((nodes ? read_nodes : elements ? read_elements : read_entities)(&g));
+      if (nodes)
+        PetscCall(read_nodes(&g));
+      else if (elements)
+        PetscCall(read_elements(&g));
+      else
+        PetscCall(read_entities(&g));
       s->binary = PETSC_FALSE;
     } else if (!strcmp(name, "$PartitionedEntities"))
       SB_SCAN_ERROR(

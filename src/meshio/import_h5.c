@@ -75,6 +75,7 @@ static PetscErrorCode open_array(const File *f, Array *a)
   hid_t space, plist;
   int ndim;
   PetscBool packed;
+  const char *holds = "texts of one length";
   double want;
   char path[256];
 
@@ -94,12 +95,13 @@ static PetscErrorCode open_array(const File *f, Array *a)
   packed = (PetscBool)(plist >= 0 && H5Pget_nfilters(plist) > 0);
   if (plist >= 0)
     (void)H5Pclose(plist);
+  if (a->klass == H5T_FLOAT)
+    holds = "real numbers";
+  else if (a->klass == H5T_INTEGER)
+    holds = "whole numbers";
   if (H5Tget_class(a->type) != a->klass ||
       (a->klass == H5T_STRING && H5Tis_variable_str(a->type) > 0))
-    H5_ERROR(f, "%s does not hold %s", a->name,
-             a->klass == H5T_FLOAT     ? "real numbers"
-             : a->klass == H5T_INTEGER ? "whole numbers"
-                                       : "texts of one length");
+    H5_ERROR(f, "%s does not hold %s", a->name, holds);
   if ((ndim != 1 && ndim != 2) || size[1] != a->ncomp)
     H5_ERROR(f, "%s has %d dimensions and %llu columns; expected %llu columns", a->name, ndim,
              (unsigned long long)size[1], (unsigned long long)a->ncomp);
@@ -129,15 +131,17 @@ static PetscErrorCode open_array(const File *f, Array *a)
 /* Reads the rows of an open array; an error names the position of a value out of range. */
 static PetscErrorCode read_values(const File *f, const Array *a, void *values)
 {
-  const hid_t whole = a->bound >= 0 && sizeof(PetscInt) == 4 ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;
-  const hid_t type = a->klass == H5T_FLOAT     ? H5T_NATIVE_DOUBLE
-                     : a->klass == H5T_INTEGER ? whole
-                                               : a->type;
+  const PetscBool number = (PetscBool)(a->bound >= 0 && sizeof(PetscInt) == 4);
+  hid_t type = a->type;
   const hsize_t first[2] = {(hsize_t)a->rows.first, 0};
   const hsize_t n[2] = {a->n, a->ncomp};
   herr_t status = 0;
 
   PetscFunctionBeginUser;
+  if (a->klass == H5T_FLOAT)
+    type = H5T_NATIVE_DOUBLE;
+  else if (a->klass == H5T_INTEGER)
+    type = number ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;
   if (a->n) {
     const hid_t in_file = H5Dget_space(a->set);
     const hid_t in_memory = H5Screate_simple(H5Sget_simple_extent_ndims(in_file), n, NULL);

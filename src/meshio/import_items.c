@@ -132,6 +132,8 @@ PetscErrorCode SbItemsFree(SbItems *item)
 PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number)
 {
+  PetscBool keep = PETSC_FALSE;
+
   PetscFunctionBeginUser;
   im->count[type]++;
   if (type == SB_GMSH_TET10) {
@@ -142,8 +144,15 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
     type = SB_GMSH_LINE;
   if (type == SB_GMSH_TRIANGLE6 && !im->surface)
     type = SB_GMSH_TRIANGLE;
-  if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && im->surface) ||
-      (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
+
+  // what the mesh is made of, and lower items that are in groups
+  if (type == SB_GMSH_TET)
+    keep = PETSC_TRUE;
+  else if (type == SB_GMSH_TRIANGLE)
+    keep = (PetscBool)(im->surface || tags);
+  else if (type == SB_GMSH_POINT || type == SB_GMSH_LINE)
+    keep = (PetscBool)(tags != 0);
+  if (keep)
     PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -252,7 +252,9 @@ static PetscErrorCode read_grid(Nastran *b)
     size_t n = 0;
 
     for (const char *p = word; *p && n < WORD; p++) {
-      if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
+      const PetscBool sign = (PetscBool)(*p == '-' || *p == '+');
+
+      if (sign && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
         full[n++] = 'E';
       full[n++] = *p == 'D' || *p == 'd' ? 'E' : *p;
     }
@@ -278,6 +280,8 @@ static const struct {
 static PetscErrorCode read_element(Nastran *b, int kind)
 {
   SbDeckElement e = {.property = 0, .at = b->scan->token};
+  const PetscBool quadratic = (PetscBool)(kinds[kind].linear != kinds[kind].higher);
+  const PetscBool tet = (PetscBool)(kinds[kind].higher == SB_GMSH_TET10);
   PetscBool more = PETSC_FALSE;
   int64_t node;
 
@@ -294,15 +298,16 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   }
 
   /* edge nodes; the last fields of shells and lines have other meanings */
-  for (int k = 4; b->next < b->nfield.n && kinds[kind].linear != kinds[kind].higher &&
-                  (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
-       k++) {
-    const char *word = next_field(b);
+  for (int k = 4; quadratic && b->next < b->nfield.n; k++) {
+    const char *word;
 
+    if (more && (!tet || k >= 10))
+      break;
+    word = next_field(b);
     if (!word[0] || word[0] == '+' || strchr(word, '.'))
       continue;
     more = PETSC_TRUE;
-    if (kinds[kind].higher == SB_GMSH_TET10)
+    if (tet)
       PetscCall(to_number(b, word, "node of an element", &e.node[PetscMin(k, 9)]));
   }
   e.type = more ? kinds[kind].higher : kinds[kind].linear;

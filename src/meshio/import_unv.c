@@ -65,9 +65,11 @@ static PetscErrorCode read_element(SbDeck *d)
   dim = SbGmshTypes[e.type].dim;
   for (int64_t k = 0; k < n; k++) {
     const PetscBool quadratic = (PetscBool)(SbGmshIsSimplex(e.type) && n > dim + 1);
+    int64_t *node = &other;
 
-    PetscCall(SbScanText(s, "node of an element",
-                         k < 10 ? &e.node[quadratic ? around[dim][k] : k] : &other));
+    if (k < 10)
+      node = &e.node[quadratic ? around[dim][k] : k];
+    PetscCall(SbScanText(s, "node of an element", node));
     if (!k)
       e.at = s->token;
   }

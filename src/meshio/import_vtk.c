@@ -228,6 +228,7 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   Vtk v = {.scan = s, .im = im};
+  const char *missing = NULL;
   char name[32], word[32], kind[32];
 
   PetscFunctionBeginUser;
@@ -250,11 +251,15 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
   while (SbScanWord(s, sizeof(name), name))
     PetscCall(read_section(&v, name));
-  if (!im->x || !v.cells_at || !v.grid.type)
+  if (!im->x)
+    missing = "POINTS, with at least one,";
+  else if (!v.cells_at)
+    missing = "CELLS";
+  else if (!v.grid.type)
+    missing = "CELL_TYPES";
+  if (missing)
     SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
-                  !im->x        ? "POINTS, with at least one,"
-                  : !v.cells_at ? "CELLS"
-                                : "CELL_TYPES");
+                  missing);
   s->token = v.cells_at;
   PetscCall(SbVtkGridFill(&v.grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -162,14 +162,19 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   size_t *packed = NULL;
   size_t at = 0;
   unsigned char *in = NULL;
+  PetscBool small;
 
   PetscFunctionBeginUser;
   PetscCall(take_length(v, b, name, &nblock));
   PetscCall(take_length(v, b, name, &size));
   PetscCall(take_length(v, b, name, &last));
   full = nblock - (nblock && last);
-  if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
-      full * size + (nblock ? last : 0) != want)
+
+  // bounds first, so that the sum cannot overflow
+  small = (PetscBool)(nblock <= (size_t)(b->end - b->at) && last <= want);
+  if (size && full > want / size)
+    small = PETSC_FALSE;
+  if (!small || full * size + (nblock ? last : 0) != want)
     SB_SCAN_ERROR(
       v->scan, "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all",
       name, nblock, size, last, want);
@@ -201,21 +206,25 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   SbScan part;
   SbNumberType type;
   Bytes b = {.at = tag.close, .end = s->end, .text = PETSC_TRUE};
+  static const char *const kinds[] = {"Int", "UInt", "Float"};
+  static const char letters[] = "iuf";
   char format[16], name[64], kind[32];
-  PetscBool text;
+  PetscBool text, sized;
   size_t want, length;
   int64_t offset, room;
 
   PetscFunctionBeginUser;
   s->token = tag.open;
   attribute(tag, "type", sizeof(kind), kind);
-  type.kind = !strncmp(kind, "Int", 3)     ? 'i'
-              : !strncmp(kind, "UInt", 4)  ? 'u'
-              : !strncmp(kind, "Float", 5) ? 'f'
-                                           : 0;
+  type.kind = 0;
+  for (int i = 0; i < 3; i++)
+    if (!strncmp(kind, kinds[i], strlen(kinds[i])))
+      type.kind = letters[i];
   type.size = atoi(kind + strcspn(kind, "0123456789")) / 8;
-  if (!type.kind || (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8) ||
-      (type.kind == 'f' && type.size < 4))
+  sized = (PetscBool)(type.size == 4 || type.size == 8);
+  if (type.kind != 'f' && (type.size == 1 || type.size == 2))
+    sized = PETSC_TRUE;
+  if (!type.kind || !sized)
     SB_SCAN_ERROR(s, "an array of type '%s'; expected one as Float64 or Int32", kind);
   attribute(tag, "format", sizeof(format), format);
   attribute(tag, "Name", sizeof(name), name);
@@ -235,7 +244,10 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   } else
     SB_SCAN_ERROR(s, "an array of format '%s'; expected ascii, binary or appended", format);
   text = (PetscBool)(!format[0] || !strcmp(format, "ascii"));
-  room = text ? (b.end - b.at) / 2 + 1 : (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
+  if (text)
+    room = (b.end - b.at) / 2 + 1;
+  else
+    room = (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
   if (n > room)
     SB_SCAN_ERROR(
       s, "array '%s' should hold %lld numbers, which is more than the file can contain there", name,

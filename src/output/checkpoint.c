@@ -36,8 +36,8 @@ typedef struct {
 static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
 {
   const SbModel m = run->model;
-  const PetscBool remember = (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 &&
-                                         m->space->jump && !m->space->linear);
+  const PetscBool implicit = (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2);
+  const PetscBool remember = (PetscBool)(implicit && m->space->jump && !m->space->linear);
   const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->U},
                            {"v", "SI", NULL, &out->node, 3, 1, run->V},
                            {"a", "SI", NULL, &out->node, 3, 2, run->A},
@@ -230,6 +230,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbH5 h;
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN];
   char message[SB_MESSAGE_MAX] = "";
+  PetscBool due = PETSC_FALSE;
   uint64_t checksum;
   Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
   Number number[NNUMBER];
@@ -238,10 +239,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* whether this step is to be written: by time, by number, as the last one, or because the run
      stops */
-  if (step->step == run->step0 ||
-      !(run->stopped || (step->last && asked) ||
-        (out->checkpoint_every > 0. && SbOutputDue(out->checkpoint_every, step->t, step->dt)) ||
-        (out->checkpoint_every_steps && step->step % out->checkpoint_every_steps == 0)))
+  if (out->checkpoint_every > 0.)
+    due = SbOutputDue(out->checkpoint_every, step->t, step->dt);
+  if (out->checkpoint_every_steps && step->step % out->checkpoint_every_steps == 0)
+    due = PETSC_TRUE;
+  if ((step->last && asked) || run->stopped)
+    due = PETSC_TRUE;
+  if (step->step == run->step0 || !due)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   PetscCall(SbOutputOrder(run, out));

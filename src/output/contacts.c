@@ -104,9 +104,8 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
     const int ncomp = table[k].ncomp;
-    const hid_t type = table[k].whole ? H5T_STD_I32LE
-                       : out->precise ? H5T_IEEE_F64LE
-                                      : H5T_IEEE_F32LE;
+    const hid_t real = out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+    const hid_t type = table[k].whole ? H5T_STD_I32LE : real;
 
     /* this rank's rows, as numbers of the file */
     for (PetscInt i = 0; i < c->share.n * ncomp; i++) {

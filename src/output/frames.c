@@ -120,11 +120,12 @@ static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
     PetscReal *number = fr->owned + wide * c;
     const PetscBool ten_nodes = (PetscBool)(wide > 4 && SbSpaceCellNode(s, c, 4) >= 0);
 
-    for (PetscInt a = 0; a < wide; a++)
-      number[a] = a < 4 ? (PetscReal)mesh->vert_orig[mesh->cell[4 * c + a]]
-                  : ten_nodes && a < SB_CELL_NODES
-                    ? (PetscReal)out->edge_number[SbSpaceCellNode(s, c, a)]
-                    : -1.;
+    for (PetscInt a = 0; a < 4; a++)
+      number[a] = (PetscReal)mesh->vert_orig[mesh->cell[4 * c + a]];
+    for (PetscInt a = 4; a < wide; a++)
+      number[a] = -1.;
+    for (PetscInt a = 4; ten_nodes && a < SB_CELL_NODES; a++)
+      number[a] = (PetscReal)out->edge_number[SbSpaceCellNode(s, c, a)];
     if (ten_nodes && !out->quadratic)
       number[SB_CELL_NODES] = best_diagonal(s, c);
   }
@@ -139,8 +140,10 @@ static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
     const int cut = out->split && out->split[i];
     int32_t point[SB_CELL_NODES];
 
-    for (int a = 0; a < SB_CELL_NODES; a++)
-      point[a] = a >= n ? -1 : out->discontinuous ? first + a : (int32_t)number[a];
+    for (int a = 0; a < n; a++)
+      point[a] = out->discontinuous ? first + a : (int32_t)number[a];
+    for (int a = n; a < SB_CELL_NODES; a++)
+      point[a] = -1;
     first += n;
     for (int a = 0; a < SB_CELL_NODES && wide > 4; a++)
       ten[SB_CELL_NODES * i + a] = point[to_vtk[a]];
@@ -184,10 +187,14 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
         PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
     for (PetscInt i = 0; i < (cell ? mesh->ncell_owned : out->point.nowned); i++) {
       const SbPlace at = cell ? (SbPlace){-1, -1, -1} : SbPointsPlace(run, out, i);
-      const uint64_t sets = cell           ? mesh->cell_set[i]
-                            : at.node >= 0 ? run->model->space->node_set[at.node]
-                                           : mesh->vert_set[at.vertex];
+      uint64_t sets;
 
+      if (cell)
+        sets = mesh->cell_set[i];
+      else if (at.node >= 0)
+        sets = run->model->space->node_set[at.node];
+      else
+        sets = mesh->vert_set[at.vertex];
       out->frames->owned[i] = (sets & SB_SET_BIT(k)) != 0;
     }
     PetscCall(put(out, group, name, "1", (PetscBool)cell, 1, H5T_STD_I32LE));
@@ -436,7 +443,8 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   SbFrames fr = out->frames;
   List l = {0};
   PetscInt k = 0;
-  int64_t mesh = 0, shown = -1; /* meshes of a frame and of the one before, as in fr->mesh */
+  int64_t mesh = 0;   /* mesh of a frame, as in fr->mesh */
+  int64_t shown = -1; /* and of the one before */
   PetscBool other;
   char message[SB_MESSAGE_MAX] = "";
 
@@ -529,7 +537,8 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   char path[PETSC_MAX_PATH_LEN];
   SbFrames fr = out->frames;
   PetscBool has = PETSC_FALSE; /* the file has the mesh */
-  PetscInt most = 1, wide;     /* components of a cell field; points of a cell */
+  PetscInt most = 1;           /* components of a cell field */
+  PetscInt wide;               /* points of a cell */
 
   PetscFunctionBeginUser;
   if (!out->nfield)

@@ -242,12 +242,17 @@ static hid_t collective_list(void)
 
 hid_t SbH5TypeInMemory(hid_t type)
 {
-  return type == H5T_STD_I64LE    ? (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
-         : type == H5T_STD_I32LE  ? H5T_NATIVE_INT32
-         : type == H5T_STD_U64LE  ? H5T_NATIVE_UINT64
-         : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
-         : type == H5T_IEEE_F32LE ? H5T_NATIVE_FLOAT
-                                  : type;
+  const hid_t pair[][2] = {
+    {H5T_STD_I64LE, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32},
+    {H5T_STD_I32LE, H5T_NATIVE_INT32},
+    {H5T_STD_U64LE, H5T_NATIVE_UINT64},
+    {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE},
+    {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT}};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(pair); i++)
+    if (type == pair[i][0])
+      return pair[i][1];
+  return type;
 }
 
 /* An attribute. */

@@ -173,12 +173,18 @@ static void put_grid(SbIndex x)
   const SbArray vector = {.ncomp = 3};
   SbPiece cells = {.bytes = 4};
   SbPiece places = {.bytes = 8};
+  const char *items = "cells";
+  const char *topology = "Tetrahedron";
 
   /* points: vertices at rest, or those of contact */
-  SbFormat(sizeof(cells.path), cells.path, "%s/%s", x->part[p].group,
-           x->points        ? "point"
-           : x->corners > 4 ? "cells10"
-                            : "cells");
+  if (x->points) {
+    items = "point";
+    topology = "Polyvertex";
+  } else if (x->corners > 4) {
+    items = "cells10";
+    topology = "Tetrahedron_10";
+  }
+  SbFormat(sizeof(cells.path), cells.path, "%s/%s", x->part[p].group, items);
   SbFormat(sizeof(places.path), places.path, "%s/x", x->part[p].group);
   for (PetscInt i = 0; i < x->narray && x->points; i++)
     if (!strcmp(x->array[i].name, "Points"))
@@ -186,10 +192,7 @@ static void put_grid(SbIndex x)
   (void)fprintf(x->file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n",
                 x->points ? "contacts" : "bodies", x->frame[f].time);
   (void)fprintf(x->file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\"%s>",
-                x->points        ? "Polyvertex"
-                : x->corners > 4 ? "Tetrahedron_10"
-                                 : "Tetrahedron",
-                PetscMax(ncell, 1), x->points ? " NodesPerElement=\"1\"" : "");
+                topology, PetscMax(ncell, 1), x->points ? " NodesPerElement=\"1\"" : "");
   put_item(x, &whole, &cells, ncell, none);
   (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", x->file);
   put_item(x, &vector, &places, n, x->nowhere);
@@ -199,16 +202,17 @@ static void put_grid(SbIndex x)
   for (PetscInt i = 0; i < x->narray; i++) {
     const SbArray *a = &x->array[i];
     const SbPiece *piece = &a->piece[a->npiece - 1];
-    const char *name =
-      strrchr(piece->path, '/') + 1; // "position" of what are points in VTK's own format
+    const char *name = strrchr(piece->path, '/') + 1; // "position": points in VTK's own format
+    const char *type = "Tensor6";
 
     if (piece->block != (a->constant ? p : f) || !strcmp(a->name, "Connectivity") ||
         !strcmp(name, "x"))
       continue;
-    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">", name,
-                  a->ncomp == 1   ? "Scalar"
-                  : a->ncomp == 3 ? "Vector"
-                                  : "Tensor6",
+    if (a->ncomp == 1)
+      type = "Scalar";
+    else if (a->ncomp == 3)
+      type = "Vector";
+    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">", name, type,
                   a->cell ? "Cell" : "Node");
     put_item(x, a, piece, a->cell ? ncell : n, a->whole ? nobody : none);
     (void)fputs("</Attribute>\n", x->file);

@@ -66,24 +66,9 @@ void SbOutputFile(SbRun run, const char *name, char path[PETSC_MAX_PATH_LEN], Pe
 static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
   PetscInt nname;
-  char **args, (*names)[SB_NAME_MAX];
-  int n;
+  char(*names)[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-
-  /* the scenario file on the command line; empty without one */
-  PetscCall(PetscGetArgs(&n, &args));
-  for (int i = 1; i < n; i++) {
-    const PetscBool named = (PetscBool)(!strcmp(args[i - 1], "-options_file") ||
-                                        !strcmp(args[i - 1], "-options_file_yaml"));
-    const char *dot = strrchr(args[i], '.');
-
-    if (named || (args[i][0] != '-' && args[i - 1][0] != '-' && dot &&
-                  (!strcmp(dot, ".opts") || !strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))) {
-      PetscCall(PetscStrncpy(out->scenario, args[i], sizeof(out->scenario)));
-      break;
-    }
-  }
 
   /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbOptionString(&SbRunScope, "output_dir", sizeof(out->dir), out->dir));
@@ -203,7 +188,7 @@ static PetscErrorCode destroy(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOutputSetFromOptions(SbRun run)
+PetscErrorCode SbOutputSetFromOptions(SbRun run, const char *scenario)
 {
   SbOutput out;
   time_t now = time(NULL);
@@ -222,6 +207,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   out->cpu_start = SB_CPU_SECONDS;
   (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z",
                  localtime_r(&now, &local));
+  PetscCall(PetscStrncpy(out->scenario, scenario, sizeof(out->scenario)));
   PetscCall(read_options(out, run->model));
 
   // A limit on the size of files is met as a failed write, with its message, not as a signal.

@@ -164,7 +164,7 @@ struct _p_SbOutput {
 
   /* options */
   char dir[PETSC_MAX_PATH_LEN];
-  char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
+  char scenario[PETSC_MAX_PATH_LEN]; /* option file that names the run; empty without one */
   char restart[PETSC_MAX_PATH_LEN];  /* empty: none */
   int
     ndamaged; /* newest checkpoints that cannot be read: -restart latest takes the one before them */

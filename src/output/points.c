@@ -98,11 +98,12 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
 /* The node at an owned vertex, or -1 where the body has its nodes at faces. */
 static PetscInt vertex_node(SbSpace s, const SbPoints *p, PetscInt vertex)
 {
-  const PetscInt corner = s->vertices ? 0 : p->corner[p->start[vertex]];
+  PetscInt corner;
 
-  return s->vertices                                       ? vertex
-         : SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner]
-                                                           : -1;
+  if (s->vertices)
+    return vertex;
+  corner = p->corner[p->start[vertex]];
+  return SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
 }
 
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[],
@@ -197,13 +198,14 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
   PetscCall(SbSpaceRestoreLocalRead(s, R, &all));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const SbPlace at = SbPointsPlace(run, out, i);
-    const PetscInt node = at.vertex < 0   ? at.node
-                          : at.corner < 0 ? vertex_node(s, p, at.vertex)
-                                          : -1;
+    PetscInt node;
 
-    if (at.corner >= 0)
+    if (at.corner >= 0) {
       add_corner_force(s, r, p->valence, at.corner, values + 3 * i);
-    else if (node >= 0)
+      continue;
+    }
+    node = at.vertex < 0 ? at.node : vertex_node(s, p, at.vertex);
+    if (node >= 0)
       add_force(r, node, out->discontinuous ? 1. / p->valence[node] : 1., values + 3 * i);
     else
       for (PetscInt k = p->start[at.vertex]; k < p->start[at.vertex + 1]; k++)

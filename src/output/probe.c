@@ -331,15 +331,19 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
       const PetscBool vertex = (PetscBool)(probe->original < first_edge(s));
       const PetscInt local = probe->local;
       const PetscInt per = vertex ? 4 : 6;
-      PetscInt here = local < 0 ? -1
-                      : vertex  ? mesh->gvert[local]
-                                : s->gnode[local - mesh->nvert_owned];
+      PetscInt here = -1; /* its global number */
 
+      if (local >= 0)
+        here = vertex ? mesh->gvert[local] : s->gnode[local - mesh->nvert_owned];
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, out->comm));
       for (PetscInt i = 0; i < per * mesh->ncell_owned; i++) {
-        const PetscInt edge = vertex ? -1 : s->edge_node[i];
+        PetscInt there = -1;
 
-        if ((vertex ? mesh->gvert[mesh->cell[i]] : edge < 0 ? -1 : s->gnode[edge]) == here)
+        if (vertex)
+          there = mesh->gvert[mesh->cell[i]];
+        else if (s->edge_node[i] >= 0)
+          there = s->gnode[s->edge_node[i]];
+        if (there == here)
           PetscCall(add(&probe->cells, i / per,
                         SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / per)) / 6.));
       }
@@ -376,11 +380,13 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const Sb
   for (const SbProbe *probe = out->probe; probe < out->probe + out->nprobe; probe++) {
     for (PetscInt i = 0; i < probe->nfield; values += probe->field[i++]->ncomp) {
       const SbField *f = probe->field[i];
-      const PetscReal *x = f->from == offsetof(SbStep, V)   ? stage->v
-                           : f->from == offsetof(SbStep, A) ? stage->a
-                                                            : stage->u;
+      const PetscReal *x = stage->u;
       const PetscBool position = (PetscBool)!strcmp(f->name, "position");
 
+      if (f->from == offsetof(SbStep, V))
+        x = stage->v;
+      else if (f->from == offsetof(SbStep, A))
+        x = stage->a;
       if (f->cell) {
         PetscCall(SbFieldAddCells(f, run, step, &probe->cells, values));
         continue;

@@ -37,11 +37,12 @@ static void put(FILE *f, const char *format, ...)
     } else {
       (void)fputc('"', f);
       for (const char *text = va_arg(args, const char *); *text; text++)
-        (void)fprintf(f,
-                      *text == '"' || *text == '\\' ? "\\%c"
-                      : (unsigned char)*text < 32   ? "\\u%04x"
-                                                    : "%c",
-                      *text);
+        if (*text == '"' || *text == '\\')
+          (void)fprintf(f, "\\%c", *text);
+        else if ((unsigned char)*text < 32)
+          (void)fprintf(f, "\\u%04x", *text);
+        else
+          (void)fputc(*text, f);
       (void)fputc('"', f);
     }
   }

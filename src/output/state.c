@@ -65,11 +65,20 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   PetscCall(read_all(o->mesh, "body", H5T_STD_I64LE, 1, &nbody, &body));
   PetscCall(read_all(o->mesh, "cells10", H5T_STD_I64LE, 10, &nten, &o->cell10));
   PetscCall(read_all(o->mesh, "parent", H5T_STD_I64LE, 1, &nparent, &parent));
-  *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) &&
-                    (!nten || o->cell10) &&
-                    (nparent ? parent && nparent == o->ncell && nten <= nparent &&
-                                 are_points(parent, nparent, nten)
-                             : !nten || nten == o->ncell));
+
+  // every array that has rows could be read
+  *ok = (PetscBool)(o->x && o->cell && (!nbody || body) && (!nten || o->cell10) &&
+                    (!nparent || parent));
+
+  // a body for each tet; for each a P2 tet that it is part of, else as many P2 tets as tets
+  if (nbody && nbody != o->ncell)
+    *ok = PETSC_FALSE;
+  if (nparent && (nparent != o->ncell || nten > nparent))
+    *ok = PETSC_FALSE;
+  if (!nparent && nten && nten != o->ncell)
+    *ok = PETSC_FALSE;
+  if (*ok && nparent)
+    *ok = are_points(parent, nparent, nten);
 
   /* replace parts of P2 tets by the tets, corners first */
   for (PetscInt i = 0; *ok && body && i < nparent; i++)

@@ -44,7 +44,8 @@ static void write_array(SbIndex v, hid_t where, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5,
                                     1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
-  const hid_t type = a->whole ? H5T_STD_I32LE : a->bytes == 8 ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+  const hid_t real = a->bytes == 8 ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+  const hid_t type = a->whole ? H5T_STD_I32LE : real;
   const hid_t list = H5Pcreate(H5P_DATASET_CREATE);
   const PetscInt nblock = a->constant ? v->npart : v->nframe;
   const int columns = a->ncomp == 6 ? 6 : 1; // that are placed one by one

@@ -117,6 +117,7 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 {
   const SbOldMesh *old = at->old;
   SbLocator now = NULL;
+  SbLocator filled = at->flat ? at->flat : old->rest; /* tets of the volume that has been filled */
   PetscReal *y = m->x;
 
   PetscFunctionBeginUser;
@@ -129,13 +130,15 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
     if (m->flat)
       PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
-  if (!how->rest)
+  if (!how->rest) {
     PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
+    filled = now;
+  }
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
     PetscReal w[4];
 
-    (void)SbLocatorFind(now ? now : at->flat ? at->flat : at->old->rest, y + 3 * v, &cell, w);
+    (void)SbLocatorFind(filled, y + 3 * v, &cell, w);
     PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume %s",
                how->rest ? "at rest" : "now");
     if (now || at->flat)
@@ -259,49 +262,64 @@ static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbN
   return (PetscBool)(longest >= 0);
 }
 
+/* Which corners of a tet are the two ends of an edge; false: it does not have this edge. */
+static PetscBool has_edge(const SbNewMesh *m, PetscInt c, const PetscInt ends[2], int corner[2])
+{
+  corner[0] = corner[1] = -1;
+  for (int a = 0; a < 4; a++) {
+    if (m->cell[4 * c + a] == ends[0])
+      corner[0] = a;
+    if (m->cell[4 * c + a] == ends[1])
+      corner[1] = a;
+  }
+  return (PetscBool)(corner[0] >= 0 && corner[1] >= 0);
+}
+
+/* Makes the arrays of a mesh long enough for so many vertices and tets. */
+static PetscErrorCode reserve(PetscInt nvert, PetscInt ncell, SbNewMesh *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscRealloc(3 * (size_t)nvert * sizeof(*m->X), &m->X));
+  PetscCall(PetscRealloc(3 * (size_t)nvert * sizeof(*m->x), &m->x));
+  PetscCall(PetscRealloc(4 * (size_t)ncell * sizeof(*m->cell), &m->cell));
+  if (m->flat)
+    PetscCall(PetscRealloc(3 * (size_t)nvert * sizeof(*m->flat), &m->flat));
+  if (m->edge_off)
+    PetscCall(PetscRealloc(18 * (size_t)ncell * sizeof(*m->edge_off), &m->edge_off));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Inserts a vertex at the middle of an edge at rest; each tet around the edge is divided in two. */
-static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2], SbNewMesh *m)
+static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbNewMesh *m)
 {
   const PetscInt middle = m->nvert;
   const PetscInt ncell = m->ncell;
-  PetscInt n = 0;
+  PetscInt naround = 0;
+  int corner[2];
 
   PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < ncell; c++) {
-    int found = 0;
+  for (PetscInt c = 0; c < ncell; c++)
+    naround += has_edge(m, c, ends, corner);
+  PetscCall(reserve(m->nvert + 1, ncell + naround, m));
 
-    for (int a = 0; a < 4; a++)
-      found += m->cell[4 * c + a] == ends[0] || m->cell[4 * c + a] == ends[1];
-    n += found == 2;
-  }
-  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->X), &m->X));
-  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->x), &m->x));
-  PetscCall(PetscRealloc(4 * (size_t)(ncell + n) * sizeof(*m->cell), &m->cell));
-  if (m->flat)
-    PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->flat), &m->flat));
-  if (m->edge_off)
-    PetscCall(PetscRealloc(18 * (size_t)(ncell + n) * sizeof(*m->edge_off), &m->edge_off));
+  // the new vertex
   for (int k = 0; k < 3; k++)
     m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
-  follow(at_old, m, middle);
+  follow(at, m, middle);
   m->nvert++;
-  for (PetscInt c = 0; c < ncell; c++) {
-    PetscInt *v = m->cell + 4 * c;
-    PetscInt at[2] = {-1, -1};
 
-    for (int a = 0; a < 4; a++) {
-      if (v[a] == ends[0])
-        at[0] = a;
-      if (v[a] == ends[1])
-        at[1] = a;
-    }
-    if (at[0] < 0 || at[1] < 0)
+  // each tet around keeps one end of the edge, its copy the other
+  for (PetscInt c = 0; c < ncell; c++) {
+    const PetscInt half = m->ncell;
+
+    if (!has_edge(m, c, ends, corner))
       continue;
-    PetscCall(PetscArraycpy(m->cell + 4 * m->ncell, v, 4));
-    v[at[1]] = middle;
-    m->cell[4 * m->ncell++ + at[0]] = middle;
-    bend(at_old, m, c, middle);
-    bend(at_old, m, m->ncell - 1, -1);
+    PetscCall(PetscArraycpy(m->cell + 4 * half, m->cell + 4 * c, 4));
+    m->cell[4 * c + corner[1]] = middle;
+    m->cell[4 * half + corner[0]] = middle;
+    m->ncell++;
+    bend(at, m, c, middle);
+    bend(at, m, half, -1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -352,6 +370,8 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
     PetscCall(PetscFree(moved));
     PetscCall(PetscFree(stars.start));
     PetscCall(PetscFree(stars.cells));
+
+    // split an inner edge of each tet that is still bad
     split = PETSC_FALSE;
     for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS && m->ncell <= most; c++) {
       PetscInt ends[2] = {-1, -1};

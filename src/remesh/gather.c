@@ -57,7 +57,10 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   g->nvert = mesh->Nvert;
   g->ncell = mesh->Ncell;
   g->nfield = vectors_of(run, vec);
-  g->width = s->edge_node ? SB_EDGES + 6 : supports ? 8 : 4;
+  if (s->edge_node)
+    g->width = SB_EDGES + 6;
+  else
+    g->width = supports ? 8 : 4;
   PetscCall(PetscCalloc3(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0, m->nbody, &g->mass));
   for (PetscInt b = 0; b < m->nbody; b++) {
     g->vert0[b + 1] = g->vert0[b] + m->body[b].nvert;

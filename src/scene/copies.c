@@ -88,13 +88,16 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
     int count[3];
     int end = 0;
     double d[3];
+    PetscBool read;
 
     // n placements on a grid nx,ny,nz,dx,dy,dz, x fastest
-    PetscCheck(sscanf(text + 5, "%d,%d,%d,%lf,%lf,%lf%n", &count[0], &count[1], &count[2], &d[0],
-                      &d[1], &d[2], &end) == 6 &&
-                 !text[5 + end] && count[0] > 0 && count[1] > 0 && count[2] > 0 &&
-                 (double)count[0] * count[1] * count[2] < 1e6,
-               PETSC_COMM_SELF, PETSC_ERR_USER,
+    read = (PetscBool)(sscanf(text + 5, "%d,%d,%d,%lf,%lf,%lf%n", &count[0], &count[1], &count[2],
+                              &d[0], &d[1], &d[2], &end) == 6 &&
+                       !text[5 + end]);
+    for (int i = 0; i < 3 && read; i++)
+      read = (PetscBool)(count[i] > 0);
+    PetscCheck(read && (double)count[0] * count[1] * count[2] < 1e6, PETSC_COMM_SELF,
+               PETSC_ERR_USER,
                "-body_%s_copies grid:%s: give grid:nx,ny,nz,dx,dy,dz, how many along each axis (a "
                "million at "
                "most) and how far apart (m)",

@@ -348,10 +348,14 @@ static PetscErrorCode use_name(SbModel model, const char *name)
   if (find_set(model, name) >= 0)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
-  set->shape = find_body(model, name) >= 0 ? SB_SET_BODY
-               : !strcmp(name, "all")      ? SB_SET_HALFSPACE
-               : !strcmp(name, "boundary") ? SB_SET_BOUNDARY
-                                           : SB_SET_GROUP;
+  if (find_body(model, name) >= 0)
+    set->shape = SB_SET_BODY;
+  else if (!strcmp(name, "all"))
+    set->shape = SB_SET_HALFSPACE;
+  else if (!strcmp(name, "boundary"))
+    set->shape = SB_SET_BOUNDARY;
+  else
+    set->shape = SB_SET_GROUP;
   if (set->shape == SB_SET_HALFSPACE) {
     /* one that contains every point */
     set->p[2] = 1;

@@ -15,7 +15,15 @@
 
 /* PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as
    large as the matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them
-   during the factorisation, and they are freed after a failure. */
+   during the factorisation, and they are freed after a failure.
+
+   They are recognised by the name of the function that allocates. PETSc gives no better handle: the
+   arrays are local variables of its numeric factorisation, and what the set-up of the PC allocates
+   before and keeps (the factor, its ordering) goes through the same allocator in the same call. The
+   operation of the numeric factorisation alone cannot be wrapped, since each symbolic one replaces
+   it. An SBAIJ matrix needs no such arrays, but costs a copy of the matrix at every factorisation.
+   A changed name does no harm but the leak; an array that PETSc frees is forgotten
+   (note_release). */
 static struct {
   PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
   PetscErrorCode (*release)(void *, int, const char[], const char[]);

@@ -59,7 +59,9 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
     m->ncollapsed += !keep[i];
     if (!keep[i])
       continue;
-    low = v[0] < v[1] ? (v[0] < v[2] ? 0 : 2) : (v[1] < v[2] ? 1 : 2);
+    low = v[0] < v[1] ? 0 : 1;
+    if (v[low] >= v[2])
+      low = 2;
     p = v[(low + 1) % 3];
     q = v[(low + 2) % 3];
     triple[ntriple++] = (Triple){{v[low], PetscMin(p, q), PetscMax(p, q)}, i, (PetscBool)(p > q)};

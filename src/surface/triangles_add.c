@@ -131,8 +131,10 @@ static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], in
       for (PetscInt k = 0; k < n && quality > best; k++) {
         const PetscInt d = left[k];
 
-        if (d != a && d != b && d != c && seen_area(p, a, b, d, NULL) >= 0 &&
-            seen_area(p, b, c, d, NULL) >= 0 && seen_area(p, c, a, d, NULL) >= 0)
+        if (d == a || d == b || d == c)
+          continue;
+        if (seen_area(p, a, b, d, NULL) >= 0 && seen_area(p, b, c, d, NULL) >= 0 &&
+            seen_area(p, c, a, d, NULL) >= 0)
           quality = 0;
       }
       if (quality > best) {
@@ -251,9 +253,8 @@ static PetscReal loop_area(const Loops *l, PetscInt k)
 static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt except)
 {
   const PetscReal *m = l->p.normal;
-  const int most = PetscAbsReal(m[0]) > PetscAbsReal(m[1])
-                     ? (PetscAbsReal(m[0]) > PetscAbsReal(m[2]) ? 0 : 2)
-                     : (PetscAbsReal(m[1]) > PetscAbsReal(m[2]) ? 1 : 2);
+  const int larger = PetscAbsReal(m[0]) > PetscAbsReal(m[1]) ? 0 : 1;
+  const int most = PetscAbsReal(m[larger]) > PetscAbsReal(m[2]) ? larger : 2;
   const int u = (most + 1) % 3;
   const int v = (most + 2) % 3;
   PetscInt best = -1;

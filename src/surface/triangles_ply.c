@@ -38,6 +38,7 @@ static PetscErrorCode read_property(Ply *p)
   Property *q;
   char word[32];
   const char *before;
+  PetscBool coordinate, corners;
 
   PetscFunctionBeginUser;
   if (!p->nelement)
@@ -55,10 +56,11 @@ static PetscErrorCode read_property(Ply *p)
     p->s->at = before;
   PetscCall(SbScanType(p->s, &q->type));
   (void)SbScanWord(p->s, sizeof(word), word);
-  if (!strcmp(e->name, "vertex") && word[0] >= 'x' && word[0] <= 'z' && !word[1] && !q->count.size)
+  coordinate = (PetscBool)(word[0] >= 'x' && word[0] <= 'z' && !word[1]);
+  corners = (PetscBool)(!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index"));
+  if (!strcmp(e->name, "vertex") && coordinate && !q->count.size)
     q->axis = word[0] - 'x';
-  if (!strcmp(e->name, "face") &&
-      (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")) && q->count.size)
+  if (!strcmp(e->name, "face") && corners && q->count.size)
     q->axis = 3;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -80,8 +80,9 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
 {
   const PetscReal inner = f->nface - f->body.nfacet;
   const PetscReal ncell = f->body.ncell;
-  PetscReal nodes = f->body.nvert, blocks = nodes + 2. * f->nedge,
-            times = 1.9; /* matrix, assembly plan, preconditioner */
+  PetscReal nodes = f->body.nvert;
+  PetscReal blocks = nodes + 2. * f->nedge;
+  PetscReal times = 1.9; /* matrix, assembly plan, preconditioner */
 
   if (!strcmp(element, "cr")) {
     nodes = f->nface;

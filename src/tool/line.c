@@ -47,8 +47,13 @@ static const SbOption rows[] = {
 static const char *const readers[] = {
   "tet", "tet", "tet", "tet", "tet", "tet", "tet repair", "refine", "convert tet repair refine",
   "",    "",    "",    "",    "",    ""};
-_Static_assert(PETSC_STATIC_ARRAY_LENGTH(readers) == PETSC_STATIC_ARRAY_LENGTH(rows),
-               "one entry for each row");
+_Static_assert(PETSC_STATIC_ARRAY_LENGTH(rows) == SB_TOOL_OPTIONS &&
+                 PETSC_STATIC_ARRAY_LENGTH(readers) == SB_TOOL_OPTIONS,
+               "one entry for each option");
+
+/* First words of PETSc's options. */
+static const char *const petsc = "log_ malloc options_ info on_error_ error_ memory fp_trap "
+                                 "no_signal_handler start_in_debugger skip_petscrc citations";
 
 PetscErrorCode SbToolHelp(void)
 {
@@ -62,7 +67,7 @@ PetscErrorCode SbToolHelp(void)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
                         "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
+  for (int i = 0; i < SB_TOOL_OPTIONS; i++) {
     const SbOption *r = &rows[i];
 
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  -%s%s%s%s%s%s%s%s%s\n      %s\n", r->key,
@@ -75,7 +80,7 @@ PetscErrorCode SbToolHelp(void)
 
 static const SbOption *find_row(const char *key)
 {
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
+  for (int i = 0; i < SB_TOOL_OPTIONS; i++)
     if (!strcasecmp(rows[i].key, key))
       return &rows[i];
   return NULL;
@@ -108,6 +113,11 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
     } else if (is_option) {
       const SbOption *row = find_row(argv[i] + 1);
 
+      if (row)
+        line->given[row - rows] = PETSC_TRUE;
+      else if (!line->unknown && !SbHasPrefix(argv[i] + 1, petsc))
+        line->unknown = argv[i] + 1;
+
       // the word after an option is its value, for a switch only if it is a truth value
       argv[kept++] = argv[i];
       if (!argv[i + 1])
@@ -126,16 +136,16 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
+PetscErrorCode SbToolSetFromOptions(const SbToolLine *line, SbTool *tool)
 {
   const SbToolCommand *command;
-  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
+  const char *list[SB_TOOL_OPTIONS];
   char all[256] = "";
   PetscInt n = 0;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbOptionsRegister("", "", SB_TOOL_OPTIONS, rows));
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
 
   // one process, a command, and the number of files that it takes
@@ -156,28 +166,18 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
              command->nfile > 1 ? "s" : "", line->nword - 1, command->name, command->files);
 
   // options: of this command, or of PETSc
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
+  for (int i = 0; i < SB_TOOL_OPTIONS; i++)
     list[i] = rows[i].key;
-  for (int i = 1; i < argc; i++) {
-    const char *name = argv[i] + 1;
-    const char *reader;
-    const SbOption *row = find_row(name);
-    PetscBool is_option;
-
-    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
-    if (!is_option ||
-        (!row && SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap "
-                                   "no_signal_handler start_in_debugger skip_petscrc citations")))
-      continue;
-    if (!row)
-      SbSuggestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(all), all);
-    PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s",
-               name, all[0] ? "; did you mean -" : "; supple-mesh -help lists them", all,
-               all[0] ? "?" : "");
-    reader = readers[row - rows];
-    PetscCheck(!reader[0] || strstr(reader, command->name), PETSC_COMM_SELF, PETSC_ERR_USER,
-               "-%s does nothing in supple-mesh %s; it is for %s", name, command->name, reader);
-  }
+  if (line->unknown)
+    SbSuggestNames(line->unknown, SB_TOOL_OPTIONS, list, sizeof(all), all);
+  PetscCheck(!line->unknown, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s is not an option of supple-mesh%s%s%s", line->unknown,
+             all[0] ? "; did you mean -" : "; supple-mesh -help lists them", all,
+             all[0] ? "?" : "");
+  for (int i = 0; i < SB_TOOL_OPTIONS; i++)
+    PetscCheck(!line->given[i] || !readers[i][0] || strstr(readers[i], command->name),
+               PETSC_COMM_SELF, PETSC_ERR_USER, "-%s does nothing in supple-mesh %s; it is for %s",
+               rows[i].key, command->name, readers[i]);
   tool->command = command;
   tool->in = line->word[1];
   tool->out = command->nfile > 1 ? line->word[2] : NULL;

@@ -4,11 +4,15 @@
 #pragma once
 #include "sbmeshio.h"
 
+#define SB_TOOL_OPTIONS 15
+
 /* Command line of supple-mesh, parsed. */
 typedef struct {
   PetscBool help, version;
   int nword;
-  const char *word[4]; /* command, then files; further words are only counted */
+  const char *word[4];              /* command, then files; further words are only counted */
+  PetscBool given[SB_TOOL_OPTIONS]; /* by rows of the table of options */
+  const char *unknown;              /* first option, without dash, that is none of PETSc's either */
 } SbToolLine;
 
 typedef struct _SbTool {
@@ -26,11 +30,11 @@ typedef struct _SbTool {
 } SbTool;
 
 /* line.c */
-/* Removes the words that are not options, -help and -version from argc, argv. Before
-   PetscInitialize(). */
+/* Reads the command line, and removes the words that are not options, -help and -version from
+   argc, argv for PETSc. line borrows from argv. Before PetscInitialize(). */
 PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line);
 /* Checks command, number of files and options, and reads the options. */
-PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool);
+PetscErrorCode SbToolSetFromOptions(const SbToolLine *line, SbTool *tool);
 PetscErrorCode SbToolHelp(void);
 
 /* commands.c: runs the command. */

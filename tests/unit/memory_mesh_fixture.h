@@ -60,7 +60,7 @@ static inline PetscErrorCode fixture_open_given(const char *dir, const char *opt
   PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
   PetscCall(test_scene_run(scene));
-  PetscCall(SbOutputSetFromOptions(scene->run));
+  PetscCall(SbOutputSetFromOptions(scene->run, ""));
   PetscCall(SbOptionsCheck());
   scene->model->body[0].in_memory = in_memory;
   if (!in_memory)
