@@ -6,7 +6,7 @@
   has not used for KEEP solves are dropped at the next growth. So most Newton iterations change
   values only, and the symbolic factorisation and the coarse space are reused.
 
-  Systems are solved by CG with the coarse space of pc_coarse.c, to a tolerance of FORCING in the
+  Systems are solved by CG with the coarse space of two_level.c, to a tolerance of FORCING in the
   norm of the preconditioner, or factored on one rank (block_solver.c). The limit of CG's iterations
   costs as much as the factorisation: the operations of both factorisations follow from the symbolic
   ones, the work of an iteration from the numbers of blocks of the matrix and of the coarse factor.
@@ -18,8 +18,9 @@
   -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
   -sub_pc_type) apply here, too.
 */
-#include "coarse.h"
+#include "sbassembly.h"
 #include "sblog.h"
+#include "sbpc.h"
 #include "sbsolver.h"
 
 #define KEEP 20      /* solves after which an unused block is dropped from the pattern */

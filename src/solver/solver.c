@@ -14,6 +14,7 @@
   fails; the next solver of a list is then tried on the same system (time/solver_list.c), and only
   if all fail is the step halved or the run stopped.
 */
+#include "sbpc.h"
 #include "solver_impl.h"
 
 #define RESTART 100 /* restart length of FGMRES */
@@ -55,7 +56,7 @@ static const SbSolverPreset presets[] = {
    .options =
      "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite"},
   {"cg_ssor", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
-  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate},
+  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCTwoLevelCreate},
   {"cg_p_multigrid", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCPMultigridCreate},
   {"cg_gamg", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type gamg"},
   {"cg_hypre", SB_MATRIX_AIJ,
@@ -472,11 +473,11 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
     PetscCall(PCFactorSetMatSolverType(pc, package));
   if (package && !strcmp(package, MATSOLVERMUMPS))
     PetscCall(
-      SbSolverSetDefaults("", "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
+      SbOptionsSetDefaults("", "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
 
   /* a non-positive pivot appears as a reason of the solve, not as an error */
   if (package && !strcmp(package, MATSOLVERCHOLMOD))
-    PetscCall(SbSolverSetDefaults("", "-mat_cholmod_print 0", PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-mat_cholmod_print 0", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -502,7 +503,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   if (reproducible && s->ghosted)
     PetscCall(
-      SbSolverSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
+      SbOptionsSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));
@@ -528,16 +529,16 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
   /* variants that keep the preconditioner symmetric */
   if (symmetric && !strcmp(type, PCASM))
-    PetscCall(SbSolverSetDefaults("", "-pc_asm_type basic", PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
-    PetscCall(SbSolverSetDefaults("", "-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
 
   /* PETSc keeps the eigenvalue estimate of the first matrix, too small once contact stiffness is
      added */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
   if (!given && !strcmp(type, PCGAMG))
-    PetscCall(SbSolverSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
-  PetscCall(SbSolverSetDefaults("", preset->options, PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
+  PetscCall(SbOptionsSetDefaults("", preset->options, PETSC_FALSE));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY))
     PetscCall(choose_package(s, pc, type));
   if (preset->direct)
@@ -762,5 +763,31 @@ PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace s, PetscInt *
     pc = s->constraints->failed ? NULL : s->constraints->factored;
   if (pc)
     PetscCall(SbPCDirectCountNegative(pc, negative));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define DIRECT_STATIC \
+  30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
+#define DIRECT_DYNAMIC 1000
+
+PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
+                              char reason[], size_t size)
+{
+  const PetscInt unknowns = 3 * s->Nnode;
+  const char *package;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDirectPackage(s->comm, unknowns, PETSC_FALSE, &package));
+  PetscCheck(
+    choice != 1 || package, s->comm, PETSC_ERR_USER,
+    "-saddle_solver direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
+    "-saddle_solver iterative");
+  if (!choice)
+    choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
+  *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_NONE;
+  if (choice == 1)
+    PetscCall(PetscSNPrintf(reason, size, "multipliers of contact directly, by %s", package));
+  else
+    PetscCall(PetscSNPrintf(reason, size, "constraints of contact by their null space"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

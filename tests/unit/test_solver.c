@@ -2,6 +2,7 @@
 /* Every row of the solver table solves the same linear bar; a matrix that is not positive definite
    fails with CHOLMOD and with no other package; the choice by `auto` has a reason; a solve at its
    limit fails. */
+#include "sbfactor.h"
 #include "sbsolver.h"
 #include "../scene.h"
 

@@ -4,6 +4,7 @@
   solution agrees with a factorisation, and the run continues with it. A method chosen by the user
   is not replaced, nor is any if a body is free.
 */
+#include <sbfactor.h>
 #include <sbsolver.h>
 #include "../slivers.h"
 

@@ -21,9 +21,8 @@
   z_i - ..).
 */
 #include "sbfour.h"
-#include "sbassembly.h"
 #include "sbkernel.h"
-#include "solver_impl.h"
+#include "gauss_seidel.h"
 
 /* z_j -= A_ij^T x for the n blocks right of the diagonal; the fourth lane of x is zero. */
 SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],

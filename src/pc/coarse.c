@@ -276,19 +276,6 @@ static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
-{
-  const PetscInt n = s->nnode_owned;
-  const PetscInt nz = s->plan->di[n] + s->plan->oi[n];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(n + 1, ia, nz, ja));
-  PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
-  for (PetscInt k = 0; k < nz; k++)
-    (*ja)[k] = s->gnode[(*ja)[k]];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The rows of a unit have the units of its nodes' neighbours; ia, column: rows of A, own nodes and
    ghosts. */
 static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscInt column[])

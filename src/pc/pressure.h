@@ -1,13 +1,14 @@
 /*
-  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with
+  pressure.h - the solver for nearly incompressible bodies (pressure.c): the mixed operator, with
   the pressures of the cells as unknowns, and the preconditioner of its displacement block.
 */
 #pragma once
 #include "sbassembly.h"
+#include "sbpc.h"
 
 /* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1
    for every body. The tangent without its volumetric part is assembled in each. With a P2 body only
-   the space itself, with pc_coarse.c. */
+   the space itself, with two_level.c. */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   PetscInt n;    /* number of levels: 2, or 3 with a DG body, 1 with a P2 body */

@@ -60,7 +60,7 @@
   Comput. 2; Helenbrook, Mavriplis, Atkins (2003), Analysis of p-multigrid.
 */
 #include "coarse.h"
-#include "solver_impl.h"
+#include "gauss_seidel.h"
 #include "sblog.h"
 
 #define NAME "two-level"
@@ -492,7 +492,7 @@ static PetscErrorCode create(SbSpace s, PC pc, const char *name, PetscErrorCode 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
+PetscErrorCode SbPCTwoLevelCreate(SbSpace s, PC pc)
 {
   const char *prefix;
   TwoLevel *p;
@@ -557,7 +557,7 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed)
+PetscErrorCode SbPCTwoLevelSimplify(PC pc, KSPConvergedReason reason, PetscBool *changed)
 {
   PetscBool ok;
   TwoLevel *p;
