@@ -56,6 +56,7 @@ typedef struct _p_SbFactor *SbFactor;
 */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                               SbFactor old, SbFactor *f);
+
 /*
   SbFactorNumeric - numeric factorisation.
 
@@ -67,6 +68,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
 */
 PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt ja[],
                                const PetscReal block[], PetscReal schur[], PetscBool *ok);
+
 /*
   SbFactorForward, SbFactorBackward - the two halves of a solve; Backward continues the last
   Forward.
@@ -78,10 +80,13 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 */
 void SbFactorForward(SbFactor f, const float b[], float kept[]);
 void SbFactorBackward(SbFactor f, const float kept[], float x[]);
+
 /* A x = b with an exact factor; b and x [n][3] may be the same. Not collective. */
 PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[]);
+
 /* Multiplications and additions of an exact factorisation; number of entries of the factor. */
 void SbFactorCost(SbFactor f, PetscReal *flops, PetscReal *entries);
+
 /* Bytes that one substitution reads, of a factor in integers. */
 PetscInt64 SbFactorBytes(SbFactor f);
 PetscErrorCode SbFactorDestroy(SbFactor *f);
@@ -92,10 +97,12 @@ PetscErrorCode SbFactorDestroy(SbFactor *f);
 typedef struct _p_SbBlockSolver *SbBlockSolver;
 PetscErrorCode SbBlockSolverCreate(MPI_Comm comm, SbBlockSolver *solver);
 PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver);
+
 /* Symbolic factorisation, as done by SbBlockSolverSetUp() with `changed`; arguments as there.
    Collective. */
 PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver solver, PetscInt n, const PetscInt ia[],
                                     const PetscInt ja[]);
+
 /*
   SbBlockSolverSetUp - factors the matrix.
 
@@ -106,9 +113,11 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver solver, PetscInt n, const Pets
 PetscErrorCode SbBlockSolverSetUp(SbBlockSolver solver, PetscInt n, const PetscInt ia[],
                                   const PetscInt ja[], const PetscReal block[], PetscBool changed,
                                   PetscBool *ok);
+
 /* Operations of a factorisation, entries of the factor. Collective; after
    SbBlockSolverAnalyze(). */
 PetscErrorCode SbBlockSolverCost(SbBlockSolver solver, PetscReal *flops, PetscReal *entries);
+
 /* x = A^-1 b, by own rows. Collective. */
 PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, Vec b, Vec x);
 
@@ -135,6 +144,7 @@ struct _p_SbInterface {
 /* Finds the interface. Collective. */
 PetscErrorCode SbInterfaceCreate(SbSpace space, SbInterface *face);
 PetscErrorCode SbInterfaceDestroy(SbInterface *face);
+
 /*
   SbInterfaceFactorise - factors the sum over ranks of their Schur complements.
 
@@ -144,6 +154,7 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *face);
 */
 PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal schur[],
                                     PetscBool *ok);
+
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
 PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
 

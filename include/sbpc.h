@@ -21,6 +21,7 @@
   a negative number.
 */
 PetscErrorCode SbPCTwoLevelCreate(SbSpace space, PC pc);
+
 /* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed:
    false for other preconditioners and failures, or when that is done already. Collective. */
 PetscErrorCode SbPCTwoLevelSimplify(PC pc, KSPConvergedReason reason, PetscBool *changed);

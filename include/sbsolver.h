@@ -18,22 +18,22 @@ typedef struct _SbSolverPreset {
 } SbSolverPreset;
 
 extern const SbOption SbSolverRows[];
-/* Reads -solver: "auto" or a name of the table. */
+
+/* ---- which solver (preset.c, choice.c) */
+
+/* Reads -solver: "auto", "direct" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
+
 /* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row
    whose matrix type it supports. The reason in words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear,
                               PetscBool explicit_run, const char *choice,
                               const SbSolverPreset **preset, char reason[], size_t size);
+
 /* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective.
    Errors: PETSC_ERR_USER where this PETSc has none for this number of ranks. */
 PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[]);
-/*
-  SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored
-  last, in the null space of its contact constraints; -1: the solver does not count them.
-  Collective.
-*/
-PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
+
 /*
   SbSolverNextFallback - the next solver after one that failed: a factorisation, for large systems
   iterations.
@@ -44,14 +44,7 @@ PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscI
 */
 PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
                                     uint32_t *tried, const SbSolverPreset **preset);
-/* Gives the solver of `snes` the preset's options and tolerances; before SNESSetFromOptions().
-   Collective. */
-PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
-/* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and
-   restores it after. Collective; before each solve. */
-PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
-/* M of such a pc, else pc itself. Not collective. */
-PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
+
 /*
   SbSaddleChoose - how the saddle-point system of constraints is solved: `choice` 0 by size, 1
   directly, 2 by iterations, with the reason in words. Collective. Errors: PETSC_ERR_USER for 1
@@ -59,6 +52,20 @@ PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
 */
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
+
+/* ---- from a row of the table to a KSP that is set up (solver.c) */
+
+/* The operator that the preset works on. Collective; caller destroys. */
+PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
+
+/* Gives the solver of `snes` the preset's options and tolerances; before SNESSetFromOptions().
+   Collective. */
+PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
+
+/* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and
+   restores it after. Collective; before each solve. */
+PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
+
 /*
   SbSolverFinish - the last set-up of the solver of `snes` after SNESSetFromOptions().
 
@@ -67,10 +74,18 @@ PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice,
   package that cannot work here.
 */
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace space, const SbSolverPreset *preset, Mat P);
+
 /* "cg, cholesky of mumps": what the solver of `snes` is now. Not collective. */
 PetscErrorCode SbSolverDescribe(SNES snes, SbSpace space, size_t size, char text[]);
-/* The operator that the preset works on. Collective; caller destroys. */
-PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
+
+/*
+  SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored
+  last, in the null space of its contact constraints; -1: the solver does not count them.
+  Collective.
+*/
+PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
+
+/* ---- systems with constraints outside of the matrix (constraint_operator.c) */
 
 /* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the
    constraints. singular: K may be, if only constraints support some body: it is regularised for
@@ -79,12 +94,17 @@ PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *prese
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, PetscBool singular,
                                            SbSaddle saddle, Mat *A);
 
-/* tangent and contact blocks */
+/* The preconditioner M of a pc that works in the null space of constraints, P M^-1 P; else pc
+   itself. Not collective. */
+PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
+
+/* ---- systems of the tangent and blocks of contact (contact_system.c) */
 
 typedef struct {
   PetscInt v[2];  /* row and column */
   PetscReal H[9]; /* row-major, N/m */
 } SbBlock;
+
 /* Rows of owned nodes, by local numbers, columns of any nodes, by global ones, best in row order;
    start with {0}, PetscFree() the blocks. Duplicates are summed. */
 typedef struct {
@@ -92,12 +112,15 @@ typedef struct {
   SbBlock *block; /* [n] */
 } SbBlocks;
 typedef struct _p_SbContactSystem *SbContactSystem;
+
 /* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: those of
    contact_system.c. */
 PetscErrorCode SbContactSystemCreate(SbSpace space, PetscInt choice, SbContactSystem *system);
+
 /* In words, how such systems are solved. Not collective. */
 PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size);
 PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
+
 /*
   SbContactSystemSolve - Y = (K + blocks)^-1 F. The sparsity of the blocks may change with each
   call.

@@ -71,22 +71,29 @@ struct _p_SbCoarse {
    are this rank's. */
 PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool vertices, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
+
 /* Finds the units and the pattern of E. A: BAIJ or SBAIJ; rows: its pattern, and nodes in contact,
    which move by themselves; NULL: that of the space, and none. Collective. */
 PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const SbContactRows *rows);
+
 /* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern.
    Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
+
 /* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be
    positive definite: with a factorisation always, with multigrid perhaps not. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
+
 /* The second half of SbCoarseSetUp(), after coarse->value. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
+
 /* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z, or NULL.
    Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
+
 /* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
+
 /* x += Z E^-1 Z^T (b - A x). Collective. */
 PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 

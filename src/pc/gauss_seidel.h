@@ -11,10 +11,12 @@
    collective. */
 PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[],
                                   PetscBool *positive);
+
 /* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r differs from z and t.
    Collective. */
 PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
                                  Vec z, Vec t);
+
 /* z += (D + L)^-1 (r - A z); t is work space. Collective. */
 PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
                                Vec z, Vec t);

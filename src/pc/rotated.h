@@ -21,11 +21,14 @@ typedef struct {
 } SbExactNodes;
 
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
+
 /* Chooses in e, {0} before, free nodes with a spread above `limit`, raised if they are too many;
    factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
+
 /* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */
 void SbExactNodesBefore(SbExactNodes *e, float r[]);
+
 /* z += B (r - A (z + y)) + y after z = P r; r is the residual before SbExactNodesBefore(). */
 void SbExactNodesAfter(SbExactNodes *e, const float r[], float z[]);

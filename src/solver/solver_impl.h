@@ -29,3 +29,24 @@ PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
   for a space without such constraints.
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
+
+/* ---- the table of solvers (preset.c) */
+
+/* The row of the table, NULL if there is none. Not collective. */
+const SbSolverPreset *SbSolverPresetFind(const char *name);
+
+/* The row as a bit, for sets of rows; 0 for a row that a -pc_type gave. Not collective. */
+uint32_t SbSolverPresetBit(const SbSolverPreset *preset);
+
+/* The value of an option of PETSc in the row's options, "" if it has none. Not collective. */
+void SbSolverPresetValue(const SbSolverPreset *preset, const char *option, char value[SB_NAME_MAX]);
+
+/*
+  SbSolverPresetOfUser - the row that an option of PETSc asks for.
+
+  Not collective. Input: choice, the value of -solver. Output: preset, NULL if the user gives no
+  such option; option, its name. Options read: -pc_type; -pc_factor_mat_solver_type where `choice`
+  is auto, direct or a factorisation.
+*/
+PetscErrorCode SbSolverPresetOfUser(const char *choice, const SbSolverPreset **preset,
+                                    const char **option);
