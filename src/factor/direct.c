@@ -41,6 +41,7 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
 {
   const PetscBool mumps = (PetscBool)!strcmp(package, MATSOLVERMUMPS);
   const PetscBool umfpack = (PetscBool)!strcmp(package, MATSOLVERUMFPACK);
+  const char *options = "-mat_cholmod_factor supernodal -mat_cholmod_print 0";
   const char *outer;
   char prefix[96];
   PetscMPIInt size;
@@ -62,11 +63,11 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
 
   /* MUMPS counts all negative pivots only if the last front is not distributed; CHOLMOD otherwise
      factors small indefinite matrices, by L D L^T, and a failure is the solver's reason */
-  PetscCall(SbOptionsSetDefaults(prefix,
-                                 mumps     ? "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"
-                                 : umfpack ? "-mat_umfpack_ordering METIS"
-                                           : "-mat_cholmod_factor supernodal -mat_cholmod_print 0",
-                                 PETSC_FALSE));
+  if (mumps)
+    options = "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100";
+  else if (umfpack)
+    options = "-mat_umfpack_ordering METIS";
+  PetscCall(SbOptionsSetDefaults(prefix, options, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
