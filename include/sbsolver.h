@@ -24,11 +24,23 @@ extern const SbOption SbSolverRows[];
 /* Reads -solver: "auto", "direct" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
 
-/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row
-   whose matrix type it supports. The reason in words. Collective. */
-PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear,
-                              PetscBool explicit_run, const char *choice,
-                              const SbSolverPreset **preset, char reason[], size_t size);
+/* What a run solves, and the value of -solver. */
+typedef struct {
+  PetscBool dynamic, linear;
+  PetscBool explicit_run; /* nothing is solved */
+  const char *choice;     /* "auto", "direct" or a name of the table */
+} SbSolverProblem;
+
+/*
+  SbSolverChoose - the row for the problem's choice; with "auto" by the number of unknowns, ranks,
+  elements and laws.
+
+  Collective. Output: reason, in words; preset. Options read: -pc_type and
+  -pc_factor_mat_solver_type, which take the place of `choice`; -ksp_type. Errors: PETSC_ERR_USER
+  for a row that needs a package which this PETSc has not.
+*/
+PetscErrorCode SbSolverChoose(SbSpace space, const SbSolverProblem *problem, size_t size,
+                              char reason[], const SbSolverPreset **preset);
 
 /* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective.
    Errors: PETSC_ERR_USER where this PETSc has none for this number of ranks. */

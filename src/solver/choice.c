@@ -78,7 +78,7 @@ PetscErrorCode SbSolverFindFacts(SbSpace s, SbSolverFacts *f)
 
 static PetscBool is(const SbSolverFacts *f, const char *choice)
 {
-  return (PetscBool)!strcmp(f->choice, choice);
+  return (PetscBool)!strcmp(f->problem.choice, choice);
 }
 
 static PetscBool interface_too_large(const SbSolverFacts *f)
@@ -88,7 +88,7 @@ static PetscBool interface_too_large(const SbSolverFacts *f)
 
 static PetscBool runs_explicitly(const SbSolverFacts *f)
 {
-  return f->explicit_run;
+  return f->problem.explicit_run;
 }
 
 static PetscBool given_by_petsc_option(const SbSolverFacts *f)
@@ -114,7 +114,8 @@ static PetscBool rotation_pays(const SbSolverFacts *f)
 {
   const PetscBool hard_for_iterations = (PetscBool)(f->slivers && f->nu <= NU_SLIVERS);
 
-  return (PetscBool)(f->dynamic && !f->linear && !f->minres && f->face_nu <= NU_ROTATED &&
+  return (PetscBool)(f->problem.dynamic && !f->problem.linear && !f->minres &&
+                     f->face_nu <= NU_ROTATED &&
                      f->unknowns <= (hard_for_iterations ? ROTATED_SLIVERS : ROTATED));
 }
 
@@ -144,19 +145,19 @@ static PetscBool small(const SbSolverFacts *f)
 
 static PetscBool slivers_nearly_incompressible(const SbSolverFacts *f)
 {
-  return (PetscBool)(f->package && !f->dynamic && f->slivers && f->nu > NU_PRESSURE &&
+  return (PetscBool)(f->package && !f->problem.dynamic && f->slivers && f->nu > NU_PRESSURE &&
                      f->unknowns <= DIRECT_NEXT);
 }
 
 static PetscBool static_p2_nearly_incompressible(const SbSolverFacts *f)
 {
-  return (PetscBool)(f->package && !f->dynamic && f->p2 && f->nu > NU_SLIVERS &&
+  return (PetscBool)(f->package && !f->problem.dynamic && f->p2 && f->nu > NU_SLIVERS &&
                      f->unknowns <= DIRECT_NEXT);
 }
 
 static PetscBool vertices_locked(const SbSolverFacts *f)
 {
-  return (PetscBool)(f->package && !f->dynamic && !f->faces && f->nu > NU_LOCKED &&
+  return (PetscBool)(f->package && !f->problem.dynamic && !f->faces && f->nu > NU_LOCKED &&
                      f->unknowns <= DIRECT_P1);
 }
 
@@ -170,7 +171,7 @@ static PetscBool p2_nearly_incompressible(const SbSolverFacts *f)
 static PetscBool face_pressures_pay(const SbSolverFacts *f)
 {
   const PetscBool nearly_incompressible = (PetscBool)(f->face_nu > NU_PRESSURE);
-  const PetscBool jumps_or_static = (PetscBool)(!f->slivers && (f->dg || !f->dynamic));
+  const PetscBool jumps_or_static = (PetscBool)(!f->slivers && (f->dg || !f->problem.dynamic));
 
   return (PetscBool)(f->cr_dg && (nearly_incompressible || jumps_or_static) && !f->constraints &&
                      !f->coupled);
@@ -255,7 +256,7 @@ static void write_reason(const SbSolverFacts *f, const char *text, size_t size, 
   };
 
   SbFormat(sizeof(count), count, "%" PetscInt_FMT " unknowns", f->unknowns);
-  SbFormat(sizeof(system), system, "%s, %s", f->dynamic ? "dynamic" : "static", count);
+  SbFormat(sizeof(system), system, "%s, %s", f->problem.dynamic ? "dynamic" : "static", count);
   SbFormat(sizeof(ranks), ranks, "%d rank%s", (int)f->ranks, f->ranks > 1 ? "s" : "");
   SbFormat(sizeof(nu), nu, "%g", (double)f->nu);
   SbFormat(sizeof(face_nu), face_nu, "%g", (double)f->face_nu);
@@ -299,15 +300,14 @@ const SbSolverPreset *SbSolverChooseByFacts(const SbSolverFacts *f, size_t size,
   if (!strcmp(name, GIVEN))
     return f->given;
   if (!strcmp(name, NAMED))
-    name = f->choice;
+    name = f->problem.choice;
   if (!strcmp(name, FACTOR))
     name = f->package;
   return name ? SbSolverPresetFind(name) : NULL;
 }
 
-PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear,
-                              PetscBool explicit_run, const char *choice,
-                              const SbSolverPreset **preset, char reason[], size_t size)
+PetscErrorCode SbSolverChoose(SbSpace s, const SbSolverProblem *problem, size_t size, char reason[],
+                              const SbSolverPreset **preset)
 {
   char method[SB_NAME_MAX] = "";
   PetscBool has = PETSC_TRUE;
@@ -316,26 +316,23 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear,
 
   PetscFunctionBeginUser;
   PetscCall(SbSolverFindFacts(s, &f));
-  f.dynamic = dynamic;
-  f.linear = linear;
-  f.explicit_run = explicit_run;
-  f.choice = choice;
+  f.problem = *problem;
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   f.minres = (PetscBool)!strcmp(method, KSPMINRES);
-  if (!explicit_run)
-    PetscCall(SbSolverPresetOfUser(choice, &f.given, &f.given_by));
+  if (!problem->explicit_run)
+    PetscCall(SbSolverPresetOfUser(problem->choice, &f.given, &f.given_by));
 
   /* the interface between ranks, where the rotated factorisation may be taken */
   may_rotate =
     (PetscBool)(is(&f, "rotated") || is(&f, "realtime") || (is(&f, "auto") && rotation_pays(&f)));
-  if (may_rotate && !f.given && !explicit_run && s->ghosted)
+  if (may_rotate && !f.given && !problem->explicit_run && s->ghosted)
     PetscCall(SbSpaceInterfaceSize(s, &f.interface, &f.interface_most));
   if (interface_too_large(&f) && !is(&f, "auto"))
     PetscCall(SbWarning(s->comm,
                         "-solver %s is for parts of ranks that meet at %" PetscInt_FMT
                         " nodes at most (-pc_rotated_interface), and these meet at %" PetscInt_FMT
                         ": another solver is taken; fewer ranks may be faster",
-                        choice, f.interface_most, f.interface));
+                        problem->choice, f.interface_most, f.interface));
 
   *preset = SbSolverChooseByFacts(&f, size, reason);
   PetscCheck(

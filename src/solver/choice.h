@@ -27,12 +27,9 @@ typedef struct {
   PetscBool indefinite;
   const char *package; /* the fastest factorisation for the system; NULL: there is none */
 
-  /* the run */
-  PetscBool dynamic, linear;
-  PetscBool explicit_run; /* nothing is solved */
+  SbSolverProblem problem;
 
-  /* the user's options */
-  const char *choice;          /* of -solver: auto, direct, or a name */
+  /* the user's options of PETSc */
   const SbSolverPreset *given; /* the row that a -pc_type or package asks for; NULL: none */
   const char *given_by;        /* the name of that option */
   PetscBool minres;            /* -ksp_type minres */

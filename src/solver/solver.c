@@ -87,7 +87,7 @@ static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
-  PetscBool given, symmetric, reproducible;
+  PetscBool given, symmetric, reproducible, one_solve;
   KSP ksp;
   PC pc;
 
@@ -129,8 +129,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
   /* PETSc keeps the eigenvalue estimate of the first matrix, too small once contact stiffness is
      added */
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
-  if (!given && !strcmp(type, PCGAMG))
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &one_solve));
+  if (!one_solve && !strcmp(type, PCGAMG))
     PetscCall(SbOptionsSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
   PetscCall(SbOptionsSetDefaults("", preset->options, PETSC_FALSE));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY))

@@ -219,34 +219,48 @@ static PetscErrorCode check_table(void)
     const char *solver;
   } of[] = {
     /* nothing to solve; the user's choice */
-    {{.unknowns = 900, .explicit_run = PETSC_TRUE, .choice = "direct"}, "cg"},
-    {{.unknowns = 900, .choice = "direct"}, "cholmod"},
-    {{.unknowns = 900, .choice = "direct", .package = NONE}, NULL},
-    {{.unknowns = 900, .choice = "sor"}, "sor"},
-    {{.unknowns = 90000, .choice = "rotated", .interface = 9, .interface_most = 9}, "rotated"},
-    {{.unknowns = 90000, .choice = "rotated", .interface = 10, .interface_most = 9},
+    {{.unknowns = 900, .problem.explicit_run = PETSC_TRUE, .problem.choice = "direct"}, "cg"},
+    {{.unknowns = 900, .problem.choice = "direct"}, "cholmod"},
+    {{.unknowns = 900, .problem.choice = "direct", .package = NONE}, NULL},
+    {{.unknowns = 900, .problem.choice = "sor"}, "sor"},
+    {{.unknowns = 90000, .problem.choice = "rotated", .interface = 9, .interface_most = 9},
+     "rotated"},
+    {{.unknowns = 90000, .problem.choice = "rotated", .interface = 10, .interface_most = 9},
      "cg_two_level"},
 
     /* the rotated factorisation */
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE}, "rotated"},
-    {{.unknowns = 60001, .dynamic = PETSC_TRUE}, "cg_two_level"},
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE, .linear = PETSC_TRUE}, "cg_two_level"},
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE, .minres = PETSC_TRUE}, "cg_two_level"},
-    {{.unknowns = 120000, .dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.49}, "rotated"},
-    {{.unknowns = 120001, .dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.49},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE}, "rotated"},
+    {{.unknowns = 60001, .problem.dynamic = PETSC_TRUE}, "cg_two_level"},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE, .problem.linear = PETSC_TRUE},
      "cg_two_level"},
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.491}, "rotated"},
-    {{.unknowns = 60001, .dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.491},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE, .minres = PETSC_TRUE}, "cg_two_level"},
+    {{.unknowns = 120000, .problem.dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.49},
+     "rotated"},
+    {{.unknowns = 120001, .problem.dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.49},
      "cg_two_level"},
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE, .cr_dg = PETSC_TRUE, .face_nu = 0.4999}, "rotated"},
-    {{.unknowns = 60000, .dynamic = PETSC_TRUE, .cr_dg = PETSC_TRUE, .face_nu = 0.49991},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.491},
+     "rotated"},
+    {{.unknowns = 60001, .problem.dynamic = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.491},
+     "cg_two_level"},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE, .cr_dg = PETSC_TRUE, .face_nu = 0.4999},
+     "rotated"},
+    {{.unknowns = 60000, .problem.dynamic = PETSC_TRUE, .cr_dg = PETSC_TRUE, .face_nu = 0.49991},
      "pressure"},
 
     /* many ranks: neither a rotated factorisation nor one by a package, but near nu = 1/2 */
-    {{.unknowns = 900, .dynamic = PETSC_TRUE, .interface = 9, .interface_most = 9}, "rotated"},
-    {{.unknowns = 900, .dynamic = PETSC_TRUE, .interface = 10, .interface_most = 9, .nu = 0.45},
+    {{.unknowns = 900, .problem.dynamic = PETSC_TRUE, .interface = 9, .interface_most = 9},
+     "rotated"},
+    {{.unknowns = 900,
+      .problem.dynamic = PETSC_TRUE,
+      .interface = 10,
+      .interface_most = 9,
+      .nu = 0.45},
      "cg_two_level"},
-    {{.unknowns = 900, .dynamic = PETSC_TRUE, .interface = 10, .interface_most = 9, .nu = 0.451},
+    {{.unknowns = 900,
+      .problem.dynamic = PETSC_TRUE,
+      .interface = 10,
+      .interface_most = 9,
+      .nu = 0.451},
      "cholmod"},
 
     /* P2 */
@@ -260,7 +274,7 @@ static PetscErrorCode check_table(void)
     {{.unknowns = 30001, .p2 = PETSC_TRUE, .slivers = PETSC_TRUE, .nu = 0.451}, "cholmod"},
     {{.unknowns = 200000, .p2 = PETSC_TRUE, .nu = 0.491}, "cholmod"},
     {{.unknowns = 200001, .p2 = PETSC_TRUE, .nu = 0.491}, "pressure"},
-    {{.unknowns = 90000, .p2 = PETSC_TRUE, .nu = 0.491, .dynamic = PETSC_TRUE}, "pressure"},
+    {{.unknowns = 90000, .p2 = PETSC_TRUE, .nu = 0.491, .problem.dynamic = PETSC_TRUE}, "pressure"},
     {{.unknowns = 200001, .p2 = PETSC_TRUE, .nu = 0.491, .constraints = PETSC_TRUE},
      "cg_p_multigrid"},
     {{.unknowns = 200001, .p2 = PETSC_TRUE, .nu = 0.491, .coupled = PETSC_TRUE}, "cg_p_multigrid"},
@@ -273,7 +287,7 @@ static PetscErrorCode check_table(void)
     {{.unknowns = 80000, .nu = 0.49951}, "cholmod"},
     {{.unknowns = 80000, .nu = 0.49951, .package = NONE}, "cg_two_level"},
     {{.unknowns = 80001, .nu = 0.49951}, "cg_two_level"},
-    {{.unknowns = 80000, .nu = 0.49951, .dynamic = PETSC_TRUE}, "cg_two_level"},
+    {{.unknowns = 80000, .nu = 0.49951, .problem.dynamic = PETSC_TRUE}, "cg_two_level"},
     {{.unknowns = 200000, .nu = 0.45, .slivers = PETSC_TRUE}, "cg_two_level"},
     {{.unknowns = 200000, .nu = 0.451, .slivers = PETSC_TRUE}, "cholmod"},
     {{.unknowns = 200001, .nu = 0.451, .slivers = PETSC_TRUE}, "cg_two_level"},
@@ -284,14 +298,15 @@ static PetscErrorCode check_table(void)
     {{.unknowns = 80000, .cr_dg = PETSC_TRUE, .face_nu = 0.4999}, "pressure"},
     {{.unknowns = 30001, .cr_dg = PETSC_TRUE, .face_nu = 0.3, .slivers = PETSC_TRUE},
      "cg_two_level"},
-    {{.unknowns = 90000, .cr_dg = PETSC_TRUE, .face_nu = 0.45, .dynamic = PETSC_TRUE},
+    {{.unknowns = 90000, .cr_dg = PETSC_TRUE, .face_nu = 0.45, .problem.dynamic = PETSC_TRUE},
      "cg_two_level"},
-    {{.unknowns = 90000, .cr_dg = PETSC_TRUE, .face_nu = 0.451, .dynamic = PETSC_TRUE}, "pressure"},
+    {{.unknowns = 90000, .cr_dg = PETSC_TRUE, .face_nu = 0.451, .problem.dynamic = PETSC_TRUE},
+     "pressure"},
     {{.unknowns = 90000,
       .cr_dg = PETSC_TRUE,
       .dg = PETSC_TRUE,
       .face_nu = 0.3,
-      .dynamic = PETSC_TRUE},
+      .problem.dynamic = PETSC_TRUE},
      "pressure"},
     {{.unknowns = 30001, .cr_dg = PETSC_TRUE, .face_nu = 0.3, .constraints = PETSC_TRUE},
      "cg_two_level"},
@@ -310,8 +325,8 @@ static PetscErrorCode check_table(void)
       f.nu = PetscMax(f.nu, f.face_nu);
     else
       f.face_nu = -1.;
-    if (!f.choice)
-      f.choice = "auto";
+    if (!f.problem.choice)
+      f.problem.choice = "auto";
     if (!f.package)
       f.package = MATSOLVERCHOLMOD;
     else if (!strcmp(f.package, NONE))
