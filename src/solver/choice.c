@@ -101,7 +101,7 @@ static PetscBool asked_for_factorisation(const SbSolverFacts *f)
   return is(f, "direct");
 }
 
-/* a rotated factorisation whose interface is too large is chosen as with auto */
+/* A rotated factorisation whose interface is too large is replaced as with auto. */
 static PetscBool named(const SbSolverFacts *f)
 {
   return (PetscBool)(!is(f, "auto") && !interface_too_large(f));
@@ -136,7 +136,7 @@ static PetscBool p2_compressible(const SbSolverFacts *f)
 
 /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and
    50. */
-static PetscBool small(const SbSolverFacts *f)
+static PetscBool small_enough_to_factor(const SbSolverFacts *f)
 {
   const PetscBool many_ranks = (PetscBool)(interface_too_large(f) && f->nu <= NU_PRESSURE);
 
@@ -155,7 +155,7 @@ static PetscBool static_p2_nearly_incompressible(const SbSolverFacts *f)
                      f->unknowns <= DIRECT_NEXT);
 }
 
-static PetscBool vertices_locked(const SbSolverFacts *f)
+static PetscBool p1_locked(const SbSolverFacts *f)
 {
   return (PetscBool)(f->package && !f->problem.dynamic && !f->faces && f->nu > NU_LOCKED &&
                      f->unknowns <= DIRECT_P1);
@@ -210,25 +210,24 @@ static const struct {
   /* auto: fast whatever the conditioning */
   {rotates, "rotated", "{system}: one factorisation, rotated with the nodes, serves many steps"},
   {p2_compressible, "cg_p_multigrid",
-   "{system} of p2, nu up to {nu}: with P1 on the vertices below it iterations do not grow with "
-   "the "
-   "mesh"},
-  {small, FACTOR, "{count}: a factorisation is fast and works at any Poisson's ratio{indefinite}"},
+   "{system} of p2, nu up to {nu}: with P1 on the vertices below it iterations do not grow "
+   "with the mesh"},
+  {small_enough_to_factor, FACTOR,
+   "{count}: a factorisation is fast and works at any Poisson's ratio{indefinite}"},
 
   /* auto: systems that are hard for iterations */
   {slivers_nearly_incompressible, FACTOR,
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
   {static_p2_nearly_incompressible, FACTOR,
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
-  {vertices_locked, FACTOR,
+  {p1_locked, FACTOR,
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
   {p2_nearly_incompressible, "pressure",
    "{system} of p2, nu up to {nu}: with the pressures as unknowns iterations hardly grow towards "
    "1/2"},
   {face_pressures_pay, "pressure",
-   "{system} of cr or dg, nu up to {face_nu}: with the pressures as unknowns iterations hardly "
-   "grow "
-   "towards 1/2"},
+   "{system} of cr or dg, nu up to {face_nu}: with the pressures as unknowns iterations "
+   "hardly grow towards 1/2"},
 
   /* auto: all others. 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7,
      cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
@@ -452,8 +451,7 @@ PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[
   PetscCall(SbDirectPackage(comm, PETSC_MAX_INT, PETSC_FALSE, &package));
   PetscCheck(package, comm, PETSC_ERR_USER,
              "-static_control arc_length factors indefinite matrices, which takes MUMPS or "
-             "UMFPACK, and this "
-             "PETSc has neither: choose another -solver");
+             "UMFPACK, and this PETSc has neither: choose another -solver");
   PetscCall(PetscStrncpy(choice, package, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

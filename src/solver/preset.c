@@ -21,8 +21,8 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscCheck(
     frames, s->comm, PETSC_ERR_USER,
     "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the "
-    "materials "
-    "linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated");
+    "materials linear, and corotated with -body_<name>_tangent warped: choose these, or -solver "
+    "rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -78,28 +78,21 @@ static const SbSolverPreset by_type[] = {
 
 const SbOption SbSolverRows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
-   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_"
-   "hypre|"
-   "gauss_seidel|sor|cholmod|umfpack|mumps|rotated|realtime|pressure",
+   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|"
+   "cg_hypre|gauss_seidel|sor|cholmod|umfpack|mumps|rotated|realtime|pressure",
    "linear solver. auto: chosen by size, ranks and material, and reported; direct: the fastest "
-   "factorisation "
-   "that this PETSc has; cg_...: conjugate gradients, preconditioned by Jacobi, point-block "
-   "Jacobi, "
-   "incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse space, p-multigrid (p2), "
-   "GAMG or "
-   "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, "
-   "mumps: "
-   "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated "
-   "with the "
-   "nodes from then on; realtime: the same without a matrix and warm-started, for p1 and p2, "
-   "linear and "
-   "corotated; pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near "
-   "incompressibility. PETSc's -ksp_ and -pc_ options refine it"},
+   "factorisation that this PETSc has; cg_...: conjugate gradients, preconditioned by Jacobi, "
+   "point-block Jacobi, incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse "
+   "space, p-multigrid (p2), GAMG or BoomerAMG; gauss_seidel, sor: stationary iterations by "
+   "blocks, or PETSc's; cholmod, umfpack, mumps: factorisations; rotated: CG with a Cholesky "
+   "factor in low precision, computed once and rotated with the nodes from then on; realtime: the "
+   "same without a matrix and warm-started, for p1 and p2, linear and corotated; pressure: GMRES "
+   "with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. PETSc's "
+   "-ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "bitwise identical results of every run on the same number of ranks: matrices are factored on "
-   "one rank, "
-   "and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival of "
-   "messages"},
+   "one rank, and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival "
+   "of messages"},
   {0},
 };
 
