@@ -192,6 +192,10 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[],
                               PetscInt ia[], PetscInt ja[], PetscReal block[]);
 
+/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2() that the caller
+   frees. Not collective. */
+PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
+
 /* Gives a symmetric SBAIJ (one rank) or BAIJ matrix of final pattern the product of product.c.
    Collective. */
 PetscErrorCode SbProductAttach(Mat A);

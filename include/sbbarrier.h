@@ -1,5 +1,5 @@
 /*
-  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of
+  sbbarrier.h - layer 7: barrier contact of surfaces. Vertices, edges and triangles of bodies and of
   an obstacle, contact pairs, continuous collision detection, the barrier potential.
 
   Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every

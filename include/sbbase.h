@@ -93,6 +93,12 @@ const SbOption *SbOptionFind(const SbScope *scope, const char *key);
 /* Full name, e.g. "-body_liver_young", for messages. */
 void SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
+/* Adds options of PETSc's objects, such as "-key value", with a prefix to PETSc's database unless
+   the user set them, or (clear) removes those whose values are still the same. -ksp_type and
+   -pc_type are skipped: they are set by calls, so that types in the database are always the user's.
+   Not collective. */
+PetscErrorCode SbOptionsSetDefaults(const char *prefix, const char *options, PetscBool clear);
+
 /* Examines the options of ours that nobody read (src/base/option_check.c): warns of one that is of
    no use in this run, with the reason; one that does not exist ends the run, with the nearest
    names. Collective. */

@@ -1,5 +1,5 @@
 /*
-  sbcontact.h - layer 5: rigid obstacles, fixed or on a prescribed path.
+  sbcontact.h - layer 7: rigid obstacles, fixed or on a prescribed path.
 */
 #pragma once
 #include "sbfem.h"

@@ -1,5 +1,5 @@
 /*
-  sbeffect.h - layer 5: effects: loads, supports, damping, contact.
+  sbeffect.h - layer 7: effects: loads, supports, damping, contact.
 
   An operation left NULL means "nothing to do" and is never called: the model sorts the effects into
   one list per operation after set-up. An effect that the scenario does not name is never created.

@@ -1,5 +1,5 @@
 /*
-  sbestimate.h - layer 7: how large the errors of a run are. The errors of space:
+  sbestimate.h - layer 9: how large the errors of a run are. The errors of space:
   src/ledger/estimate_space.c.
 */
 #pragma once

@@ -1,5 +1,5 @@
 /*
-  sbledger.h - layer 7: error estimates of a run by source, beside the seconds spent on each.
+  sbledger.h - layer 9: error estimates of a run by source, beside the seconds spent on each.
 
   Errors are in the norm of the energy: the square of an error is its energy, J, as a strain and a
   velocity of the bodies; relative is the root of its share of the largest energy, kinetic and

@@ -1,5 +1,5 @@
 /*
-  sbmodel.h - layer 6: composition of a scene, evaluation of its forces and tangent, energies and
+  sbmodel.h - layer 8: composition of a scene, evaluation of its forces and tangent, energies and
   momenta.
 */
 #pragma once

@@ -1,5 +1,5 @@
 /*
-  sboutput.h - layer 7: one folder per run. fields.h5 and its indices, history.csv, run.json,
+  sboutput.h - layer 9: one folder per run. fields.h5 and its indices, history.csv, run.json,
   checkpoints.
 
   Everything here attaches to a run as a monitor; output that the scenario does not select is not

@@ -1,4 +1,4 @@
-/* sbremesh.h - layer 8: re-meshing of bodies during a run, and its mesher. */
+/* sbremesh.h - layer 10: re-meshing of bodies during a run, and its mesher. */
 #pragma once
 #include "sbledger.h"
 #include "sbsurface.h"

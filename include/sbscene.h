@@ -1,5 +1,5 @@
 /*
-  sbscene.h - layer 8: from the command line and an option file to a model; names that a scenario
+  sbscene.h - layer 10: from the command line and an option file to a model; names that a scenario
   may use.
 */
 #pragma once

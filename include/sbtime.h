@@ -1,5 +1,5 @@
 /*
-  sbtime.h - layer 7: presets of the integrators, the second-order TSType, steps and their monitors.
+  sbtime.h - layer 9: presets of the integrators, the second-order TSType, steps and their monitors.
 */
 #pragma once
 #include "sbmodel.h"

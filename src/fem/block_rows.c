@@ -59,3 +59,16 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   PetscCall(SbMatRestoreBlocks(&b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
+{
+  const PetscInt n = s->nnode_owned;
+  const PetscInt nz = s->plan->di[n] + s->plan->oi[n];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(n + 1, ia, nz, ja));
+  PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
+  for (PetscInt k = 0; k < nz; k++)
+    (*ja)[k] = s->gnode[(*ja)[k]];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

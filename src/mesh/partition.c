@@ -323,9 +323,15 @@ static PetscErrorCode check_type(MPI_Comm comm, const char *type)
              "-petscpartitioner_type shell: it needs a program that gives the parts");
   PetscCall(PetscFunctionListFind(PetscPartitionerList, type, &create));
   if (!create) {
+    const char **names;
     char advice[512];
+    int n;
 
-    PetscCall(SbListAdvise(PetscPartitionerList, type, sizeof(advice), advice));
+    PetscCall(PetscFunctionListGet(PetscPartitionerList, &names, &n));
+    while (n && !names[n - 1])
+      n--; /* PETSc 3.18 counts the terminating NULL */
+    SbAdviseSorted(type, n, names, sizeof(advice), advice);
+    PetscCall(PetscFree(names));
     SETERRQ(comm, PETSC_ERR_USER_INPUT, "-petscpartitioner_type %s: there is no such type; %s",
             type, advice);
   }

@@ -7,6 +7,7 @@
   in the null space, so that one iteration is enough, up to rounding. Without active constraints M
   itself is used.
 */
+#include "sbpc.h"
 #include "solver_impl.h"
 #include "sblog.h"
 
@@ -166,21 +167,6 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace s, PC pc, PC *inner)
   PetscCall(PCShellSetView(pc, view_wrapped));
   PetscCall(PCShellSetDestroy(pc, destroy_wrapped));
   *inner = w->inner;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context)
-{
-  const char *own = NULL;
-  PetscBool is;
-
-  PetscFunctionBeginUser;
-  *(void **)context = NULL;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is)
-    PetscCall(PCShellGetName(pc, &own));
-  if (own && !strcmp(own, name))
-    PetscCall(PCShellGetContext(pc, context));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

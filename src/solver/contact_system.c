@@ -6,7 +6,7 @@
   has not used for KEEP solves are dropped at the next growth. So most Newton iterations change
   values only, and the symbolic factorisation and the coarse space are reused.
 
-  Systems are solved by CG with the coarse space of pc_coarse.c, to a tolerance of FORCING in the
+  Systems are solved by CG with the coarse space of two_level.c, to a tolerance of FORCING in the
   norm of the preconditioner, or factored on one rank (block_solver.c). The limit of CG's iterations
   costs as much as the factorisation: the operations of both factorisations follow from the symbolic
   ones, the work of an iteration from the numbers of blocks of the matrix and of the coarse factor.
@@ -18,8 +18,9 @@
   -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
   -sub_pc_type) apply here, too.
 */
-#include "coarse.h"
+#include "sbassembly.h"
 #include "sblog.h"
+#include "sbpc.h"
 #include "sbsolver.h"
 
 #define KEEP 20      /* solves after which an unused block is dropped from the pattern */
@@ -38,6 +39,12 @@
 #define FORCING_USER 1e-4
 #define MOST_USER 5000
 
+/* The two copies of the rows: PETSc's matrix for CG, and the factor. */
+enum {
+  MATRIX,
+  FACTOR
+};
+
 struct _p_SbContactSystem {
   SbSpace space;
   PetscInt choice; /* 0 by cost, 1 factorisation, 2 CG */
@@ -53,9 +60,9 @@ struct _p_SbContactSystem {
   PetscInt budget;      /* credit of iterations */
   PetscInt resume, pause;    /* number of the solve in which CG is tried again; solves until then */
   PetscReal *tangent;        /* [ka[n]][9] blocks of the tangent */
-  PetscBool fresh[2];        /* matrix, factor: lack the current values */
-  PetscBool foreign[2];      /* matrix, factor: have an old pattern */
-  char method[32], type[32]; /* the user's Krylov method and preconditioner, "": none */
+  PetscBool stale_values[2]; /* MATRIX, FACTOR: lacks the current values */
+  PetscBool stale_pattern[2];   /* MATRIX, FACTOR: has an old pattern */
+  char method[32], type[32];    /* the user's Krylov method and preconditioner, "": none */
   SbBlockSolver factor, coarse; /* of all; of the coarse space, borrowed */
   KSP ksp;
   Mat A;
@@ -197,7 +204,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
   if (missing) {
     PetscCall(make_pattern(c, b));
-    c->foreign[0] = c->foreign[1] = PETSC_TRUE;
+    c->stale_pattern[MATRIX] = c->stale_pattern[FACTOR] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, NULL, c->ka, NULL, c->tangent));
 
@@ -217,7 +224,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     for (int e = 0; e < 9; e++)
       to[e] += b->block[k].H[e];
   }
-  c->fresh[0] = c->fresh[1] = PETSC_TRUE;
+  c->stale_values[MATRIX] = c->stale_values[FACTOR] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,12 +266,12 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   const SbSpace s = c->space;
   const SbContactRows *rows = &c->rows;
   PetscBool own = (PetscBool)!c->type[0];
-  PetscBool apart;
+  PetscBool contact_type; /* the user gives -contact_pc_type */
   Mat P;
   PC pc;
 
   PetscFunctionBeginUser;
-  if (c->foreign[0]) {
+  if (c->stale_pattern[MATRIX]) {
     PetscCall(MatDestroy(&c->A));
     PetscCall(MatCreate(s->comm, &c->A));
     PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
@@ -282,10 +289,10 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   if (!c->ksp) {
     PetscCall(KSPCreate(s->comm, &c->ksp));
 
-    /* options for -pc_type, from its preset in solver.c and the user, have no prefix in the
+    /* options for -pc_type, from its preset and the user, have no prefix in the
        database */
-    PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &apart));
-    if (own || apart)
+    PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &contact_type));
+    if (own || contact_type)
       PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
     PetscCall(KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10,
                                own ? MOST : MOST_USER));
@@ -306,7 +313,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscCall(KSPSetOperators(c->ksp, P, P));
   if (!own)
     PetscCall(MatDestroy(&P));
-  c->foreign[0] = c->fresh[0] = PETSC_FALSE;
+  c->stale_pattern[MATRIX] = c->stale_values[MATRIX] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -326,7 +333,7 @@ static PetscErrorCode find_most(SbContactSystem c)
   if (!c->factor) {
     PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
     PetscCall(SbBlockSolverAnalyze(c->factor, rows->n, rows->ia, rows->ja));
-    c->foreign[1] = PETSC_FALSE;
+    c->stale_pattern[FACTOR] = PETSC_FALSE;
   }
   PetscCall(SbBlockSolverCost(c->factor, &flops[0], &entries[0]));
   PetscCall(SbBlockSolverCost(c->coarse, &flops[1], &entries[1]));
@@ -340,10 +347,10 @@ static PetscErrorCode find_most(SbContactSystem c)
 static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason,
                               PetscInt *iterations)
 {
-  const PetscBool changed = c->foreign[0];
+  const PetscBool changed = c->stale_pattern[MATRIX];
 
   PetscFunctionBeginUser;
-  if (c->fresh[0])
+  if (c->stale_values[MATRIX])
     PetscCall(set_up_iteration(c));
 
   /* PETSc's log events count the set-up and the iteration */
@@ -384,7 +391,8 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   /* factor by choice, if small, while CG pauses, or if a factor of these values exists */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
-                          (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));
+                          (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume ||
+                           !c->stale_values[FACTOR])));
   *iterations = 0;
   *reason = KSP_DIVERGED_ITS;
   if (!factored)
@@ -399,12 +407,12 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   if (factored || slow) {
     if (!c->factor)
       PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
-    if (c->fresh[1]) {
+    if (c->stale_values[FACTOR]) {
       PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value,
-                                   c->foreign[1], &ok));
-      c->foreign[1] = PETSC_FALSE;
+                                   c->stale_pattern[FACTOR], &ok));
+      c->stale_pattern[FACTOR] = PETSC_FALSE;
     }
-    c->fresh[1] = (PetscBool)!ok;
+    c->stale_values[FACTOR] = (PetscBool)!ok;
     if (ok)
       PetscCall(SbBlockSolverSolve(c->factor, F, Y));
     *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;

@@ -1,429 +1,20 @@
 /*
-  Linear solvers by name. Each is a table row with PETSc options, set in the options database unless
-  the user set them, so that everything stays adjustable by PETSc's own options, and the matrix type
-  that its preconditioner needs.
+  Linear solvers from a row of the table (preset.c) to a KSP of PETSc that is set up. The row's
+  options are set in the options database unless the user set them, so that everything stays
+  adjustable by PETSc's own options. SbSolverFinish() reports unsupported combinations as errors
+  before anything is computed.
 
-  A -pc_type of the user other than the row's replaces the row: `by_type` gives the matrix type. The
-  Krylov method is then CG, or that of -ksp_type. SbSolverFinish() reports unsupported combinations
-  as errors before anything is computed.
-
-  The convergence test uses the true residual wherever the method computes it: the preconditioned
-  norm can be off by orders of magnitude for nearly incompressible bodies. Gauss-Seidel and SOR are
-  wrapped in a PCCOMPOSITE with one member: a bare PCSOR takes over Richardson's loop and does the
-  maximum number of sweeps without testing the residual. A solve that does not reach its tolerance
-  fails; the next solver of a list is then tried on the same system (time/solver_list.c), and only
-  if all fail is the step halved or the run stopped.
+  The convergence test uses the true residual wherever the method computes it (true_residual.c): the
+  preconditioned norm can be off by orders of magnitude for nearly incompressible bodies. A solve
+  that does not reach its tolerance fails; the next solver (choice.c) is then tried on the same
+  system (time/solver_list.c), and only if all fail is the step halved or the run stopped.
 */
+#include "choice.h"
+#include "sbfactor.h"
+#include "sbpc.h"
 #include "solver_impl.h"
 
 #define RESTART 100 /* restart length of FGMRES */
-/* Thresholds from docs/reports/solver_choice.md. Largest number of unknowns for ... */
-#define ROTATED 60000          /* the rotated factorisation */
-#define ROTATED_SLIVERS 120000 /* the same, with slivers and nu up to NU_SLIVERS */
-#define DIRECT_P1 80000 /* a factorisation for P1, from nu = NU_LOCKED on: faster than iterations */
-#define P_MULTIGRID 5000 /* a factorisation for P2, up to nu = NU_SLIVERS: as fast as p-multigrid */
-#define DIRECT_NEXT \
-  200000 /* a factorisation with slivers from NU_PRESSURE on, or as first fallback */
-/* Poisson's ratio ... */
-#define NU_PRESSURE 0.45 /* from which on dynamic CR, too, has the pressures as unknowns */
-#define NU_SLIVERS 0.49
-#define NU_LOCKED 0.4995
-#define NU_ROTATED 0.4999 /* up to which the rotated factorisation is used for CR and DG */
-#define SLIVERS 0.001     /* fraction of the tets from which on slivers matter */
-
-static PetscErrorCode create_frames(SbSpace s, Mat *A)
-{
-  PetscBool frames;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceAllowsMatrixFree(s, &frames));
-  PetscCheck(
-    frames, s->comm, PETSC_ERR_USER,
-    "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the "
-    "materials "
-    "linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated");
-  PetscCall(SbSpaceCreateMatrixFree(s, A));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The names are explained at the option below. */
-static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
-  {"cg_jacobi", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
-  {"cg_icc", SB_MATRIX_SBAIJ,
-   .options =
-     "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite"},
-  {"cg_ssor", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
-  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate},
-  {"cg_p_multigrid", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCPMultigridCreate},
-  {"cg_gamg", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type gamg"},
-  {"cg_hypre", SB_MATRIX_AIJ,
-   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5",
-   .package = "hypre"},
-  /* these two are block Jacobi between ranks */
-  {"gauss_seidel", SB_MATRIX_AIJ,
-   .options = "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 "
-              "-ksp_max_it 100000"},
-  {"sor", SB_MATRIX_AIJ,
-   .options =
-     "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 "
-     "-ksp_max_it 100000"},
-  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg", .package = MATSOLVERCHOLMOD, .direct = PETSC_TRUE},
-  {"umfpack", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERUMFPACK, .direct = PETSC_TRUE},
-  {"mumps", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERMUMPS, .direct = PETSC_TRUE},
-  {"rotated", SB_MATRIX_BAIJ, "-ksp_type cg", .precondition = SbPCRotatedCreate},
-  /* fastest with -snes_type ksponly and -ksp_rtol 1e-4 */
-  {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
-   .create = create_frames, .precondition = SbPCRotatedCreate},
-  {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300",
-   .create = SbPressureOperatorCreate, .precondition = SbPCPressureCreate},
-};
-
-/* Matrix types and options for preconditioners of -pc_type. The last row: all others. */
-static const SbSolverPreset by_type[] = {
-  {PCNONE, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
-  {PCJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
-  {PCPBJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
-  {PCICC, SB_MATRIX_SBAIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
-  {PCBJACOBI, SB_MATRIX_AIJ, "-ksp_type cg -sub_pc_factor_shift_type positive_definite",
-   .by_type = PETSC_TRUE},
-  {PCASM, SB_MATRIX_AIJ, "-ksp_type cg -sub_pc_factor_shift_type positive_definite",
-   .by_type = PETSC_TRUE},
-  {PCSOR, SB_MATRIX_AIJ, "-ksp_type cg -pc_sor_local_symmetric", .by_type = PETSC_TRUE},
-  {PCHYPRE, SB_MATRIX_AIJ, "-ksp_type cg", .package = "hypre", .by_type = PETSC_TRUE},
-  {"", SB_MATRIX_AIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
-};
-
-const SbOption SbSolverRows[] = {
-  {"solver", SB_OPTION_CHOICE, 1, "", "auto",
-   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_"
-   "hypre|"
-   "gauss_seidel|sor|cholmod|umfpack|mumps|rotated|realtime|pressure",
-   "linear solver. auto: chosen by size, ranks and material, and reported; direct: the fastest "
-   "factorisation "
-   "that this PETSc has; cg_...: conjugate gradients, preconditioned by Jacobi, point-block "
-   "Jacobi, "
-   "incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse space, p-multigrid (p2), "
-   "GAMG or "
-   "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, "
-   "mumps: "
-   "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated "
-   "with the "
-   "nodes from then on; realtime: the same without a matrix and warm-started, for p1 and p2, "
-   "linear and "
-   "corotated; pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near "
-   "incompressibility. PETSc's -ksp_ and -pc_ options refine it"},
-  {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
-   "bitwise identical results of every run on the same number of ranks: matrices are factored on "
-   "one rank, "
-   "and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival of "
-   "messages"},
-  {0},
-};
-
-PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
-{
-  int index;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionChoice(&SbRunScope, "solver", &index));
-  PetscCall(SbOptionCheckEarly(&SbRunScope, "reproducible"));
-
-  /* choice 0 is auto, 1 is direct, then follow the rows of the table */
-  PetscCall(PetscStrncpy(choice,
-                         index > 1 ? presets[index - 2].name
-                         : index   ? "direct"
-                                   : "auto",
-                         size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const SbSolverPreset *find_preset(const char *name)
-{
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(presets); k++)
-    if (!strcmp(presets[k].name, name))
-      return &presets[k];
-  return NULL;
-}
-
-/* Value of an option in a preset's option string, "" if it has none. */
-static void preset_value(const SbSolverPreset *preset, const char *name, char value[SB_NAME_MAX])
-{
-  const char *at = strstr(preset->options, name);
-
-  at = at ? at + strlen(name) + 1 : "";
-  SbFormat(SB_NAME_MAX, value, "%.*s", (int)strcspn(at, " "), at);
-}
-
-/* Properties of the bodies that make systems hard to solve. */
-typedef struct {
-  PetscReal nu, face_nu; /* largest Poisson's ratio; that of bodies with nodes at faces, -1: none */
-  PetscReal sliver_part; /* fraction of tets with an angle below SB_SLIVER */
-  PetscBool slivers;     /* sliver_part is above SLIVERS */
-  PetscBool dg;          /* some element has its nodes in one cell only (DG) */
-
-  /* Some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD
-     fails. Where Newton's method chooses the tangent (auto), such a failure makes it project the
-     cells' tangents. */
-  PetscBool indefinite;
-} Hardness;
-
-static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
-{
-  PetscReal most[4] = {-1., -1., 0., 0.};
-  PetscInt nsliver = 0;
-  PetscInt ncell = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscInt *per = s->region[r].element->nodes_per;
-    const SbMaterial m = s->region[r].material;
-
-    most[0] = PetscMax(most[0], SbMaterialPoisson(m));
-    if (!per[0])
-      most[1] = PetscMax(most[1], SbMaterialPoisson(m));
-    if (per[3])
-      most[2] = 1.;
-    if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT)
-      most[3] = 1.;
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 4, MPIU_REAL, MPI_MAX, s->comm));
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    nsliver += s->mesh->body[b].nsliver;
-    ncell += s->mesh->body[b].ncell;
-  }
-  h->nu = most[0];
-  h->face_nu = most[1];
-  h->sliver_part = (PetscReal)nsliver / (PetscReal)PetscMax(1, ncell);
-  h->slivers = (PetscBool)(h->sliver_part >= SLIVERS);
-  h->dg = (PetscBool)(most[2] > 0.);
-  h->indefinite = (PetscBool)(most[3] > 0.);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Finds the preset for a PETSc option of the user, *option. -pc_type: that of -solver if it has
-   this type, else one of by_type. -pc_factor_mat_solver_type, if -solver is auto or direct: that of
-   the package. NULL: the user set neither. */
-static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset,
-                                const char **option)
-{
-  const SbSolverPreset *base = find_preset(choice);
-  char type[SB_NAME_MAX], own[SB_NAME_MAX];
-  PetscBool given;
-
-  PetscFunctionBeginUser;
-  *preset = NULL;
-  *option = "-pc_type";
-  PetscCall(PetscOptionsGetString(NULL, NULL, *option, type, sizeof(type), &given));
-  if (!given && (!base || base->direct)) {
-    *option = "-pc_factor_mat_solver_type";
-    PetscCall(PetscOptionsGetString(NULL, NULL, *option, type, sizeof(type), &given));
-    if (given)
-      *preset = find_preset(type);
-    if (*preset && !(*preset)->direct)
-      *preset = NULL;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (!given)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (base) {
-    preset_value(base, "-pc_type", own);
-    *preset = strcmp(own, type) ? NULL : base;
-  }
-  for (size_t k = 0; !*preset; k++)
-    if (!strcmp(by_type[k].name, type) || !by_type[k].name[0])
-      *preset = &by_type[k];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear,
-                              PetscBool explicit_run, const char *choice,
-                              const SbSolverPreset **preset, char reason[], size_t size)
-{
-  const PetscInt unknowns = 3 * s->Nnode;
-  const char *name = choice;
-  const char *package;
-  const char *option = NULL;
-  char method[SB_NAME_MAX] = "";
-  char count[48], system[64];
-  PetscInt nface = 0;
-  PetscInt most = 0;
-  PetscBool has = PETSC_TRUE;
-  PetscBool turns;
-  Hardness hard;
-
-  PetscFunctionBeginUser;
-  PetscCall(find_hardness(s, &hard));
-  PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!hard.indefinite, &package));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
-  *preset = NULL;
-  if (!explicit_run)
-    PetscCall(find_type(choice, preset, &option));
-
-  /* rotated factorisation, unless too many nodes are on interfaces between ranks */
-  turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
-  if (!strcmp(choice, "auto"))
-    turns =
-      (PetscBool)(dynamic && !linear && hard.face_nu <= NU_ROTATED && strcmp(method, KSPMINRES) &&
-                  unknowns <= (hard.slivers && hard.nu <= NU_SLIVERS ? ROTATED_SLIVERS : ROTATED));
-  if (*preset)
-    turns = PETSC_FALSE;
-  if (turns && s->ghosted && !explicit_run)
-    PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
-  if (nface > most) {
-    if (strcmp(choice, "auto"))
-      PetscCall(SbWarning(s->comm,
-                          "-solver %s is for parts of ranks that meet at %" PetscInt_FMT
-                          " nodes at most (-pc_rotated_interface), and these meet at %" PetscInt_FMT
-                          ": another solver is taken; fewer ranks may be faster",
-                          choice, most, nface));
-    turns = PETSC_FALSE;
-    choice = "auto";
-  }
-  SbFormat(sizeof(count), count, "%" PetscInt_FMT " unknowns", unknowns);
-  SbFormat(sizeof(system), system, "%s, %s", dynamic ? "dynamic" : "static", count);
-  if (explicit_run) {
-    name = "cg";
-    SbFormat(size, reason, "explicit integrator: no linear system");
-  } else if (*preset) {
-    SbFormat(size, reason, "chosen by %s", option);
-  } else if (!strcmp(choice, "direct")) {
-    PetscCheck(
-      package, s->comm, PETSC_ERR_USER,
-      "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
-      "another solver, or auto");
-    name = package;
-    SbFormat(size, reason, "the factorisation for %s on %d rank%s%s", count, (int)s->size,
-             s->ghosted ? "s" : "", hard.indefinite ? "; the exact tangent may be indefinite" : "");
-  } else if (strcmp(choice, "auto")) {
-    SbFormat(size, reason, "chosen by -solver");
-  } else if (turns) {
-    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of rotated and cg_two_level 22 and 89, 22
-       and 94 on two ranks, 12 and 50, 16 and 76 on four (docs/reports/realtime_ranks.md). Ten steps
-       of 1.3k to 2.3k unknowns, linear iterations of rotated and pressure, DG: 1150 and 1478 at nu
-       0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
-    name = "rotated";
-    SbFormat(size, reason, "%s: one factorisation, rotated with the nodes, serves many steps",
-             system);
-  } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
-             unknowns > (hard.indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
-    /* measured in docs/reports/solver_choice.md */
-    name = "cg_p_multigrid";
-    SbFormat(size, reason,
-             "%s of p2, nu up to %g: with P1 on the vertices below it iterations do not grow with "
-             "the mesh",
-             system, (double)hard.nu);
-  } else if (unknowns <= SB_DIRECT_SMALL && package && !(nface > most && hard.nu <= NU_PRESSURE)) {
-    /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450
-       and 50 (docs/reports/realtime_ranks.md) */
-    name = package;
-    SbFormat(size, reason, "%s: a factorisation is fast and works at any Poisson's ratio%s", count,
-             hard.indefinite ? "; the exact tangent may be indefinite" : "");
-  } else if (!dynamic && package &&
-             unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT
-                          : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
-                          : !s->faces && hard.nu > NU_LOCKED                  ? DIRECT_P1
-                                                                              : 0)) {
-    /* measured in docs/reports/solver_choice.md */
-    name = package;
-    SbFormat(
-      size, reason,
-      "%s, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): a factorisation, "
-      "iterations hardly get there",
-      count, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER);
-  } else if (!s->constraints && !s->coupled &&
-             (s->edge_node ? !s->faces && hard.nu > NU_SLIVERS
-                           : s->faces && (hard.face_nu > NU_PRESSURE ||
-                                          (!hard.slivers && (!dynamic || hard.dg))))) {
-    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at
-       nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
-    name = "pressure";
-    SbFormat(
-      size, reason,
-      "%s of %s, nu up to %g: with the pressures as unknowns iterations hardly grow towards 1/2",
-      system, s->edge_node ? "p2" : "cr or dg", (double)(s->edge_node ? hard.nu : hard.face_nu));
-  } else {
-    /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu
-       0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
-    name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
-    SbFormat(size, reason,
-             "%s: motions of large parts are solved directly, the rest takes few iterations",
-             system);
-  }
-  if (nface > most)
-    SbAppend(size, reason,
-             "; %d ranks meet at %" PetscInt_FMT
-             " nodes, and rotated and realtime take %" PetscInt_FMT,
-             (int)s->size, nface, most);
-  if (!*preset)
-    *preset = find_preset(name);
-  PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
-  if ((*preset)->package)
-    PetscCall(SbHasPackage((*preset)->package, &has));
-  PetscCheck(
-    has, s->comm, PETSC_ERR_USER,
-    "%s %s needs %s, which this PETSc was built without: choose another one, or -solver auto",
-    option && *preset ? option : "-solver", (*preset)->name, (*preset)->package);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscBool memory,
-                                    uint32_t *tried, const SbSolverPreset **preset)
-{
-  /* in the order of trial, up to a number of unknowns: a factorisation fails rarely but costs
-     most */
-  static const struct {
-    const char *name;
-    PetscInt most;
-  } others[] = {{"direct", DIRECT_NEXT},
-                {"pressure", PETSC_MAX_INT},
-                {"cg_gamg", PETSC_MAX_INT},
-                {"direct", PETSC_MAX_INT}};
-  const SbSolverPreset *failed = *preset;
-  Hardness hard;
-
-  PetscFunctionBeginUser;
-  *preset = NULL;
-  PetscCall(find_hardness(s, &hard));
-  if (find_preset(failed->name) == failed)
-    *tried |= 1U << (failed - presets);
-
-  /* where the tangent may be indefinite, Newton's method changes it, and no other solver is
-     tried */
-  if (hard.indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
-    const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
-
-    if (3 * s->Nnode > others[k].most || (memory && direct))
-      continue;
-
-    /* algebraic multigrid takes thousands of iterations on CR and DG near nu = 1/2 */
-    if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE)
-      continue;
-
-    /* a matrix that is singular for a factorisation is singular for iterations */
-    if (failed->direct && !memory && !direct)
-      continue;
-
-    /* one that has not failed yet; a factorisation for definite matrices, then one for indefinite
-       ones, which stress or rounding may cause */
-    for (int j = direct ? (int)hard.indefinite : 1; j < 2 && !*preset; j++) {
-      const char *name = others[k].name;
-
-      if (direct)
-        PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!j, &name));
-      if (name)
-        *preset = find_preset(name);
-      if (*preset && (*tried) & 1U << (*preset - presets))
-        *preset = NULL;
-    }
-    if (*preset && (*preset)->create && (!s->faces == !s->edge_node || s->constraints))
-      *preset = NULL;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
@@ -444,39 +35,43 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The package where the user names neither one nor -solver: PETSc's default ignores size and
-   ranks. */
+/* The package of a PCLU or PCCHOLESKY where the user names neither one nor -solver: PETSc's default
+   ignores size and ranks. */
 static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
-  const char *package;
+  const char *package = NULL;
   PetscBool has;
-  Hardness hard;
+  SbSolverFacts f;
 
   PetscFunctionBeginUser;
-  PetscCall(find_hardness(s, &hard));
-  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !hard.indefinite), &package));
   if (s->ghosted) {
-    /* on several ranks, MUMPS for any other matrix type */
-    package = MATSOLVERMUMPS;
-    PetscCall(SbHasPackage(package, &has));
-    if (!has && lu)
-      package = MATSOLVERSUPERLU_DIST;
-    if (!has)
-      PetscCall(SbHasPackage(package, &has));
-    if (!has)
+    /* the matrix is distributed: MUMPS, or SuperLU_DIST */
+    PetscCall(SbHasPackage(MATSOLVERMUMPS, &has));
+    if (has)
+      package = MATSOLVERMUMPS;
+    else if (lu) {
+      PetscCall(SbHasPackage(MATSOLVERSUPERLU_DIST, &has));
+      if (has)
+        package = MATSOLVERSUPERLU_DIST;
+    }
+  } else {
+    /* the fastest on one rank; UMFPACK has no Cholesky factorisation */
+    PetscCall(SbSolverFindFacts(s, &f));
+    PetscCall(SbDirectPackage(s->comm, f.unknowns, (PetscBool)(!lu && !f.indefinite), &package));
+    if (package && !lu && !strcmp(package, MATSOLVERUMFPACK))
       package = NULL;
-  } else if (package && !lu && !strcmp(package, MATSOLVERUMFPACK))
-    package = NULL;
-  if (package)
-    PetscCall(PCFactorSetMatSolverType(pc, package));
-  if (package && !strcmp(package, MATSOLVERMUMPS))
+  }
+  if (!package)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCFactorSetMatSolverType(pc, package));
+  if (!strcmp(package, MATSOLVERMUMPS))
     PetscCall(
-      SbSolverSetDefaults("", "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
+      SbOptionsSetDefaults("", "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
 
   /* a non-positive pivot appears as a reason of the solve, not as an error */
-  if (package && !strcmp(package, MATSOLVERCHOLMOD))
-    PetscCall(SbSolverSetDefaults("", "-mat_cholmod_print 0", PETSC_FALSE));
+  if (!strcmp(package, MATSOLVERCHOLMOD))
+    PetscCall(SbOptionsSetDefaults("", "-mat_cholmod_print 0", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -492,7 +87,7 @@ static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
-  PetscBool given, symmetric, reproducible;
+  PetscBool given, symmetric, reproducible, one_solve;
   KSP ksp;
   PC pc;
 
@@ -502,7 +97,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   if (reproducible && s->ghosted)
     PetscCall(
-      SbSolverSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
+      SbOptionsSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));
@@ -517,8 +112,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
 
   /* the preset's types, or those of the user */
-  preset_value(preset, "-ksp_type", method);
-  preset_value(preset, "-pc_type", type);
+  SbSolverPresetValue(preset, "-ksp_type", method);
+  SbSolverPresetValue(preset, "-pc_type", type);
   PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), NULL));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", users, sizeof(users), &given));
   PetscCall(KSPSetType(ksp, given ? users : method));
@@ -528,16 +123,16 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
   /* variants that keep the preconditioner symmetric */
   if (symmetric && !strcmp(type, PCASM))
-    PetscCall(SbSolverSetDefaults("", "-pc_asm_type basic", PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
-    PetscCall(SbSolverSetDefaults("", "-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
+    PetscCall(SbOptionsSetDefaults("", "-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
 
   /* PETSc keeps the eigenvalue estimate of the first matrix, too small once contact stiffness is
      added */
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
-  if (!given && !strcmp(type, PCGAMG))
-    PetscCall(SbSolverSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
-  PetscCall(SbSolverSetDefaults("", preset->options, PETSC_FALSE));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &one_solve));
+  if (!one_solve && !strcmp(type, PCGAMG))
+    PetscCall(SbOptionsSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
+  PetscCall(SbOptionsSetDefaults("", preset->options, PETSC_FALSE));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY))
     PetscCall(choose_package(s, pc, type));
   if (preset->direct)
@@ -729,22 +324,6 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
   PetscCall(PetscSNPrintf(text, size, "%s, %s%s%s%s", method ? method : "", name ? name : "",
                           package ? " of " : "", package ? package : "",
                           gathered ? " on one rank" : ""));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[])
-{
-  const char *package;
-
-  PetscFunctionBeginUser;
-  if (strcmp(choice, "auto") && strcmp(choice, "direct"))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbDirectPackage(comm, PETSC_MAX_INT, PETSC_FALSE, &package));
-  PetscCheck(package, comm, PETSC_ERR_USER,
-             "-static_control arc_length factors indefinite matrices, which takes MUMPS or "
-             "UMFPACK, and this "
-             "PETSc has neither: choose another -solver");
-  PetscCall(PetscStrncpy(choice, package, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

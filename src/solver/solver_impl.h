@@ -30,50 +30,23 @@ PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
-/* Number of negative pivots of a factorisation, -1: unknown; only MUMPS' L D L^T counts them.
-   Collective. */
-PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
+/* ---- the table of solvers (preset.c) */
 
-/* Makes pc algebraic multigrid that needs few messages. threshold of strong couplings: 0, zero
-   couplings, of which P1 on boxes has many, are ignored; -1, all are kept. Not collective. */
-PetscErrorCode SbPCMultigridSet(PC pc, PetscReal threshold);
+/* The row of the table, NULL if there is none. Not collective. */
+const SbSolverPreset *SbSolverPresetFind(const char *name);
 
-/* The package of a factorisation that is gathered on one rank, NULL for any other pc. Not
-   collective. */
-PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
+/* The row as a bit, for sets of rows; 0 for a row that a -pc_type gave. Not collective. */
+uint32_t SbSolverPresetBit(const SbSolverPreset *preset);
 
-/*
-  SbPCPressureCreate - makes pc the solver for a SbPressureOperator: GMRES for displacements and
-  pressures. Use it in KSPRICHARDSON with the unpreconditioned norm, which refines until -ksp_rtol
-  holds for the true residual, or the residual is one of rounding.
-
-  Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what
-  the KSP reports. A residual that two corrections no longer halve fails the solve
-  (KSP_DIVERGED_BREAKDOWN). Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1).
-*/
-PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
+/* The value of an option of PETSc in the row's options, "" if it has none. Not collective. */
+void SbSolverPresetValue(const SbSolverPreset *preset, const char *option, char value[SB_NAME_MAX]);
 
 /*
-  Solves [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] for z by a factorisation, renewed when K or the
-  constraints have changed; r must be projected. Collective.
+  SbSolverPresetOfUser - the row that an option of PETSc asks for.
 
-  Output: failed, the reason of a failed factorisation; z is NaN then.
+  Not collective. Input: choice, the value of -solver. Output: preset, NULL if the user gives no
+  such option; option, its name. Options read: -pc_type; -pc_factor_mat_solver_type where `choice`
+  is auto, direct or a factorisation.
 */
-PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
-
-/* The context of a PCSHELL with this name, NULL for any other pc. Not collective. */
-PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context);
-
-/* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes.
-   extra[n][3] (output; NULL: none): l1 terms, added to the diagonal, with which sweeps converge on
-   several ranks. Zero and *positive = false where a determinant is not positive on this rank. Not
-   collective. */
-PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[],
-                                  PetscBool *positive);
-/* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r differs from z and t.
-   Collective. */
-PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
-                                 Vec z, Vec t);
-/* z += (D + L)^-1 (r - A z); t is work space. Collective. */
-PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
-                               Vec z, Vec t);
+PetscErrorCode SbSolverPresetOfUser(const char *choice, const SbSolverPreset **preset,
+                                    const char **option);

@@ -536,6 +536,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   const PetscBool explicit = SbRunIsExplicit(run);
   const SbSpace s = m->space;
   PetscBool warped = PETSC_FALSE;
+  SbSolverProblem problem;
   PetscScalar *mass;
   char reason[128];
 
@@ -564,8 +565,9 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(SbSpaceCreateVec(s, &run->path));
     PetscCall(SbSolverChooseIndefinite(m->comm, sizeof(run->solver_choice), run->solver_choice));
   }
-  PetscCall(SbSolverChoose(s, m->dynamic, m->linear, explicit, run->solver_choice,
-                           &run->solver_used, run->solver_reason, sizeof(run->solver_reason)));
+  problem = (SbSolverProblem){m->dynamic, m->linear, explicit, run->solver_choice};
+  PetscCall(
+    SbSolverChoose(s, &problem, sizeof(run->solver_reason), run->solver_reason, &run->solver_used));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
 

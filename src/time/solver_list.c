@@ -14,6 +14,7 @@
   petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not
   public.
 */
+#include "sbpc.h"
 #include "sbsolver.h"
 #include "time_impl.h"
 #include <petsc/private/kspimpl.h>
@@ -99,7 +100,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
   /* remove the options of the old solver and its settings of the KSP, except tolerances */
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
-  PetscCall(SbSolverSetDefaults("", old->options, PETSC_TRUE));
+  PetscCall(SbOptionsSetDefaults("", old->options, PETSC_TRUE));
   PetscCall(KSPReset(ksp));
   PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
   PetscCall(PCCreate(PetscObjectComm((PetscObject)ksp), &pc));
@@ -210,7 +211,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
     reason = KSP_DIVERGED_INDEFINITE_PC;
-  PetscCall(SbPCCoarseFallBack(pc, reason, &simpler));
+  PetscCall(SbPCTwoLevelSimplify(pc, reason, &simpler));
   if (simpler) {
     PetscCall(solve_again(l, ksp, b, x));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -4,7 +4,7 @@
   afterwards (to the 1e-4 of the 16-bit factor); the correction is symmetric; constrained nodes and
   nodes with non-local rows are never chosen.
 */
-#include "../../src/solver/rotated.h"
+#include "../../src/pc/rotated.h"
 #include "../scene.h"
 
 static const char *const scene =

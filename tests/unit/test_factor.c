@@ -5,7 +5,7 @@
   of their largest entry gives errors of that size times the condition number of the factor, here
   about 3: 2e-4 is allowed.
 */
-#include "../../src/solver/factor.h"
+#include "sbfactor.h"
 #include <test.h>
 #include <petscblaslapack.h>
 

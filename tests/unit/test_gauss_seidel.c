@@ -4,7 +4,7 @@
   and CR, with prescribed nodes; the residual returned by the first one equals that of a product.
 */
 // @ranks 1 3
-#include "../../src/solver/solver_impl.h"
+#include "../../src/pc/gauss_seidel.h"
 #include "../scene.h"
 
 static void pattern(const PetscReal x[3], PetscReal v[3])

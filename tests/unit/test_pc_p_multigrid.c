@@ -7,6 +7,7 @@
   runs without p2.
 */
 #include "../scene.h"
+#include <sbpc.h>
 #include <sbsolver.h>
 
 #define BODY(name, mesh, more)                                                                    \

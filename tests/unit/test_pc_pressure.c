@@ -5,8 +5,9 @@
   agreement with a factorisation; iterations stay bounded as nu approaches 1/2 and the mesh is
   refined; reported failures.
 */
-#include "../../src/solver/pressure.h"
+#include "../../src/pc/pressure.h"
 #include "../scene.h"
+#include <sbpc.h>
 #include <sbsolver.h>
 
 #define BODY(name, mesh, law, element, more)                                                     \

@@ -4,6 +4,7 @@
   rigidly rotated body; few iterations in a bent body; independence of the number of ranks; every
   kind of operator.
 */
+#include "sbpc.h"
 #include "sbsolver.h"
 #include "../scene.h"
 

@@ -4,6 +4,7 @@
   solution agrees with a factorisation, and the run continues with it. A method chosen by the user
   is not replaced, nor is any if a body is free.
 */
+#include <sbfactor.h>
 #include <sbsolver.h>
 #include "../slivers.h"
 
@@ -154,6 +155,7 @@ static PetscErrorCode check_choice(void)
    method has used last; with exact it is one for indefinite ones. */
 static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
 {
+  const SbSolverProblem problem = {.choice = "direct"};
   const SbSolverPreset *preset;
   const char *package;
   char reason[512];
@@ -166,8 +168,7 @@ static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(t.model->material[0]->tangent == SB_TANGENT_EXACT, "%s: the tangent was filtered",
            tangent);
-  PetscCall(SbSolverChoose(t.model->space, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, "direct", &preset,
-                           reason, sizeof(reason)));
+  PetscCall(SbSolverChoose(t.model->space, &problem, sizeof(reason), reason, &preset));
   SB_CHECK(!strcmp(preset->name, package), "%s, after the run: %s, not %s", tangent, preset->name,
            package);
   PetscCall(test_scene_close(&t));

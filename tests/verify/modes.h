@@ -4,6 +4,7 @@
 */
 #pragma once
 #include "verify.h"
+#include "sbfactor.h"
 #include "sbsolver.h"
 #include <petscblaslapack.h>
 

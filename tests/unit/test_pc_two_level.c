@@ -6,6 +6,7 @@
 */
 #include "../scene.h"
 #include <sblog.h>
+#include <sbpc.h>
 #include <sbsolver.h>
 
 #define BODY(name, mesh, more)                                              \
@@ -86,7 +87,7 @@ static PetscErrorCode system_open(const char *options, PetscReal shift, System *
   PetscCall(KSPSetTolerances(y->ksp, 1e-8, 0., PETSC_DEFAULT, 5000));
   PetscCall(KSPSetOperators(y->ksp, y->A, y->A));
   PetscCall(KSPGetPC(y->ksp, &y->pc));
-  PetscCall(SbPCCoarseCreate(s, y->pc));
+  PetscCall(SbPCTwoLevelCreate(s, y->pc));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

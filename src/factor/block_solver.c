@@ -6,7 +6,7 @@
   iteration: METIS computes a new one only when the factor has more than WORSE times the entries of
   the one that METIS ordered last.
 */
-#include "block_solver.h"
+#include "sbfactor.h"
 
 #define WORSE 1.25
 

@@ -6,7 +6,7 @@
   side there, and the others wait: cheaper than to factor the matrix on every rank (PCREDUNDANT),
   and up to SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
 */
-#include "solver_impl.h"
+#include "sbfactor.h"
 
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite,
                                const char **package)
@@ -37,39 +37,11 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear)
-{
-  char **word;
-  int n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrToArray(options, ' ', &n, &word));
-  for (int k = 0; k < n; k++) {
-    const char *key = word[k] + 1;
-    const char *value = "";
-    char name[128];
-    char there[128] = "";
-    PetscBool given;
-
-    if (k + 1 < n && word[k + 1][0] != '-')
-      value = word[++k];
-    if (!strcmp(key, "ksp_type") || !strcmp(key, "pc_type"))
-      continue;
-    PetscCall(PetscSNPrintf(name, sizeof(name), "-%s%s", prefix, key));
-    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
-    if (!clear && !given)
-      PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
-    if (clear && given && !strcmp(there, value))
-      PetscCall(PetscOptionsClearValue(NULL, name));
-  }
-  PetscCall(PetscStrToArrayDestroy(n, word));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
 {
   const PetscBool mumps = (PetscBool)!strcmp(package, MATSOLVERMUMPS);
   const PetscBool umfpack = (PetscBool)!strcmp(package, MATSOLVERUMFPACK);
+  const char *options = "-mat_cholmod_factor supernodal -mat_cholmod_print 0";
   const char *outer;
   char prefix[96];
   PetscMPIInt size;
@@ -91,11 +63,11 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
 
   /* MUMPS counts all negative pivots only if the last front is not distributed; CHOLMOD otherwise
      factors small indefinite matrices, by L D L^T, and a failure is the solver's reason */
-  PetscCall(SbSolverSetDefaults(prefix,
-                                mumps     ? "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"
-                                : umfpack ? "-mat_umfpack_ordering METIS"
-                                          : "-mat_cholmod_factor supernodal -mat_cholmod_print 0",
-                                PETSC_FALSE));
+  if (mumps)
+    options = "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100";
+  else if (umfpack)
+    options = "-mat_umfpack_ordering METIS";
+  PetscCall(SbOptionsSetDefaults(prefix, options, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

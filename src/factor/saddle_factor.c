@@ -11,37 +11,11 @@
     (P (K + F^T k G) P + s Q) z = r.
 
   This is regular even for a singular K, of a body that only constraints support. It is symmetric
-  without friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored
+  without friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (direct.c). It is factored
   again only when K or the constraints have changed.
 */
-#include "solver_impl.h"
-#include "rotated.h"
-
-#define DIRECT_STATIC \
-  30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
-#define DIRECT_DYNAMIC 1000
-
-PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
-                              char reason[], size_t size)
-{
-  const PetscInt unknowns = 3 * s->Nnode;
-  const char *package;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbDirectPackage(s->comm, unknowns, PETSC_FALSE, &package));
-  PetscCheck(
-    choice != 1 || package, s->comm, PETSC_ERR_USER,
-    "-saddle_solver direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
-    "-saddle_solver iterative");
-  if (!choice)
-    choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
-  *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_NONE;
-  if (choice == 1)
-    PetscCall(PetscSNPrintf(reason, size, "multipliers of contact directly, by %s", package));
-  else
-    PetscCall(PetscSNPrintf(reason, size, "constraints of contact by their null space"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#include "sbassembly.h"
+#include "sbfactor.h"
 
 PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *failed)
 {

@@ -21,6 +21,14 @@ typedef struct {
   PetscScalar *block;
 } RowSums;
 
+/* The share of its unit v, 0 or 1, in the motion of component k of node i. */
+static inline PetscReal share_of(SbCoarse c, PetscInt i, int v, int k)
+{
+  if (c->way[i] != SB_MEAN)
+    return 1.;
+  return c->moved[i] & (1 << (3 * v + k)) ? 0.5 : 0.;
+}
+
 /* W += weight K Z_j; K column-major. */
 static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weight, PetscInt j,
                               RowSums *row)
@@ -43,9 +51,7 @@ static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weig
     }
     W = row->W[row->slot[u]];
     for (int k = 0; k < 3; k++)
-      share[k] = c->way[j] != SB_MEAN               ? weight
-                 : c->moved[j] & (1 << (3 * v + k)) ? 0.5 * weight
-                                                    : 0.;
+      share[k] = weight * share_of(c, j, v, k);
     for (int r = 0; r < 3; r++) {
       const PetscReal k0 = share[0] * K[r];
       const PetscReal k1 = share[1] * K[3 + r];
@@ -77,7 +83,6 @@ static PetscErrorCode add_row(SbCoarse c, PetscInt i, RowSums *row)
   PetscFunctionBeginUser;
   for (int v = 0; v < (c->way[i] == SB_MEAN ? 2 : 1); v++) {
     const PetscInt a = c->unit[2 * i + v];
-    const PetscInt moved = c->moved[i] >> (3 * v);
 
     for (PetscInt k = 0; k < row->n && a >= 0; k++) {
       const PetscInt b = row->unit[k];
@@ -90,9 +95,8 @@ static PetscErrorCode add_row(SbCoarse c, PetscInt i, RowSums *row)
         PetscReal *rotation;
 
         for (int e = 0; e < 9; e++) {
-          const PetscReal y = c->way[i] != SB_MEAN     ? B[e]
-                              : moved & (1 << (e / 3)) ? 0.5 * B[e]
-                                                       : 0.;
+          const PetscReal share = share_of(c, i, v, e / 3);
+          const PetscReal y = share > 0. ? share * B[e] : 0.;
 
           if (a < c->n)
             E[e] += y;

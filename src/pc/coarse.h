@@ -1,10 +1,10 @@
 /*
   coarse.h - coarse spaces: aggregates of nodes, single nodes, vertices of P2; their operator and
-  its solver. Used by pc_coarse.c.
+  its solver. Used by two_level.c.
 */
 #pragma once
-#include "block_solver.h"
 #include "sbassembly.h"
+#include "sbpc.h"
 
 /*
   SbAggregate - partitions the free nodes of this rank into connected, round aggregates of about
@@ -15,15 +15,6 @@
   aggregate has nodes of one body only.
 */
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
-
-/* Bodies in contact: own rows of a symmetric matrix of 3x3 blocks on the nodes of a space. */
-typedef struct {
-  PetscInt n;       /* number of own nodes */
-  PetscInt *ia;     /* [n+1] offsets of the rows */
-  PetscInt *ja;     /* [ia[n]] global nodes, ascending in a row */
-  PetscReal *value; /* [ia[n]][9] row-major, N/m */
-  uint8_t *contact; /* [n] the node is in contact */
-} SbContactRows;
 
 /* Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns;
    by unknowns of its own; of P2's edge nodes by the mean of two vertices. */
@@ -65,7 +56,7 @@ struct _p_SbCoarse {
   PetscReal *value;  /* [ia[n]][9] blocks, row-major, N/m */
   PetscBool changed; /* the pattern is new to the solver */
   PetscBool ok;
-  /* the solver: block_solver.c; or a factorisation, or multigrid, of E */
+  /* the solver: SbBlockSolver; or a factorisation, or multigrid, of E */
   SbBlockSolver direct;
   PetscBool spread; /* multigrid approximates E^-1 */
   Mat E;
@@ -80,47 +71,32 @@ struct _p_SbCoarse {
    are this rank's. */
 PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool vertices, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
+
 /* Finds the units and the pattern of E. A: BAIJ or SBAIJ; rows: its pattern, and nodes in contact,
    which move by themselves; NULL: that of the space, and none. Collective. */
 PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const SbContactRows *rows);
+
 /* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern.
    Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
+
 /* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be
    positive definite: with a factorisation always, with multigrid perhaps not. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
+
 /* The second half of SbCoarseSetUp(), after coarse->value. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
+
 /* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z, or NULL.
    Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
+
 /* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
+
 /* x += Z E^-1 Z^T (b - A x). Collective. */
 PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 
-/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not
-   collective. */
-PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
-
-/* Position of a column in row r, whose columns are ascending; -1: none. */
-static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r,
-                                 PetscInt column)
-{
-  PetscInt place;
-
-  (void)PetscFindInt(column, ia[r + 1] - ia[r], ja + ia[r], &place);
-  return place < 0 ? -1 : ia[r] + place;
-}
-
-/*
-  SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev with the diagonal blocks, or
-  Gauss-Seidel for P2 bodies that are not too large, and an exactly solved coarse space: nodes in
-  contact, and rigid-body modes of aggregates of the others or the vertices of P2.
-
-  Collective; space and rows are borrowed. The operator of pc is a matrix with these rows and the
-  fast product, another matrix when their pattern or the nodes in contact have changed. Output: the
-  solver of the coarse space, borrowed.
-*/
-PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc,
-                                 SbBlockSolver *coarse);
+/* Makes pc algebraic multigrid that needs few messages. threshold of strong couplings: 0, zero
+   couplings, of which P1 on boxes has many, are ignored; -1, all are kept. Not collective. */
+PetscErrorCode SbPCMultigridSet(PC pc, PetscReal threshold);

@@ -2,12 +2,12 @@
   CHOLMOD through PETSc raises an error with a trace at a non-positive pivot: a body without
   supports, or a tangent that is indefinite in compression. Here it is a failed factorisation, as
   with other packages: the solve fails, and the step is halved or the run stops with one line. If
-  the matrix is gathered on one rank (pc_direct.c), all ranks get the failure. MUMPS can factor
+  the matrix is gathered on one rank (direct.c), all ranks get the failure. MUMPS can factor
   again after a failure.
 
   petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
 */
-#include "sbsolver.h"
+#include "sbfactor.h"
 #include <petsc/private/pcimpl.h>
 
 #define ORIGINAL "SbPCSetUpOriginal_C"

@@ -21,13 +21,12 @@
   z_i - ..).
 */
 #include "sbfour.h"
-#include "sbassembly.h"
 #include "sbkernel.h"
-#include "solver_impl.h"
+#include "gauss_seidel.h"
 
 /* z_j -= A_ij^T x for the n blocks right of the diagonal; the fourth lane of x is zero. */
-SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],
-                    PetscScalar z[])
+SB_INLINE void subtract_transposed(const PetscScalar *a, PetscInt n, const PetscInt column[],
+                                   const PetscReal x[3], PetscScalar z[])
 {
   const Four xi = {x[0], x[1], x[2], 0.};
 
@@ -53,8 +52,8 @@ SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], c
   (9 * 32) /* prefetch distance in numbers: the hardware does not predict backward row order */
 
 /* sum_j A_ij z_j over the n blocks right of the diagonal. */
-SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[],
-                    const PetscScalar z[], PetscReal sum[3])
+SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[],
+                           const PetscScalar z[], PetscReal sum[3])
 {
   Four s = {0., 0., 0., 0.};
 
@@ -90,11 +89,11 @@ SB_KERNEL static void down(PetscInt nrow, const PetscInt start[restrict],
     PetscReal sum[3];
 
     a -= 9 * (size_t)n;
-    pull(a + 9, n - 1, column + start[i] + 1, z, sum);
+    row_product(a + 9, n - 1, column + start[i] + 1, z, sum);
     for (int c = 0; c < 3; c++)
       sum[c] = r[3 * i + c] - sum[c];
     divide(inverse + 9 * (size_t)i, sum, z + 3 * i);
-    push(a + 9, n - 1, column + start[i] + 1, z + 3 * i, t);
+    subtract_transposed(a + 9, n - 1, column + start[i] + 1, z + 3 * i, t);
     for (int c = 0; extra && c < 3; c++)
       t[3 * i + c] += extra[3 * i + c] * z[3 * i + c];
   }
@@ -109,13 +108,13 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict],
     const PetscInt n = start[i + 1] - start[i];
     PetscReal sum[3];
 
-    pull(a + 9, n - 1, column + start[i] + 1, z, sum);
+    row_product(a + 9, n - 1, column + start[i] + 1, z, sum);
     for (int c = 0; c < 3; c++)
       sum[c] = b[3 * i + c] - sum[c];
     for (int c = 0; extra && c < 3; c++)
       sum[c] += extra[3 * i + c] * z[3 * i + c];
     divide(inverse + 9 * (size_t)i, sum, z + 3 * i);
-    push(a + 9, n - 1, column + start[i] + 1, z + 3 * i, b);
+    subtract_transposed(a + 9, n - 1, column + start[i] + 1, z + 3 * i, b);
     a += 9 * (size_t)n;
   }
 }

@@ -24,23 +24,23 @@
 
 typedef struct {
   SbSpace space;
-  SbInterface face;
+  SbInterface interface;
   PetscInt n,
     nkeep; /* nodes of the factor: interior ones, then the nkeep interface nodes adjacent to them */
   PetscInt *node;    /* [n] local nodes of the space */
   PetscInt *local;   /* [nnode] inverse of node, -1 for nodes not in the factor */
   PetscInt *ia, *ja; /* graph of the interior rows */
   SbFactor factor;
-  SbPack *cells;     /* rotations of the cells, owned; NULL: the operator has them */
-  PetscReal *turn;   /* [nnode_owned][9] current rotations of the nodes */
-  PetscReal *turn0;  /* [nnode_owned][9] rotations at the factorisation */
-  PetscReal *spread; /* [nnode_owned] variation of the rotation in the cells around a node */
-  float *Q;          /* [nnode_owned][9] rotation since the factorisation */
-  float *diagonal;   /* [nnode_owned][3] inverse diagonal of fully prescribed nodes */
-  float *b, *x;      /* [n][3] right-hand side and solution of the factor */
-  float *kept;       /* [nkeep][3] values at the kept nodes */
-  float *edge;       /* [3 face->n] values at the interface */
-  float *r, *r1, *z; /* [nnode_owned][3] work vectors */
+  SbPack *cells;        /* rotations of the cells, owned; NULL: the operator has them */
+  PetscReal *rotation;  /* [nnode_owned][9] current rotations of the nodes */
+  PetscReal *rotation0; /* [nnode_owned][9] rotations at the factorisation */
+  PetscReal *spread;    /* [nnode_owned] variation of the rotation in the cells around a node */
+  float *Q;             /* [nnode_owned][9] rotation since the factorisation */
+  float *diagonal;      /* [nnode_owned][3] inverse diagonal of fully prescribed nodes */
+  float *b, *x;         /* [n][3] right-hand side and solution of the factor */
+  float *kept;          /* [nkeep][3] values at the kept nodes */
+  float *shared;        /* [3 interface->n] values at the interface */
+  float *r, *r1, *z;    /* [nnode_owned][3] work vectors */
   SbExactNodes exact;
   PetscReal limit; /* spread above which a node is solved exactly */
   PetscReal scale; /* factor on residuals, to stay inside the range of float */
@@ -64,7 +64,7 @@ static PetscErrorCode number_nodes(Rotated *p)
   for (PetscInt i = 0; i < s->nnode; i++)
     p->local[i] = -1;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (s->fixed[i] == 7 || p->face->index[i] >= 0)
+    if (s->fixed[i] == 7 || p->interface->index[i] >= 0)
       continue;
     p->local[i] = p->n;
     p->node[p->n++] = i;
@@ -74,7 +74,7 @@ static PetscErrorCode number_nodes(Rotated *p)
   // then the adjacent interface nodes, which are kept
   ninterior = p->n;
   for (PetscInt i = 0; i < s->nnode; i++) {
-    if (p->face->index[i] < 0)
+    if (p->interface->index[i] < 0)
       continue;
     p->local[i] = p->n;
     p->node[p->n++] = i;
@@ -101,9 +101,9 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   const PetscInt n = s->nnode_owned;
   const PetscInt ninterior = p->n - p->nkeep;
   const PetscInt *kept = p->node + ninterior;
-  const PetscInt *index = p->face->index;
+  const PetscInt *index = p->interface->index;
   const PetscInt nall = s->plan->di[n] + s->plan->oi[n];
-  const size_t m = 3 * (size_t)p->face->n;
+  const size_t m = 3 * (size_t)p->interface->n;
   const size_t nkept = 3 * (size_t)p->nkeep;
   PetscInt *node, *ia, *ja;
   PetscInt nz = 0;
@@ -157,7 +157,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
   if (*ok)
-    PetscCall(SbInterfaceFactorise(p->face, 2 * SbFactorBytes(p->factor), schur, ok));
+    PetscCall(SbInterfaceFactorise(p->interface, 2 * SbFactorBytes(p->factor), schur, ok));
   PetscCall(PetscFree2(own, schur));
   PetscCall(PetscFree4(node, ia, ja, block));
   p->nfactor++;
@@ -182,13 +182,13 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
   if (!p->factor) {
     if (!s->plan)
       PetscCall(SbPlanCreate(s, &s->plan));
-    PetscCall(SbInterfaceCreate(s, &p->face));
+    PetscCall(SbInterfaceCreate(s, &p->interface));
     PetscCall(number_nodes(p));
     PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, NULL, &p->factor));
-    PetscCall(PetscMalloc5(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread, 9 * n, &p->Q, 3 * n,
-                           &p->diagonal));
+    PetscCall(PetscMalloc5(9 * n, &p->rotation, 9 * n, &p->rotation0, n, &p->spread, 9 * n, &p->Q,
+                           3 * n, &p->diagonal));
     PetscCall(PetscMalloc7(3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z, 3 * p->n, &p->b, 3 * p->n,
-                           &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
+                           &p->x, 3 * p->nkeep, &p->kept, 3 * p->interface->n, &p->shared));
   }
 
   /* the rotations of cells that belong to the operator */
@@ -209,10 +209,10 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
       PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
     cells = (const SbPack *)p->cells;
   }
-  PetscCall(SbSpaceAverageRotations(s, cells, p->turn, p->spread));
+  PetscCall(SbSpaceAverageRotations(s, cells, p->rotation, p->spread));
   if (p->renew) {
     PetscCall(factor_operator(p, A, &ok));
-    PetscCall(PetscArraycpy(p->turn0, p->turn, 9 * n));
+    PetscCall(PetscArraycpy(p->rotation0, p->rotation, 9 * n));
     p->fresh = -1;
     p->renew = (PetscBool)!ok;
     PetscCall(PetscInfo(pc, "factorisation %" PetscInt_FMT "%s\n", p->nfactor,
@@ -224,7 +224,7 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
 
     if (!s->fixed[i])
-      SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
+      SbMatMulTranspose(p->rotation + 9 * i, p->rotation0 + 9 * i, Q);
     for (int k = 0; k < 9; k++)
       p->Q[9 * i + k] = (float)Q[k];
   }
@@ -236,7 +236,7 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
 }
 
 /* y = Q x of one node or, back, Q^T x. */
-SB_INLINE void turn(const float Q[9], int back, const float x[3], float y[3])
+SB_INLINE void rotate(const float Q[9], int back, const float x[3], float y[3])
 {
   const int row = back ? 1 : 3;
   const int column = back ? 3 : 1;
@@ -258,7 +258,7 @@ static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   s = p->space;
-  f = p->face;
+  f = p->interface;
   n = 3 * s->nnode_owned;
   ninterior = p->n - p->nkeep;
   r = p->r1;
@@ -273,26 +273,26 @@ static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
 
   // Q^T r in the interior, and forward substitution
   for (PetscInt k = 0; k < ninterior; k++)
-    turn(p->Q + 9 * p->node[k], 1, r + 3 * p->node[k], p->b + 3 * k);
+    rotate(p->Q + 9 * p->node[k], 1, r + 3 * p->node[k], p->b + 3 * k);
   PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
   SbFactorForward(p->factor, p->b, p->kept);
 
   // interface: right-hand side of own rows plus the contributions of the interior
-  PetscCall(PetscArrayzero(p->edge, 3 * f->n));
+  PetscCall(PetscArrayzero(p->shared, 3 * f->n));
   for (PetscInt k = 0; k < f->nmine; k++)
-    turn(p->Q + 9 * f->mine[k], 1, r + 3 * f->mine[k], p->edge + 3 * f->index[f->mine[k]]);
+    rotate(p->Q + 9 * f->mine[k], 1, r + 3 * f->mine[k], p->shared + 3 * f->index[f->mine[k]]);
   for (PetscInt k = 0; k < 3 * p->nkeep; k++)
-    p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3] += p->kept[k];
-  PetscCall(SbInterfaceSolve(f, p->edge));
+    p->shared[3 * f->index[p->node[ninterior + k / 3]] + k % 3] += p->kept[k];
+  PetscCall(SbInterfaceSolve(f, p->shared));
   for (PetscInt k = 0; k < 3 * p->nkeep; k++)
-    p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
+    p->kept[k] = p->shared[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
 
   // backward substitution, and multiplication by Q
   SbFactorBackward(p->factor, p->kept, p->x);
   for (PetscInt k = 0; k < ninterior; k++)
-    turn(p->Q + 9 * p->node[k], 0, p->x + 3 * k, z + 3 * p->node[k]);
+    rotate(p->Q + 9 * p->node[k], 0, p->x + 3 * k, z + 3 * p->node[k]);
   for (PetscInt k = 0; k < f->nmine; k++)
-    turn(p->Q + 9 * f->mine[k], 0, p->edge + 3 * f->index[f->mine[k]], z + 3 * f->mine[k]);
+    rotate(p->Q + 9 * f->mine[k], 0, p->shared + 3 * f->index[f->mine[k]], z + 3 * f->mine[k]);
 
   // prescribed nodes: divide by the diagonal
   for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
@@ -356,7 +356,7 @@ static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 
   /* an application reads the factor of the interior twice */
   all = most = 1e-6 * (PetscReal)(2 * SbFactorBytes(p->factor) +
-                                  (PetscInt64)(sizeof(*p->face->word) * p->face->nword));
+                                  (PetscInt64)(sizeof(*p->interface->word) * p->interface->nword));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_REAL, MPI_SUM, p->space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, p->space->comm));
   PetscCall(PetscViewerASCIIPrintf(
@@ -365,7 +365,7 @@ static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
     " factorisations, rank 0: %g million entries, %" PetscInt_FMT
     " nodes exact, interface of %" PetscInt_FMT
     " nodes; an application reads %g MB, at most %g of them on one rank\n",
-    p->nfactor, 1e-6 * (double)entries, p->exact.n, p->face->n, (double)all, (double)most));
+    p->nfactor, 1e-6 * (double)entries, p->exact.n, p->interface->n, (double)all, (double)most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -375,14 +375,14 @@ static PetscErrorCode PCDestroy_Rotated(PC pc)
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
-  PetscCall(SbInterfaceDestroy(&p->face));
+  PetscCall(SbInterfaceDestroy(&p->interface));
   PetscCall(SbFactorDestroy(&p->factor));
   PetscCall(SbExactNodesDestroy(&p->exact));
   PetscCall(PetscFree2(p->node, p->local));
   PetscCall(PetscFree2(p->ia, p->ja));
   PetscCall(PetscFree(p->cells));
-  PetscCall(PetscFree5(p->turn, p->turn0, p->spread, p->Q, p->diagonal));
-  PetscCall(PetscFree7(p->r, p->r1, p->z, p->b, p->x, p->kept, p->edge));
+  PetscCall(PetscFree5(p->rotation, p->rotation0, p->spread, p->Q, p->diagonal));
+  PetscCall(PetscFree7(p->r, p->r1, p->z, p->b, p->x, p->kept, p->shared));
   PetscCall(PetscFree(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

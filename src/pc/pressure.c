@@ -1,7 +1,7 @@
 /*
   Nearly incompressible CR and DG: the pressures of the cells as unknowns of the iteration.
 
-  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is
+  The condition number of K = A + B^T C^-1 B (pressure_operator.c) grows with lambda. K u = r is
   equivalent to
 
     [ A  B^T ] [u]   [r]
@@ -10,7 +10,7 @@
   which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the
   inf-sup condition on every mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V /
   (2 mu) approximates C + B A^-1 B^T. GMRES with the upper triangular preconditioner of A^
-  (pc_levels.c) and -S on its right takes a number of iterations that depends neither on lambda nor
+  (levels.c) and -S on its right takes a number of iterations that depends neither on lambda nor
   on the mesh. Benzi, Golub and Liesen (2005), Numerical solution of saddle point problems, sections
   10 and 8.
 
@@ -27,7 +27,6 @@
 
   petsc/private/kspimpl.h: else the outer solver would report its few corrections as iterations.
 */
-#include "solver_impl.h"
 #include "pressure.h"
 #include "sblog.h"
 #include <petsc/private/kspimpl.h>

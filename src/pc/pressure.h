@@ -1,13 +1,14 @@
 /*
-  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with
+  pressure.h - the solver for nearly incompressible bodies (pressure.c): the mixed operator, with
   the pressures of the cells as unknowns, and the preconditioner of its displacement block.
 */
 #pragma once
 #include "sbassembly.h"
+#include "sbpc.h"
 
 /* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1
    for every body. The tangent without its volumetric part is assembled in each. With a P2 body only
-   the space itself, with pc_coarse.c. */
+   the space itself, with two_level.c. */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   PetscInt n;    /* number of levels: 2, or 3 with a DG body, 1 with a P2 body */
@@ -30,11 +31,14 @@ struct _p_SbLevels {
 /* Collective. Prescribed unknowns must have been marked. Options read: -pressure_coarse_. */
 PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
+
 /* Adds the springs of all ranks to the other matrices, before their final assembly. Collective. */
 PetscErrorCode SbLevelsShareSprings(SbLevels levels);
+
 /* After the final assembly. *positive = false: a diagonal block is not positive definite, and
    SbLevelsApply() must not be called. Collective. */
 PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
+
 /* z = a symmetric approximation of A[0]^-1, applied to r. Collective. */
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 
@@ -58,9 +62,11 @@ struct _p_SbPressureOperator {
 /* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts. Collective. */
 PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[],
                                        const PetscScalar p[], PetscScalar y[], PetscScalar d[]);
+
 /* y[3 nnode_owned] += factor B^T p; absolute: with |B|. Collective. */
 PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[],
                                              PetscBool absolute, PetscReal factor, PetscScalar y[]);
+
 /* Norm of the rounding errors of K x from its volumetric part and from the diagonal of A, N.
    Collective. */
 PetscErrorCode SbPressureOperatorRounding(SbPressureOperator op, Vec x, PetscReal *level);

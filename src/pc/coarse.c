@@ -90,17 +90,23 @@ SB_INLINE void motion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3]
   u[2] = m[2] + m[3] * d[1] - m[4] * d[0];
 }
 
+/* How a node moves. Edge nodes of P2 have two vertices, other nodes are their own vertex. */
 static SbWay way_of(SbCoarse c, PetscInt i, const uint8_t contact[])
 {
   const SbSpace s = c->space;
   const PetscInt *v = c->parent ? c->parent + 2 * i : NULL;
-  const PetscInt n = s->nnode_owned;
+  const PetscBool edge = (PetscBool)(v && v[0] != v[1]);
+  const PetscBool p2_vertex = (PetscBool)(v && s->element[s->node_body[i]]->nodes_per[1]);
 
   if ((contact && contact[i]) || (c->aggregated && c->agg[i] < 0))
     return SB_ITSELF;
-  if (v && v[0] != v[1])
-    return !c->aggregated || (v[0] < n && v[1] < n) ? SB_MEAN : SB_ITSELF;
-  return c->aggregated && !(v && s->element[s->node_body[i]]->nodes_per[1]) ? SB_MEMBER : SB_ITSELF;
+  if (!c->aggregated)
+    return edge ? SB_MEAN : SB_ITSELF;
+
+  /* among aggregates, no node moves by vertices of other ranks */
+  if (edge)
+    return v[0] < s->nnode_owned && v[1] < s->nnode_owned ? SB_MEAN : SB_ITSELF;
+  return p2_vertex ? SB_ITSELF : SB_MEMBER;
 }
 
 /* The units of own nodes, by their numbers over all ranks; the nodes' relative positions. */
@@ -273,19 +279,6 @@ static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
       c->unit[k] += c->n;
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
-{
-  const PetscInt n = s->nnode_owned;
-  const PetscInt nz = s->plan->di[n] + s->plan->oi[n];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(n + 1, ia, nz, ja));
-  PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
-  for (PetscInt k = 0; k < nz; k++)
-    (*ja)[k] = s->gnode[(*ja)[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

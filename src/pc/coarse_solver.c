@@ -1,9 +1,9 @@
 /*
   Solver for the coarse operator E, which is distributed by rows like its units.
 
-  While E is small, one rank gathers and factors it for all (pc_direct.c; block_solver.c where its
-  pattern changes often). Otherwise a V-cycle of PETSc's algebraic multigrid approximates E^-1, so
-  that a rank's work for it is bounded by its own units.
+  While E is small, one rank gathers and factors it for all (SbPCDirectSet(); SbBlockSolver where
+  its pattern changes often). Otherwise a V-cycle of PETSc's algebraic multigrid approximates E^-1,
+  so that a rank's work for it is bounded by its own units.
 
   The near null space of E is known exactly: a rigid-body mode t + w x (x - x_b) is itself at a
   node; on an aggregate with centre x_a and radius r it has the six coefficients t + w x (x_a - x_b)
@@ -13,7 +13,6 @@
   number of ranks. The cycle is symmetric and positive definite.
 */
 #include "coarse.h"
-#include "solver_impl.h"
 
 /* Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer
    levels. Bar of 332,000 tets on 64 ranks, aggregates: 35 iterations with 114 messages of a rank
@@ -98,7 +97,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
     /* PETSc's first coarsening, by the square of the graph: 50 iterations instead of 38 on 16
        ranks */
     if (c->aggregated)
-      PetscCall(SbSolverSetDefaults(
+      PetscCall(SbOptionsSetDefaults(
         "pc_coarse_", "-pc_gamg_aggressive_coarsening 0 -mg_levels_pc_type pbjacobi", PETSC_FALSE));
   }
   PetscCall(PCSetFromOptions(c->solver));

@@ -60,7 +60,7 @@
   Comput. 2; Helenbrook, Mavriplis, Atkins (2003), Analysis of p-multigrid.
 */
 #include "coarse.h"
-#include "solver_impl.h"
+#include "gauss_seidel.h"
 #include "sblog.h"
 
 #define NAME "two-level"
@@ -86,30 +86,37 @@
 
 #define FACTORED 200000 /* p-multigrid: largest number of unknowns of E that is factored */
 
+typedef enum {
+  INCOMPLETE,  /* two-level: incomplete Cholesky on each rank */
+  DIAGONAL,    /* two-level: where that is not positive definite */
+  CHEBYSHEV,   /* contact */
+  GAUSS_SEIDEL /* p-multigrid; contact of P2 bodies */
+} Smoother;
+
 typedef struct {
   SbSpace space;
   SbCoarse coarse;
+  Smoother smoother;
   PetscBool guess_given;
 
   /* two-level */
   PetscInt wanted;     /* number of aggregates, 0: by the number of nodes */
   PetscInt limit;      /* largest number of aggregates for one rank to factor, -1: by size */
-  PC fine;             /* fine level on this rank, unless it is the diagonal */
-  PetscBool simple;    /* the fine level is the diagonal */
+  PC fine;             /* INCOMPLETE: of this rank; DIAGONAL: of all */
   Vec own_in, own_out; /* owned rows; they borrow their arrays */
 
   /* contact and p-multigrid */
   const SbContactRows *rows; /* NULL without contact */
   PetscObjectId pattern;     /* the matrix whose pattern E has, 0: none */
-  PetscReal
-    *inverse; /* [n][9] inverse diagonal blocks of A; of Chebyshev's zero at nodes in contact */
-  PetscReal *extra; /* [n][3] diagonal added in the sweeps (gauss_seidel.c); NULL: Chebyshev */
-  Vec p;            /* last step of Chebyshev's iteration */
+  PetscReal *inverse; /* [n][9] inverse diagonal blocks of A; CHEBYSHEV: zero at nodes in contact */
+  PetscReal *extra;   /* GAUSS_SEIDEL: [n][3] diagonal added in the sweeps (gauss_seidel.h) */
+  Vec p;              /* last step of Chebyshev's iteration */
 } TwoLevel;
 
 /* The incomplete Cholesky factorisation of this rank's diagonal block, or its replacement. */
 static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
 {
+  const PetscBool diagonal = (PetscBool)(p->smoother == DIAGONAL);
   PCFailedReason reason;
   PetscBool symmetric;
   const char *prefix;
@@ -117,18 +124,18 @@ static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
   PetscFunctionBeginUser;
   if (!p->fine) {
     PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
-    PetscCall(PCCreate(p->simple ? p->space->comm : PETSC_COMM_SELF, &p->fine));
+    PetscCall(PCCreate(diagonal ? p->space->comm : PETSC_COMM_SELF, &p->fine));
     PetscCall(PCGetOptionsPrefix(pc, &prefix));
     PetscCall(PCSetOptionsPrefix(p->fine, prefix));
     PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
-    if (p->simple)
+    if (diagonal)
       PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
     else /* PETSc 3.26 fails for an empty matrix */
       PetscCall(PCSetType(p->fine, p->space->nnode_owned ? PCICC : PCNONE));
     PetscCall(PCFactorSetShiftType(p->fine, MAT_SHIFT_POSITIVE_DEFINITE)); /* ICC's */
     PetscCall(PCSetFromOptions(p->fine));
   }
-  if (!p->simple)
+  if (!diagonal)
     PetscCall(SbProductGetSymmetric(A, &A));
   PetscCall(PCSetOperators(p->fine, A, A));
   PetscCall(PCSetReusePreconditioner(p->fine, PETSC_FALSE));
@@ -147,7 +154,7 @@ static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
 static PetscErrorCode simplify(TwoLevel *p)
 {
   PetscFunctionBeginUser;
-  p->simple = PETSC_TRUE;
+  p->smoother = DIAGONAL;
   PetscCall(PCDestroy(&p->fine));
   PetscCall(SbWarning(
     p->space->comm,
@@ -156,7 +163,51 @@ static PetscErrorCode simplify(TwoLevel *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PCSetUp_Coarse(PC pc)
+/* The coarse space of aggregates with its solver, and the first choice of the smoother. */
+static PetscErrorCode create_coarse(TwoLevel *p, Mat A)
+{
+  const SbSpace s = p->space;
+  PetscInt wanted = p->wanted;
+  PetscInt limit = p->limit;
+  PetscInt nfree = 0;
+  PetscInt total;
+  PetscReal nu = 0.;
+  PetscBool spread;
+
+  PetscFunctionBeginUser;
+
+  /* the number of aggregates of all ranks. 300 was best for 36,000 nodes (192,000 tets); the
+     factor's cost grows faster than their number */
+  if (!wanted)
+    wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
+  if (limit < 0)
+    limit =
+      PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (s->size * NODES_PER_FACTORED)));
+  spread = (PetscBool)(s->size > 1 && wanted > limit);
+  if (spread && !p->wanted)
+    wanted = s->Nnode / NODES_PER_SPREAD;
+
+  /* this rank's share, by free nodes */
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    nfree += s->fixed[i] != 7;
+  PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
+  wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
+  PetscCall(SbCoarseCreate(s, wanted, PETSC_FALSE, &p->coarse));
+  PetscCall(SbCoarseSetPattern(p->coarse, A, NULL));
+  if (p->coarse->N)
+    PetscCall(SbCoarseCreateSolver(p->coarse, (PetscBool)!spread));
+
+  /* the smoother, and vectors for it */
+  for (PetscInt r = 0; r < s->nregion; r++)
+    nu = PetscMax(nu, SbMaterialPoisson(s->region[r].material));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
+  p->smoother = nu > NU_ICC ? DIAGONAL : INCOMPLETE;
+  PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_in));
+  PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCSetUp_TwoLevel(PC pc)
 {
   PetscBool ok;
   TwoLevel *p;
@@ -166,43 +217,10 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
-  if (!p->coarse) {
-    const SbSpace s = p->space;
-    PetscInt wanted = p->wanted;
-    PetscInt limit = p->limit;
-    PetscInt nfree = 0;
-    PetscInt total;
-    PetscReal nu = 0.;
-    PetscBool spread;
-
-    /* 300 was best for 36,000 nodes (192,000 tets); the factor's cost grows faster than their
-       number */
-    if (!wanted)
-      wanted =
-        PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
-    if (limit < 0)
-      limit = PetscMax(LEAST_FACTORED,
-                       PetscMin(MOST_FACTORED, s->Nnode / (s->size * NODES_PER_FACTORED)));
-    spread = (PetscBool)(s->size > 1 && wanted > limit);
-    if (spread && !p->wanted)
-      wanted = s->Nnode / NODES_PER_SPREAD;
-    for (PetscInt i = 0; i < s->nnode_owned; i++)
-      nfree += s->fixed[i] != 7;
-    PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
-    wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
-    PetscCall(SbCoarseCreate(s, wanted, PETSC_FALSE, &p->coarse));
-    PetscCall(SbCoarseSetPattern(p->coarse, A, NULL));
-    if (p->coarse->N)
-      PetscCall(SbCoarseCreateSolver(p->coarse, (PetscBool)!spread));
-    for (PetscInt r = 0; r < s->nregion; r++)
-      nu = PetscMax(nu, SbMaterialPoisson(s->region[r].material));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
-    p->simple = (PetscBool)(nu > NU_ICC);
-    PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_in));
-    PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_out));
-  }
+  if (!p->coarse)
+    PetscCall(create_coarse(p, A));
   PetscCall(set_up_fine(p, pc, A, &ok));
-  if (!ok && !p->simple && !p->space->tentative) {
+  if (!ok && p->smoother == INCOMPLETE && !p->space->tentative) {
     PetscCall(simplify(p));
     PetscCall(set_up_fine(p, pc, A, &ok));
   }
@@ -218,7 +236,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
 /* With contact, and p-multigrid: both have the inverse diagonal blocks of A. */
 static PetscErrorCode PCSetUp_Blocks(PC pc)
 {
-  PetscBool ok;
+  PetscBool ok, sweeps;
   PetscObjectId id;
   TwoLevel *p;
   SbCoarse c;
@@ -230,9 +248,10 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
   PetscCall(PetscObjectGetId((PetscObject)A, &id));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   c = p->coarse;
+  sweeps = (PetscBool)(p->smoother == GAUSS_SEIDEL);
   if (!p->pattern) {
     PetscCall(PetscMalloc2(9 * (size_t)p->space->nnode_owned, &p->inverse,
-                           c->parent ? 3 * p->space->nnode_owned : 0, &p->extra));
+                           sweeps ? 3 * p->space->nnode_owned : 0, &p->extra));
     PetscCall(MatCreateVecs(A, &p->p, NULL));
   }
 
@@ -246,12 +265,12 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
     PetscCall(SbCoarseCreateSolver(c, (PetscBool)(3 * c->N <= FACTORED && strcmp(type, PCGAMG))));
   }
   p->pattern = id;
-  PetscCall(SbGaussSeidelSetUp(A, p->inverse, c->parent ? p->extra : NULL, &ok));
+  PetscCall(SbGaussSeidelSetUp(A, p->inverse, sweeps ? p->extra : NULL, &ok));
 
   /* Chebyshev: positive definite where it smooths */
-  if (!c->parent)
+  if (!sweeps)
     ok = PETSC_TRUE;
-  for (PetscInt i = 0; i < p->space->nnode_owned && !c->parent; i++) {
+  for (PetscInt i = 0; i < p->space->nnode_owned && !sweeps; i++) {
     PetscReal *B = p->inverse + 9 * (size_t)i;
 
     if (c->way[i] == SB_ITSELF)
@@ -310,11 +329,11 @@ static PetscErrorCode smooth(TwoLevel *p, Mat A, Vec r, Vec z)
   PetscReal rho = half / middle;
 
   PetscFunctionBeginUser;
-  if (p->simple) {
+  if (p->smoother == DIAGONAL) {
     PetscCall(PCApply(p->fine, r, z));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (p->fine) {
+  if (p->smoother == INCOMPLETE) {
     PetscCall(VecGetLocalVectorRead(r, p->own_in));
     PetscCall(VecGetLocalVector(z, p->own_out));
     PetscCall(PCApply(p->fine, p->own_in, p->own_out));
@@ -336,7 +355,7 @@ static PetscErrorCode smooth(TwoLevel *p, Mat A, Vec r, Vec z)
 static PetscErrorCode PCApply_TwoLevel(PC pc, Vec r, Vec z)
 {
   PetscReal share = 1.;
-  PetscBool whole;
+  PetscBool in_span;
   TwoLevel *p;
   SbCoarse c;
   Vec s = r;
@@ -346,16 +365,20 @@ static PetscErrorCode PCApply_TwoLevel(PC pc, Vec r, Vec z)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
   c = p->coarse;
-  if (c->parent) {
+
+  /* a sweep down, the coarse correction, a sweep up */
+  if (p->smoother == GAUSS_SEIDEL) {
     PetscCall(SbGaussSeidelDown(A, p->inverse, p->extra, r, z, c->t));
     PetscCall(SbCoarseRestrict(c, c->t, NULL));
     PetscCall(SbCoarseAdd(c, z));
     PetscCall(SbGaussSeidelUp(A, p->inverse, p->extra, r, z, c->t));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
+  /* z = Q r, s = r - A z, unless r has no part in the span of Z */
   PetscCall(SbCoarseRestrict(c, r, c->spread ? NULL : &share));
-  whole = (PetscBool)(share > IN_SPAN);
-  if (whole) { /* z = Q r, s = r - A z */
+  in_span = (PetscBool)(share > IN_SPAN);
+  if (in_span) {
     s = c->s;
     PetscCall(VecZeroEntries(z));
     PetscCall(SbCoarseAdd(c, z));
@@ -366,7 +389,7 @@ static PetscErrorCode PCApply_TwoLevel(PC pc, Vec r, Vec z)
   /* w = M s + Q (s - A M s) */
   PetscCall(smooth(p, A, s, c->w));
   PetscCall(SbCoarseCorrect(c, A, s, c->w));
-  if (whole)
+  if (in_span)
     PetscCall(VecAXPY(z, 1., c->w));
   else
     PetscCall(VecCopy(c->w, z));
@@ -431,7 +454,7 @@ static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
       PetscCall(PCView(c->solver, viewer));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (c && c->parent)
+  if (p->smoother == GAUSS_SEIDEL)
     PetscCall(PetscViewerASCIIPrintf(
       viewer, "  Gauss-Seidel, and the vertices of P2 bodies in the place of their aggregates\n"));
   count[0] = most = c ? c->nagg : 0;
@@ -449,9 +472,9 @@ static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
       viewer, ", spread over the ranks, at most %" PetscInt_FMT " on one; fine level:\n", most));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, ", factored by one of the ranks; fine level:\n"));
-  if (p->fine && p->simple)
+  if (p->fine && p->smoother == DIAGONAL)
     PetscCall(PCView(p->fine, viewer));
-  if (p->fine && !p->simple) {
+  if (p->fine && p->smoother == INCOMPLETE) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
     if (!p->space->rank)
       PetscCall(PCView(p->fine, own));
@@ -492,13 +515,13 @@ static PetscErrorCode create(SbSpace s, PC pc, const char *name, PetscErrorCode 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
+PetscErrorCode SbPCTwoLevelCreate(SbSpace s, PC pc)
 {
   const char *prefix;
   TwoLevel *p;
 
   PetscFunctionBeginUser;
-  PetscCall(create(s, pc, NAME, PCSetUp_Coarse, &p));
+  PetscCall(create(s, pc, NAME, PCSetUp_TwoLevel, &p));
   PetscCall(PCShellSetPreSolve(pc, PCPreSolve_TwoLevel));
   PetscCall(PCShellSetPostSolve(pc, PCPostSolve_TwoLevel));
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
@@ -527,6 +550,7 @@ PetscErrorCode SbPCPMultigridCreate(SbSpace s, PC pc)
     "-solver cg_p_multigrid is for runs with a body of -body_<name>_element p2: choose auto, or "
     "cg_two_level");
   PetscCall(create(s, pc, "p-multigrid", PCSetUp_Blocks, &p));
+  p->smoother = GAUSS_SEIDEL;
   PetscCall(SbCoarseCreate(s, -1, PETSC_TRUE, &p->coarse));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -554,10 +578,11 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc, Sb
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nvertex, 1, MPIU_INT, MPI_SUM, s->comm));
   if (nvertex > VERTICES)
     PetscCall(PetscFree(p->coarse->parent));
+  p->smoother = p->coarse->parent ? GAUSS_SEIDEL : CHEBYSHEV;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed)
+PetscErrorCode SbPCTwoLevelSimplify(PC pc, KSPConvergedReason reason, PetscBool *changed)
 {
   PetscBool ok;
   TwoLevel *p;
@@ -566,7 +591,7 @@ PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *c
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
   PetscCall(SbPCShellFind(pc, NAME, &p));
-  if (!p || p->simple || !p->coarse || !p->coarse->ok)
+  if (!p || p->smoother == DIAGONAL || !p->coarse || !p->coarse->ok)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED &&
       reason != KSP_DIVERGED_NANORINF)

@@ -12,7 +12,6 @@
 */
 #include "pressure.h"
 #include "sbkernel.h"
-#include "sbsolver.h"
 
 #define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
 #define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */

@@ -16,12 +16,13 @@
   strain is then that of its own nodes, so that in a strained body the P1 matrix is slightly
   nonsymmetric at interfaces between ranks, which GMRES allows. Springs of effects are added to the
   P1 matrix by the Galerkin product: they may be a body's only support. The P1 matrix is inverted by
-  one cycle of algebraic multigrid. With a P2 body: pc_coarse.c. Hiptmair and Xu (2007), Nodal
+  one cycle of algebraic multigrid. With a P2 body: two_level.c. Hiptmair and Xu (2007), Nodal
   auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs inequalities for piecewise H1
   functions.
 */
 #include "pressure.h"
-#include "solver_impl.h"
+#include "coarse.h"
+#include "gauss_seidel.h"
 
 /* Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored.
    Bar of CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and 4 ranks; with PETSc's default -1,

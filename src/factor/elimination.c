@@ -14,7 +14,7 @@
      nodes.
 */
 #include <metis.h>
-#include "factor.h"
+#include "elimination.h"
 
 /* Largest fraction of explicit zeros in a group of columns, by its number of nodes. */
 static const struct {

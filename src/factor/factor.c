@@ -3,7 +3,7 @@
   multifrontal method for sparse matrix solution", 1992), with triangular solves that read as little
   memory as possible.
 
-  Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its
+  Each supernode, a group of columns with one pattern (elimination.c), has a dense front: its
   entries of A and the updates of its children. LAPACK factors the leading block, BLAS forms the
   update for the parent. Some nodes may be kept, that is, not eliminated: the updates (contribution
   blocks) of the roots sum to the Schur complement on them. An exact factor has L in double
@@ -19,7 +19,8 @@
 
   Not handled: indefinite matrices (ok = PETSC_FALSE), iterative refinement.
 */
-#include "factor.h"
+#include "sbfactor.h"
+#include "elimination.h"
 #include "quantized.h"
 #include <petscblaslapack.h>
 
