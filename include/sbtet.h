@@ -25,11 +25,6 @@ PetscErrorCode SbFacesDestroy(SbFaces *faces);
 /* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
 PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
 
-/* Edges of the cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03 12 13
-   23; PetscFree(). */
-PetscErrorCode SbTetEdges(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt *nedge,
-                          PetscInt **edge);
-
 /* check.c, quality.c */
 
 /* Adds "what: n" to a note, unless n is 0. */

@@ -198,6 +198,13 @@ PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMerge
                             SbLocalMesh *local);
 /* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
+/* faces.c */
+
+/* Edges of the cells, each once: edge[ncell][6], the number of each edge of a cell, 01 02 03 12 13
+   23; PetscFree(). */
+PetscErrorCode SbTetEdges(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt *nedge,
+                          PetscInt **edge);
+
 /* plex.c: the DMPLEX of the numbered mesh; sides: with faces and edges. Collective. */
 PetscErrorCode SbPlexCreate(SbMesh mesh, PetscBool sides);
 /* Reverse Cuthill-McKee order: order[i] is the vertex with new number i. Cell vertices of -1 are
