@@ -3,17 +3,21 @@
 
     mesh -mesh big.msh
     mesh -mesh big.h5 -slabs      (all ranks read)
+    mesh -mesh box:0.4,0.1,0.1:36 -petsc
 
   Seconds are wall time, and as NAME_cpu the largest CPU time of a rank (including waiting for
   messages).
 
   read: the file to arrays on rank 0; read_and_check: with the checks of a run, all bodies in the
-  merged mesh; distribute: partition and migration; number: local numbering; plex: the DMPLEX.
+  merged mesh; distribute: partition and migration; number: local numbering; plex: the DMPLEX of
+  the numbered cells. With -petsc, on several ranks, also petsc_...: the same by PETSc's own
+  distribution, before; peaks count it then.
   Memory is the largest resident size within a phase (VmHWM, reset before it), of rank 0 and of the
   largest other rank, less that of the process at its start. One run per process: freed pages may
   remain.
 */
 #include "perf.h"
+#include <petscdmplex.h>
 #include <sbsurface.h>
 #include "../../src/mesh/mesh_impl.h"
 
@@ -93,7 +97,62 @@ static PetscErrorCode read_only(const SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode measure(SbBody *body, SbReading reading)
+/* The same mesh by DMPlexDistribute() and DMPlexDistributeOverlap(), from cells and vertices on
+   rank 0, with the parts of our partitioner. */
+static PetscErrorCode petsc_way(const SbMergedMesh *w, Phase *p)
+{
+  PetscPartitioner partitioner, parts;
+  PetscMPIInt *part, size;
+  PetscInt *key, *start, *point, *sizes;
+  PetscReal *x;
+  PetscSF sf;
+  DM dm, distributed, overlapped;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+
+  // parts, for a partitioner that knows them
+  PetscCall(PetscMalloc2(w->ncell, &part, w->ncell, &key));
+  PetscCall(PetscPartitionerCreate(PETSC_COMM_WORLD, &partitioner));
+  PetscCall(SbPartition(partitioner, w, part));
+  PetscCall(PetscPartitionerDestroy(&partitioner));
+  for (PetscInt c = 0; c < w->ncell; c++)
+    key[c] = part[c];
+  PetscCall(SbBucketByKey(w->ncell, key, size, &start, &point));
+  PetscCall(PetscMalloc1(size, &sizes));
+  for (PetscMPIInt r = 0; r < size; r++)
+    sizes[r] = start[r + 1] - start[r];
+  PetscCall(PetscMalloc1(3 * (size_t)w->nvert, &x));
+  for (PetscInt v = 0; v < w->nvert; v++)
+    PetscCall(PetscArraycpy(x + 3 * v, w->vertex[v].x, 3));
+
+  phase_begin(p);
+  PetscCall(DMPlexCreateFromCellListParallelPetsc(PETSC_COMM_WORLD, 3, w->ncell, w->nvert,
+                                                  PETSC_DECIDE, 4, PETSC_FALSE, w->cell, 3, x, &sf,
+                                                  NULL, &dm));
+  PetscCall(phase_end(p, "petsc_create"));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(DMPlexGetPartitioner(dm, &parts));
+  PetscCall(PetscPartitionerSetType(parts, PETSCPARTITIONERSHELL));
+  PetscCall(PetscPartitionerShellSetPartition(parts, size, sizes, point));
+  phase_begin(p);
+  PetscCall(DMPlexDistribute(dm, 0, NULL, &distributed));
+  PetscCall(phase_end(p, "petsc_distribute"));
+  phase_begin(p);
+  PetscCall(DMPlexDistributeOverlap(distributed, 1, NULL, &overlapped));
+  PetscCall(phase_end(p, "petsc_overlap"));
+  PetscCall(DMDestroy(&dm));
+  PetscCall(DMDestroy(&distributed));
+  PetscCall(DMDestroy(&overlapped));
+  PetscCall(PetscFree2(part, key));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(point));
+  PetscCall(PetscFree(sizes));
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode measure(SbBody *body, SbReading reading, PetscBool petsc)
 {
   Phase p;
   SbMergedMesh whole, curved;
@@ -112,6 +171,9 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   phase_begin(&p);
   PetscCall(SbMergedMeshCreate(PETSC_COMM_WORLD, reading, 1, body, 0, NULL, &whole));
   PetscCall(phase_end(&p, "read_and_check"));
+  PetscCall(SbPartitionerPrepare(PETSC_COMM_WORLD));
+  if (petsc)
+    PetscCall(petsc_way(&whole, &p));
   PetscCall(PetscNew(&mesh));
   mesh->comm = PETSC_COMM_WORLD;
   mesh->nbody = 1;
@@ -120,7 +182,6 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   whole.curved = NULL;
   whole.edge_off = NULL;
   phase_begin(&p);
-  PetscCall(SbPartitionerPrepare(PETSC_COMM_WORLD));
   PetscCall(PetscPartitionerCreate(PETSC_COMM_WORLD, &partitioner));
   PetscCall(SbDistribute(partitioner, PETSC_FALSE, &whole, &local));
   PetscCall(PetscPartitionerDestroy(&partitioner));
@@ -148,6 +209,7 @@ int main(int argc, char **argv)
 {
   SbBody body;
   PetscBool slabs = PETSC_FALSE;
+  PetscBool petsc = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
@@ -160,7 +222,8 @@ int main(int argc, char **argv)
   PetscCall(PetscStrncpy(body.mesh, "box:0.4,0.1,0.1:8", sizeof(body.mesh)));
   PetscCall(perf_argument("-mesh", sizeof(body.mesh), body.mesh));
   PetscCall(PetscOptionsGetBool(NULL, NULL, "-slabs", &slabs, NULL));
-  PetscCall(measure(&body, slabs ? SB_READING_SLABS : SB_READING_RANK0));
+  PetscCall(PetscOptionsGetBool(NULL, NULL, "-petsc", &petsc, NULL));
+  PetscCall(measure(&body, slabs ? SB_READING_SLABS : SB_READING_RANK0, petsc));
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   return 0;
