@@ -24,7 +24,7 @@ static PetscBool looks_like_petsc(const char *name)
                            "citations no_signal_handler info viewer_ "
                            "draw_ display nox saws objects_ checkstack get_total_flops "
                            "skip_petscrc error_output_ shared_tmp "
-                           "not_shared_tmp tmp partition sf_ python blas_ omp_ use_gpu device cuda "
+                           "not_shared_tmp tmp sf_ python blas_ omp_ use_gpu device cuda "
                            "hip event_ help version "
                            "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ "
                            "saddle_ telescope_ levels_ prefix_");
