@@ -196,8 +196,7 @@ typedef struct {
   SbEffectOps ops;
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
-  SbEffectPointForce, SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping,
-  SbEffectContact;
+  SbEffectPointForce, SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];
@@ -264,3 +263,17 @@ PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
 */
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
 PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
+
+/* A path given by the options displacement, angle, axis and axis_point; e owns the formulas, and is
+   no longer steady where one uses t. position: whether they may use x, y, z. Error:
+   PETSC_ERR_USER_INPUT. */
+typedef struct {
+  SbFormula displacement[3], angle; /* m, degrees */
+  PetscReal axis[3], point[3];      /* unit vector; m */
+} SbPath;
+PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, SbPath *path);
+
+/* Boundary facets of owned and ghost cells in the named sets, each once even when it is in several
+   of the sets. Collective; the caller releases the array with PetscFree(). Errors
+   (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set without boundary facets. */
+PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);

@@ -16,7 +16,7 @@
   For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all
   of it.
 */
-#include "contact_mesh.h"
+#include "pairs.h"
 #include "sbgeometry.h"
 
 #define CANCEL 1e-3 /* relative length below which a sum of directions counts as zero */
@@ -53,7 +53,7 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
 }
 
 /* Whether an edge intersects a triangle. */
-static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edge, PetscInt t)
+static PetscBool goes_through(SbContactSurface m, const PetscReal x[], PetscInt edge, PetscInt t)
 {
   const PetscInt *e = m->edge + 2 * edge;
   const PetscInt *v = m->triangle + 3 * t;
@@ -82,7 +82,7 @@ static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edg
 
 /* Edges that intersect triangles of another body, or of the same one (m->self): hit[n][2], edge and
    triangle, ascending, of all ranks on each; the caller frees it. Collective. */
-static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], PetscInt *n,
+static PetscErrorCode find_crossings(SbContactSurface m, const PetscReal x[], PetscInt *n,
                                      PetscInt **hits)
 {
   PetscInt nmine = 0;
@@ -148,7 +148,7 @@ static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, c
 
 /* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle;
    signed distance of the edge's first end, m. */
-static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t,
+static PetscReal pierce(SbContactSurface m, const PetscReal x[], PetscInt e, PetscInt t,
                         PetscReal n[3], PetscReal *first)
 {
   const PetscInt *v = m->triangle + 3 * t;
@@ -168,7 +168,7 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 
 /* Adds a point at p with its other side, the triangle of the penetrated body that the ray along the
    separation direction leaves through, if there is any. */
-static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree,
+static PetscErrorCode add_inside(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
                                  PetscInt part, PetscReal depth, const PetscReal p[3],
                                  SbPenetration *point, SbContactOverlap *o)
 {
@@ -263,7 +263,7 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
+void SbContactSurfaceNormals(SbContactSurface m, const PetscReal x[], PetscReal normal[])
 {
   for (PetscInt k = 0; k < 3 * m->nvertex; k++)
     normal[k] = 0.;
@@ -279,7 +279,7 @@ void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal
 
 /* Propagates directions from the n vertices of list[], layer by layer along edges that intersect
    nothing. */
-static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
+static void spread_ways(SbContactSurface m, Ways *w, PetscInt n, PetscInt list[])
 {
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
     /* means of the sums; a vertex whose directions cancel has none */
@@ -315,7 +315,7 @@ static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 }
 
 /* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
-static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n,
+static PetscErrorCode find_inside(SbContactSurface m, const PetscReal x[], PetscInt n,
                                   const PetscInt hit[], SbContactOverlap *o)
 {
   Ways w = {.x = x};
@@ -329,7 +329,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(PetscCalloc7(m->nvertex, &w.in, m->nvertex, &list, 3 * m->nvertex, &w.way, m->nvertex,
                          &w.depth, m->nvertex, &w.sum, m->nvertex, &w.layer, m->nedge, &w.through));
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
-  SbContactMeshNormals(m, x, w.normal);
+  SbContactSurfaceNormals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) {
     (void)SbNormalise(w.normal + 3 * v);
     w.in[v] = -1;
@@ -442,7 +442,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
 }
 
 /* A feature that penetrates a half-space, bowl, sphere or capsule. */
-static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbContactPair *pair,
+static PetscErrorCode add_behind(SbContactSurface m, const PetscReal x[], const SbContactPair *pair,
                                  SbContactOverlap *o)
 {
   SbPenetration point = {.n = 0, .area = pair->area};
@@ -473,7 +473,7 @@ static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContactOverlap *o)
+static PetscErrorCode find_behind(SbContactSurface m, const PetscReal x[], SbContactOverlap *o)
 {
   const PetscInt first = m->nbody_vertex;
 
@@ -507,7 +507,7 @@ static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscBool inside,
+PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *o)
 {
   PetscInt n, *hit;
@@ -571,8 +571,8 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2],
-                                     PetscBool *found)
+PetscErrorCode SbContactSurfaceIsInside(SbContactSurface m, const PetscReal x[], PetscInt body[2],
+                                        PetscBool *found)
 {
   const SbMesh mesh = m->space->mesh;
   const PetscInt nbody = mesh->nbody;

@@ -13,7 +13,7 @@
   and deformation are solved together, so the whole body bounces if it is stiff relative to its
   inertia, sqrt(k/m) h >> 1. In a soft one e acts only on the neighbourhood of the point, and the
   body rebounds by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci. Comput. 33, 2011).
-  (src/effect/contact.h, barrier_springs.c)
+  (contact_impl.h, separation.c)
 
   Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the mass norm and S the
   strain energy, a step of implicit Euler gains W - D + C plus the work of the loads, C = S(u1) -

@@ -3,6 +3,7 @@
   line here.
 */
 #include "sbremesh.h"
+#include "sbcontact.h"
 #include "scene_impl.h"
 #include "sblog.h"
 

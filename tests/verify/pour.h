@@ -7,7 +7,7 @@
   end inside the bowl, and resting bodies are supported.
 */
 #pragma once
-#include "../../src/effect/barrier_impl.h"
+#include "../../src/contact/barrier.h"
 #include "contact.h"
 
 #define POUR_G 9.81

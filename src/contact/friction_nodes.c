@@ -1,6 +1,6 @@
 /*
-  friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it
-  slides.
+  friction_nodes.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip
+  if it slides.
 
   A sticking pair has two exact tangential constraints, or two springs. A sliding pair has its
   contact force along n - mu d, d the direction of the slip, so that friction uses N of the same
@@ -14,7 +14,7 @@
   A node in the corner of two obstacles cannot stick to both by exact constraints: they would be
   redundant. Such a pair sticks by springs while in contact.
 */
-#include "contact.h"
+#include "contact_impl.h"
 
 #define FLIPS \
   10 /* changes of a pair between stick and slip within a step, after which it has springs */

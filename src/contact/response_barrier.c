@@ -1,11 +1,11 @@
 /*
-  barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass through
-  each other.
+  response_barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass
+  through each other.
 
-  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an
+  Below the width w pairs of features repel each other by the barrier of pair_energy.c, an
   energy that is infinite at contact. It is part of the potential that Newton's method minimises
   (src/time/newton.c), and every iteration is limited by continuous collision detection
-  (src/contact/contact_pairs.c). So an accepted state can be reached from the one before it without
+  (pairs.c). So an accepted state can be reached from the one before it without
   surfaces passing through each other.
 
   Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the
@@ -20,13 +20,13 @@
 
   In a static run, or with friction_solves, the step is solved again with the normal forces and
   closest points of the last solution until friction changes by less than a tolerance
-  (barrier_forces.c), and reported.
+  (barrier_terms.c), and reported.
 
   Initial contact. Bodies that touch when a run begins are moved apart rigidly
   (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their
-  vertices. Bodies that intersect are separated by penalty springs (barrier_springs.c).
+  vertices. Bodies that intersect are separated by penalty springs (separation.c).
 */
-#include "barrier_impl.h"
+#include "barrier.h"
 
 #define WIDTH 1e-3      /* default w over the size of the smallest body */
 #define WIDTH_CUBE 3e-3 /* largest default w over the cube root of its volume */
@@ -127,7 +127,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     PetscCall(SbObstacleSetUp(b->contact.obstacle, s->comm, b->contact.scale, b->contact.at,
                               sizeof(e->note), e->note));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
-  PetscCall(SbContactMeshCreate(s, n, facet, b->contact.obstacle, &b->mesh));
+  PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
   nmove = 3 * b->mesh->nvertex;
   nobstacle = nmove - 3 * b->mesh->nbody_vertex;
@@ -166,7 +166,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
 static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
 
   if (!b->contact.obstacle)
     return;
@@ -210,7 +210,7 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
                                        SbInitialContacts *list)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal;
 
@@ -219,12 +219,12 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   *first = PETSC_TRUE;
   find_path(b, t, dt);
-  PetscCall(SbContactMeshMarkDriven(m));
+  PetscCall(SbContactSurfaceMarkDriven(m));
   PetscCall(SbBarrierPlace(b, u, 0., b->x));
   PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->searched));
   b->searched = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
-  SbContactMeshNormals(m, b->x, normal);
+  SbContactSurfaceNormals(m, b->x, normal);
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
@@ -259,7 +259,7 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
 
@@ -270,7 +270,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     PetscInt n = 0;
 
     PetscCall(SbBarrierPlace(b, u, 0., b->x));
-    SbContactMeshNormals(m, b->x, normal);
+    SbContactSurfaceNormals(m, b->x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
     PetscCall(PetscArrayzero(push, 4 * m->nvertex));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -395,7 +395,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
                                     PetscReal speed, PetscReal u0[])
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   PetscReal least = PETSC_MAX_REAL;
   PetscReal energy[2], unused;
   PetscBool moved;
@@ -405,7 +405,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   e->progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
   if (!b->begun)
-    PetscCall(SbContactMeshMarkDriven(m));
+    PetscCall(SbContactSurfaceMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbBarrierPlace(b, u0, 0., b->x));
     PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
@@ -512,7 +512,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[],
 static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   PetscReal power;
   PetscReal gained = 0.;
   PetscReal asked = 0.;
@@ -757,7 +757,7 @@ static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, P
                                   PetscReal normal[])
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
@@ -881,7 +881,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactMeshDestroy(&b->mesh));
+  PetscCall(SbContactSurfaceDestroy(&b->mesh));
   PetscCall(SbContactPairsDestroy(&b->pairs));
   PetscCall(PetscFree7(b->w, b->x, b->start, b->other, b->u, b->from, b->to));
   PetscCall(PetscFree(b->slot));

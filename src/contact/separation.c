@@ -1,11 +1,11 @@
 /*
-  barrier_springs.c - one-sided springs along fixed directions: they separate overlaps, enforce
+  separation.c - one-sided springs along fixed directions: they separate overlaps, enforce
   restitution.
 
   A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below a goal; each step has
   new ones.
 
-  Overlap. Each penetrating point (src/contact/overlap.c) is moved out by a part of its depth in
+  Overlap. Each penetrating point (overlap.c) is moved out by a part of its depth in
   each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width of the
   barrier at least, and in a static run at once. Springs that reach less than half of that get
   stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is
@@ -21,7 +21,7 @@
   which is stiff relative to the lighter body, as whole bodies collide. Pairs already within the
   width get none, so that a body at rest stays at rest.
 */
-#include "barrier_impl.h"
+#include "barrier.h"
 
 #define STIFF 10.     /* static run: stiffness over that of the barrier */
 #define SAME 1e-5     /* of the bodies' size: positions this close coincide */
@@ -34,7 +34,7 @@
 /* Whether two bodies coincide: then no separation direction exists. */
 static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   PetscReal box[2][6];
   PetscReal most = 0.;
 
@@ -52,7 +52,7 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   SbContactOverlap *o = &b->overlap;
   PetscBool inside = PETSC_FALSE;
   PetscInt body[2] = {0, 0};
@@ -60,7 +60,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   PetscFunctionBeginUser;
   b->nspring = 0;
   if (first && !b->contact.obstacle)
-    PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
+    PetscCall(SbContactSurfaceIsInside(m, b->x, body, &inside));
   PetscCall(SbContactOverlapFind(m, b->x, inside, o));
   PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
              "The effect %s: body %s is inside body %s when the run begins, or in the same place; "
@@ -161,7 +161,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   const SbCCDLimits limits = {
     .radius = SbContactPairRadius(m, pair), .separation = w, .keep = KEEP};
   const PetscReal gap = SbContactPairGap(m, pair, x0, &(SbDistance){0});
@@ -189,7 +189,7 @@ static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscR
 static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const PetscReal x[],
                              Spring *spring)
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   const PetscBool turned = (PetscBool)(pair->v[0] >= m->nbody_vertex);
   SbDistance d;
 
@@ -219,7 +219,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
                                     const PetscReal v0[])
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   PetscReal *u1, *x;
 
   PetscFunctionBeginUser;

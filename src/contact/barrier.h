@@ -1,9 +1,9 @@
 /*
-  barrier_impl.h - the response `barrier`: shared by the files barrier*.c.
+  barrier.h - the response `barrier`.
 */
 #pragma once
-#include "contact.h"
-#include "sbbarrier.h"
+#include "contact_impl.h"
+#include "pairs.h"
 
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {
@@ -40,7 +40,7 @@ typedef struct {
 typedef struct {
   Contact contact; /* first, as options are read before the response is known */
   SbEffect effect; /* whose data this is */
-  SbContactMesh mesh;
+  SbContactSurface mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
   PetscReal *w, *k, *mass; /* [nbody+1] width, m, stiffness, Pa, and mass, kg; obstacle: infinite */
@@ -121,7 +121,7 @@ static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
 /* Swaps `next` and the friction in use. */
 void SbBarrierSwapFriction(Barrier *b);
-/* Computes `lag` (barrier_forces.c), and `next` at the end of the step. Collective. */
+/* Computes `lag` (barrier_terms.c), and `next` at the end of the step. Collective. */
 PetscErrorCode SbBarrierLag(Barrier *b);
 /* Finds overlaps at the current positions, and the springs that separate them in a step of length
    dt, s; `first` of a run: errors where they cannot. Collective. */

@@ -1,5 +1,5 @@
 /*
-  contact_node.c - nodes of the surface against a rigid obstacle, with Coulomb friction.
+  nodes.c - nodes of the surface against a rigid obstacle, with Coulomb friction.
 
   A node at x has the gap g = signed distance from the obstacle in its current pose, and the normal
   n there. Nodes are those of the surface: vertices of P1, centroids of boundary faces of CR and DG
@@ -21,7 +21,7 @@
   penalty with a multiplier, N = <lambda - k g>, updated after each solve until penetration is
   within the tolerance (Simo and Laursen 1992).
 
-  Friction (friction.c) is solved together with N. With it all responses use constraints:
+  Friction (friction_nodes.c) is solved together with N. With it all responses use constraints:
   `projected` exact ones, with solves in their null space, `penalty` and `augmented` springs, linear
   while normals and the active set stay fixed, that is, in each solve. A sticking node stays where
   it was on the moving obstacle.
@@ -40,7 +40,7 @@
   possibly behind a third one, which then replaces the one with the smaller force. Elsewhere (convex
   edges, and with friction) normals are averaged over searches, after many kept.
 */
-#include "contact.h"
+#include "contact_impl.h"
 
 #define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
 #define TOGGLES 3    /* activations of a node within a step after which it stays active */

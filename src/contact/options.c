@@ -1,9 +1,9 @@
 /*
-  contact.c - the effect `contact`: its options, and which response a scene gets.
+  options.c - the effect `contact`: its options, and which response a scene gets.
 
   Without an obstacle: contact between the bodies of the sets, and self-contact on request, by
   `barrier`. With an obstacle: contact of the surfaces `on` with it, by `barrier` or by responses of
-  nodes (contact_node.c).
+  nodes (nodes.c).
 
   Response `auto` is the same for all effects of a scene, as Newton's method has one potential and
   one set of constraints: `barrier` with contact between bodies. `projected` is exact, and safe for
@@ -11,7 +11,7 @@
   penetrate edges and faces, or be passed within a step: there it is `barrier`, unless the scene
   needs an option that it lacks.
 */
-#include "barrier_impl.h"
+#include "barrier.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},

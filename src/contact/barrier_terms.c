@@ -1,6 +1,6 @@
 /*
-  barrier_forces.c - the pairs of the response `barrier` at an iterate, their energy and its
-  derivatives, and those of friction, described in barrier.c; lagged friction.
+  barrier_terms.c - the pairs of the response `barrier` at an iterate, their energy and its
+  derivatives, and those of friction, described in response_barrier.c; lagged friction.
 
   Normal forces and slip directions of friction are those of an earlier state y: the start of the
   step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is
@@ -9,7 +9,7 @@
   when it is small (Li et al. 2020, section 5.7). They converge if a change of friction changes
   normal forces by less than itself.
 */
-#include "barrier_impl.h"
+#include "barrier.h"
 
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[])
@@ -17,7 +17,7 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
   const PetscInt first = 3 * b->mesh->nbody_vertex;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactMeshGetPositions(b->mesh, u, x));
+  PetscCall(SbContactSurfaceGetPositions(b->mesh, u, x));
   for (PetscInt k = first; k < 3 * b->mesh->nvertex; k++)
     x[k] = progress == 1. ? b->to[k - first]
                           : b->from[k - first] + progress * (b->to[k - first] - b->from[k - first]);
@@ -114,7 +114,7 @@ static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *ener
 static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
                    const PetscReal gradient[], PetscReal f[])
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt v = vertex[k];
@@ -254,7 +254,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[],
                                  const PetscReal weight[], const PetscReal H[])
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
 
   PetscFunctionBeginUser;
   for (PetscInt p = 0; p < n; p++) {
@@ -348,7 +348,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
    vertices. */
 static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
 {
-  const SbContactMesh m = b->mesh;
+  const SbContactSurface m = b->mesh;
   const PetscInt *v = friction->on.pair.v;
   const PetscReal *weight = friction->on.at.weight;
   const PetscReal *n = friction->on.at.n;

@@ -1,9 +1,9 @@
 /*
-  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c,
-  friction.c) and of surfaces (barrier.c).
+  contact_impl.h - the effect `contact`: shared by responses of nodes (nodes.c, friction_nodes.c)
+  and of surfaces (barrier.h).
 */
 #pragma once
-#include "effect_impl.h"
+#include "obstacle.h"
 #include "sbcontact.h"
 
 typedef enum {
@@ -142,10 +142,10 @@ PetscErrorCode SbContactDestroy(SbEffect e);
 /* Operations of nodes against an obstacle. */
 extern const SbEffectOps SbContactNodeOps;
 
-/* Friction (friction.c). Not collective. Begin: a step; touches: active at the end of the last
-   one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by
-   `depth` (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read:
-   their forces after a solve, N being the normal force. */
+/* Friction (friction_nodes.c). Not collective. Begin: a step; touches: active at the end of the
+   last one. Enter: activates it: it sticks or slides by its motion without contact, which
+   penetrates by `depth` (m). Direction: of the contact force. Constrain: adds its tangential
+   constraints. Read: their forces after a solve, N being the normal force. */
 void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
 void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth);
 void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3]);
