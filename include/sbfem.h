@@ -199,6 +199,9 @@ PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
+/* Writes the prescribed displacements of the last evaluation (fixed_value) into u[nnode_owned][3],
+   m, and projects it onto exact constraints. Not collective. */
+void SbSpaceSetPrescribed(SbSpace space, PetscScalar u[]);
 /* Zeroes the prescribed components of a vector, or all others. Not collective. */
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
 

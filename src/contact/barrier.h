@@ -39,7 +39,6 @@ typedef struct {
 
 typedef struct {
   Contact contact; /* first, as options are read before the response is known */
-  SbEffect effect; /* whose data this is */
   SbContactSurface mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
@@ -53,7 +52,7 @@ typedef struct {
   PetscReal *start; /* [nvertex][3] at the start of the step, m */
   PetscReal *from,
     *to;            /* [obstacle's vertices][3] positions at the start and the end of the step, m */
-  PetscReal now;    /* SbEffect.progress of x, the completed fraction of that path */
+  PetscReal now;    /* SbContact.progress of x, the completed fraction of that path */
   PetscReal *other; /* [nvertex][3] end of a motion, m */
   PetscBool known;  /* x and active are up to date for u and progress */
   PetscInt nactive, size;
@@ -167,15 +166,15 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[]);
 
-/* Operations of the effect (sbeffect.h). */
-PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
-                                    const PetscReal v0[]);
-PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work);
-PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share);
+/* Operations (sbcontact.h, sbeffect.h). */
+PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,
+                                            const PetscReal u0[], const PetscReal v0[]);
+PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work);
+PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal share);
 PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
-PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
+PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
                                          PetscReal *energy, PetscReal f[]);
-PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
-                                         PetscReal *bound);
-PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
-                                       SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);
+PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal f[], PetscReal *bound);
+PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);

@@ -49,14 +49,14 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   if (!b->begun)
     PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
   PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
-  same = (PetscBool)(b->known && same && b->now == b->effect->progress);
+  same = (PetscBool)(b->known && same && b->now == b->contact.base.progress);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
   if (same)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(b->u, u, n));
-  b->now = b->effect->progress;
+  b->now = b->contact.base.progress;
   b->known = PETSC_TRUE;
-  PetscCall(SbBarrierPlace(b, u, b->effect->progress, b->x));
+  PetscCall(SbBarrierPlace(b, u, b->contact.base.progress, b->x));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   b->nactive = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -82,7 +82,7 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
   PetscReal normal = 0.;
 
   for (int i = 0; i < 3; i++) {
-    u[i] = -b->effect->progress * friction->rotation[i];
+    u[i] = -b->contact.base.progress * friction->rotation[i];
     for (int k = 0; k < 4; k++)
       u[i] += friction->on.at.weight[k] *
               (b->x[3 * friction->on.pair.v[k] + i] - b->start[3 * friction->on.pair.v[k] + i]);
@@ -133,10 +133,10 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
 /* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to
    first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not
    matter here. */
-PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
-                                         PetscReal *bound)
+PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal f[], PetscReal *bound)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
@@ -228,10 +228,10 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
+PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
                                          PetscReal *energy, PetscReal f[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
@@ -274,10 +274,10 @@ static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[],
-                                       SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
+PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
   PetscReal energy, gradient[12], H[144];
 
   PetscFunctionBeginUser;

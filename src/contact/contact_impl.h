@@ -5,6 +5,25 @@
 #pragma once
 #include "obstacle.h"
 #include "sbcontact.h"
+#include "sblog.h"
+
+/* Calls an operation of a contact, if there is one, within the log event of its effect; PHASE: with
+   its time added to the contact phase as well. */
+#define CONTACT_CALL(c, op, ...)                                       \
+  do {                                                                 \
+    const SbContact sb_c_ = (c);                                       \
+    if (sb_c_->ops->op) {                                              \
+      PetscCall(PetscLogEventBegin(sb_c_->effect->event, 0, 0, 0, 0)); \
+      PetscCall((*sb_c_->ops->op)(sb_c_, __VA_ARGS__));                \
+      PetscCall(PetscLogEventEnd(sb_c_->effect->event, 0, 0, 0, 0));   \
+    }                                                                  \
+  } while (0)
+#define PHASE_CALL(c, op, ...)                                             \
+  do {                                                                     \
+    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0)); \
+    CONTACT_CALL(c, op, __VA_ARGS__);                                      \
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
+  } while (0)
 
 typedef enum {
   AUTO,
@@ -39,7 +58,7 @@ static inline void SbOverlapBegin(SbOverlap *o, PetscReal dt)
   o->left = o->recovery > 0 ? PetscPowReal(o->recovery, dt / o->longest) : 0;
 }
 
-/* Newton's law of restitution for the impact of a point (src/model/restitution.c). */
+/* Newton's law of restitution for the impact of a point (restitution.c). */
 typedef struct {
   PetscReal e;    /* coefficient of restitution; 0: none */
   PetscReal left; /* factor on it in this step */
@@ -106,9 +125,10 @@ typedef struct {
 } Touch;
 
 typedef struct {
-  SbResponse response;    /* not AUTO */
-  SbObstacle obstacle;    /* NULL: contact between bodies */
-  PetscReal scale, at[3]; /* of the file of a mesh */
+  struct _p_SbContact base; /* first: what the program sees */
+  SbResponse response;      /* not AUTO */
+  SbObstacle obstacle;      /* NULL: contact between bodies */
+  PetscReal scale, at[3];   /* of the file of a mesh */
   SbPath path; /* of the obstacle; torques are about the point of its axis, which moves with it */
   PetscBool self, pairs; /* between bodies: self-contact; columns for each pair of bodies */
   SbFriction friction;
@@ -122,10 +142,9 @@ typedef struct {
   PetscInt n;
   Touch *touch;     /* [n] */
   PetscReal size;   /* of the bodies, m */
-  PetscBool cut;    /* steps end at the first time of impact */
   PetscBool first;  /* the step has not been solved yet */
   PetscReal impact; /* fraction of the step at the first time of impact, 1: none */
-  SbPose to;        /* at the end of the step */
+  SbPose from, to;  /* of the obstacle at the start and the end of the step */
 } Contact;
 
 /* Whether active nodes are constrained exactly. */
@@ -139,8 +158,8 @@ void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
 /* Destroys what the Contact owns. */
 PetscErrorCode SbContactDestroy(SbEffect e);
 
-/* Operations of nodes against an obstacle. */
-extern const SbEffectOps SbContactNodeOps;
+/* Makes e, with its Contact, an effect of nodes against an obstacle. Not collective. */
+PetscErrorCode SbContactNodesCreate(SbEffect e, const SbScope *scope);
 
 /* Friction (friction_nodes.c). Not collective. Begin: a step; touches: active at the end of the
    last one. Enter: activates it: it sticks or slides by its motion without contact, which
@@ -156,3 +175,7 @@ PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N);
 /* Accepts a step for a node; presses: its normal force is positive. */
 void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses);
 #define SB_CONTACT_STATE 23 /* numbers in a record of a node */
+
+/* restitution.c: energy check of a converged step; `again`: coefficients were reduced.
+   Collective. */
+PetscErrorCode SbContactSetCheckRestitution(SbContactSet *contacts, Vec U, PetscBool *again);

@@ -90,7 +90,7 @@ static PetscReal gap_at(const Contact *c, const SbPose *pose, const PetscReal x[
   return gap;
 }
 
-static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
+static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
 {
   Contact *c = (Contact *)e->data;
   PetscReal box[6] = {0};
@@ -296,14 +296,14 @@ static void find_impact(Contact *c, const Touch *touch)
 {
   const PetscReal small = TOLERANCE * c->size;
 
-  if (!c->cut || touch->was || touch->gap0 <= small || touch->gap >= -small)
+  if (!c->base.ends_step || touch->was || touch->gap0 <= small || touch->gap >= -small)
     return;
   c->impact = PetscMin(c->impact, touch->gap0 / (touch->gap0 - touch->gap));
 }
 
-static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
+static PetscErrorCode time_of_impact_nodes(SbContact contact, PetscReal *part)
 {
-  Contact *c = (Contact *)e->data;
+  Contact *c = (Contact *)contact;
 
   PetscFunctionBeginUser;
   *part = PetscMin(*part, c->impact);
@@ -315,66 +315,43 @@ static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
-                                    const PetscReal u0[], const PetscReal v0[], const PetscReal u[])
+/* A step from t to t + dt begins with u0: the obstacle's path, what is left of a penetration, and
+   where each node would stick. */
+static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscReal t, PetscReal dt,
+                                       PetscReal speed, PetscReal u0[])
 {
-  Contact *c = (Contact *)e->data;
-  SbPose from;
+  Contact *c = (Contact *)contact;
 
   PetscFunctionBeginUser;
-  SbContactPose(c, t, &from);
+  (void)speed;
+  SbContactPose(c, t, &c->from);
   SbContactPose(c, t + dt, &c->to);
   c->friction.updates = 0;
   c->first = PETSC_TRUE;
   c->impact = 1;
-  c->bounce.left = 1;
-  c->bounce.dt = dt;
   SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    PetscReal x0[3], x[3], X0[3], x1[3], n[3], gap0, depth;
-    PetscReal v = 0;
-    PetscBool comes = PETSC_FALSE;
+    PetscReal x0[3], X0[3], x1[3], n[3], gap0, depth;
 
     touch->toggles = touch->flips = 0;
     touch->valley = PETSC_FALSE;
 
     /* a cut attempt restarts with the initial active set; a failed one keeps the active set found
        so far */
-    if (c->cut || c->bounce.e > 0)
+    if (c->base.ends_step || c->bounce.e > 0)
       touch->on = touch->was;
-    touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
-    place(space, touch->node, u, x);
+    touch->idle = (PetscBool)(c->base.ends_step && !touch->was && !exact(c));
+    touch->approach = 0;
     place(space, touch->node, u0, x0);
-    gap0 = gap_at(c, &from, x0, n);
-    if (c->cut)
+    gap0 = gap_at(c, &c->from, x0, n);
+    if (c->base.ends_step)
       touch->gap0 = gap0;
 
     /* with springs penetration includes their deflection; projected nodes are where they were
        constrained */
     depth = touch->was && !exact(c) ? -touch->kept : -gap0;
     touch->rest = depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
-
-    /* its initial position moved with the obstacle: it sticks there, also if contact begins in this
-       step */
-    SbPoseInvert(&from, x0, X0);
-    SbPoseApply(&c->to, X0, x1);
-    for (int k = 0; c->friction.mu > 0 && k < 3; k++) {
-      touch->start[k] = x1[k] - space->node_x[3 * touch->node + k];
-      touch->friction.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
-    }
-    if (c->friction.mu > 0)
-      SbFrictionBegin(&touch->friction, touch->on);
-
-    /* restitution: whether it would penetrate at its speed of approach */
-    touch->approach = 0;
-    if (c->bounce.e > 0 && v0 && !touch->was && touch->rest >= 0) {
-      touch->gap0 = PetscMax(0, gap0);
-      for (int k = 0; k < 3; k++)
-        v -= n[k] * (v0[3 * touch->node + k] - (x1[k] - x0[k]) / dt);
-      touch->approach = PetscMax(0, v);
-      comes = (PetscBool)(v > 0 && dt * v * (1 + EARLY) >= touch->gap0);
-    }
 
     /* the damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g
        - g0) / dt, g0 < 0 the gap at its start */
@@ -383,26 +360,88 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
       touch->stiff += touch->k * c->damping / dt;
       touch->before = touch->k * c->damping / dt * PetscMin(0, gap0 - touch->rest);
     }
+    if (c->friction.mu <= 0)
+      continue;
+
+    /* its initial position moved with the obstacle: it sticks there, also if contact begins in this
+       step */
+    SbPoseInvert(&c->from, x0, X0);
+    SbPoseApply(&c->to, X0, x1);
+    for (int k = 0; k < 3; k++) {
+      touch->start[k] = x1[k] - space->node_x[3 * touch->node + k];
+      touch->friction.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
+    }
+    SbFrictionBegin(&touch->friction, touch->on);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Restitution: speeds of approach of nodes that were separated. */
+static PetscErrorCode find_impacts_nodes(SbContact contact, SbSpace space, PetscReal dt,
+                                         const PetscReal u0[], const PetscReal v0[])
+{
+  Contact *c = (Contact *)contact;
+
+  PetscFunctionBeginUser;
+  c->bounce.left = 1;
+  c->bounce.dt = dt;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x0[3], X0[3], x1[3], n[3];
+    PetscReal v = 0;
+
+    if (touch->was || touch->rest < 0)
+      continue;
+    place(space, touch->node, u0, x0);
+    touch->gap0 = PetscMax(0, gap_at(c, &c->from, x0, n));
+    SbPoseInvert(&c->from, x0, X0);
+    SbPoseApply(&c->to, X0, x1);
+    for (int k = 0; k < 3; k++)
+      v -= n[k] * (v0[3 * touch->node + k] - (x1[k] - x0[k]) / dt);
+    touch->approach = PetscMax(0, v);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The active set at the predicted displacement u. */
+static PetscErrorCode start_nodes(SbContact contact, SbSpace space, const PetscReal u[])
+{
+  Contact *c = (Contact *)contact;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x[3];
+
+    place(space, touch->node, u, x);
     touch->gap = search(c, space, x, touch);
     find_impact(c, touch);
     for (int k = 0; k < 3; k++)
       touch->now[k] = u[3 * touch->node + k];
-    if ((touch->gap < 0 || comes) && exact(c))
-      enter(c, touch);
-    if (!c->held || exact(c))
-      continue;
-    if (spring(touch, touch->gap) > 0)
-      enter(c, touch);
-    else
-      touch->on = PETSC_FALSE;
+
+    /* constraints: nodes that penetrate, or would at their speed of approach; springs: those that
+       push */
+    if (exact(c)) {
+      const PetscBool comes =
+        (PetscBool)(touch->approach > 0 &&
+                    c->bounce.dt * touch->approach * (1 + EARLY) >= touch->gap0);
+
+      if (touch->gap < 0 || comes)
+        enter(c, touch);
+    } else if (c->held) {
+      if (spring(touch, touch->gap) > 0)
+        enter(c, touch);
+      else
+        touch->on = PETSC_FALSE;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The constraints of active nodes: normal, or tangential (across). */
-static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool across)
+static PetscErrorCode constrain_nodes(SbContact contact, SbSpace space, PetscBool across)
 {
-  Contact *c = (Contact *)e->data;
+  Contact *c = (Contact *)contact;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->n; i++) {
@@ -483,10 +522,10 @@ static PetscBool update_spring(const Contact *c, PetscReal largest, Touch *touch
   return PETSC_FALSE;
 }
 
-static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal u[],
-                                     PetscBool *changed)
+static PetscErrorCode update_nodes(SbContact contact, SbSpace space, const PetscReal u[],
+                                   PetscBool *changed)
 {
-  Contact *c = (Contact *)e->data;
+  Contact *c = (Contact *)contact;
   PetscReal largest = 0;
   PetscReal worst = 0;
   PetscBool mine = PETSC_FALSE;
@@ -530,7 +569,7 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
     PetscReal error;
 
     /* after the first solve of a step: times of impact; from now on all springs act */
-    if (c->first && c->cut) {
+    if (c->first && c->base.ends_step) {
       if (!touch->on || !exact(c))
         find_impact(c, touch);
       if (touch->idle && touch->gap < 0)
@@ -573,9 +612,9 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
 }
 
 /* Velocities at the obstacle after a step: rebound. */
-static PetscErrorCode restitution_contact(SbEffect e, PetscReal *work)
+static PetscErrorCode impact_work_nodes(SbContact contact, PetscReal *work)
 {
-  const Contact *c = (const Contact *)e->data;
+  const Contact *c = (const Contact *)contact;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->n; i++) {
@@ -587,9 +626,9 @@ static PetscErrorCode restitution_contact(SbEffect e, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode scale_contact(SbEffect e, PetscReal share)
+static PetscErrorCode scale_restitution_nodes(SbContact contact, PetscReal share)
 {
-  Contact *c = (Contact *)e->data;
+  Contact *c = (Contact *)contact;
 
   PetscFunctionBeginUser;
   c->bounce.left = share;
@@ -603,9 +642,9 @@ static PetscErrorCode scale_contact(SbEffect e, PetscReal share)
 }
 
 /* Velocity of the obstacle at each active node. */
-static PetscErrorCode target_contact(SbEffect e, SbSpace space, const SbStage *stage)
+static PetscErrorCode target_velocity_nodes(SbContact contact, SbSpace space, const SbStage *stage)
 {
-  const Contact *c = (const Contact *)e->data;
+  const Contact *c = (const Contact *)contact;
   SbPose before, now;
 
   PetscFunctionBeginUser;
@@ -642,7 +681,7 @@ static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch 
   return spring(touch, gap_at(c, pose, x, n) - touch->rest);
 }
 
-static PetscErrorCode force_contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+static PetscErrorCode force_nodes(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -662,7 +701,7 @@ static PetscErrorCode force_contact(SbEffect e, SbSpace space, const SbStage *st
 }
 
 /* The rotation of the normal is neglected. */
-static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+static PetscErrorCode tangent_nodes(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -693,7 +732,7 @@ static void rotate_stretch(const SbPose *pose, Touch *touch)
     touch->stretch[k] = R[k] * s[0] + R[3 + k] * s[1] + R[6 + k] * s[2];
 }
 
-static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
+static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Contact *c = (Contact *)e->data;
   PetscReal most = c->friction.error;
@@ -745,10 +784,10 @@ static PetscBool force_on(const Contact *c, const SbPose *pose, SbSpace space, c
   return PETSC_TRUE;
 }
 
-static PetscErrorCode gap_contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                                  PetscReal normal[])
+static PetscErrorCode gap_nodes(SbContact contact, SbSpace space, const SbStage *stage,
+                                PetscReal gap[], PetscReal normal[])
 {
-  const Contact *c = (const Contact *)e->data;
+  const Contact *c = (const Contact *)contact;
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -768,10 +807,10 @@ static PetscErrorCode gap_contact(SbEffect e, SbSpace space, const SbStage *stag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode points_contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                     SbContactPoints *list)
+static PetscErrorCode points_nodes(SbContact contact, SbSpace space, const SbStage *stage,
+                                   SbContactPoints *list)
 {
-  const Contact *c = (const Contact *)e->data;
+  const Contact *c = (const Contact *)contact;
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -794,8 +833,8 @@ static PetscErrorCode points_contact(SbEffect e, SbSpace space, const SbStage *s
 }
 
 /* Force and torque of the obstacle on the bodies, number of active nodes, deepest penetration. */
-static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                      const PetscReal residual[], PetscReal values[])
+static PetscErrorCode history_nodes(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal values[])
 {
   Contact *c = (Contact *)e->data;
   PetscReal deepest = 0;
@@ -834,7 +873,7 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
 /* A record has the node's original number, whether it is and was active, right-hand side and normal
    of its constraint, multiplier, gap, and friction state: enough to rebuild the constraints of the
    last solve, and to continue as the uninterrupted run. */
-static PetscErrorCode save_contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
+static PetscErrorCode save_nodes(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
   const Contact *c = (const Contact *)e->data;
 
@@ -867,8 +906,8 @@ static PetscErrorCode save_contact(SbEffect e, SbSpace space, PetscInt *n, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode load_contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[],
-                                   PetscInt n, const PetscReal records[])
+static PetscErrorCode load_nodes(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[],
+                                 PetscInt n, const PetscReal records[])
 {
   Contact *c = (Contact *)e->data;
   PetscInt *number, *at;
@@ -922,20 +961,103 @@ static PetscErrorCode load_contact(SbEffect e, SbSpace space, PetscReal t, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-const SbEffectOps SbContactNodeOps = {.setup = setup_contact,
-                                      .begin_step = touch_contact,
-                                      .assemble_constraints = constrain_contact,
-                                      .update_active_set = update_contact,
-                                      .time_of_impact = impact_contact,
-                                      .restitution = restitution_contact,
-                                      .scale_restitution = scale_contact,
-                                      .target_velocity = target_contact,
-                                      .force = force_contact,
-                                      .tangent = tangent_contact,
-                                      .accept = accept_contact,
-                                      .gap = gap_contact,
-                                      .contact_points = points_contact,
-                                      .history = history_contact,
-                                      .save = save_contact,
-                                      .load = load_contact,
-                                      .destroy = SbContactDestroy};
+/* Constraints: exact ones, or springs that act along with friction. */
+static const SbContactOps constraint_ops = {
+  .begin_step = begin_step_nodes,
+  .find_impacts = find_impacts_nodes,
+  .start_active_set = start_nodes,
+  .assemble_constraints = constrain_nodes,
+  .update_active_set = update_nodes,
+  .time_of_impact = time_of_impact_nodes,
+  .impact_work = impact_work_nodes,
+  .scale_restitution = scale_restitution_nodes,
+  .target_velocity = target_velocity_nodes,
+  .gap = gap_nodes,
+  .points = points_nodes,
+};
+
+/* Forces of springs on the nodes, with multipliers or impacts that an update changes, or
+   without. */
+static const SbContactOps spring_ops = {
+  .begin_step = begin_step_nodes,
+  .start_active_set = start_nodes,
+  .update_active_set = update_nodes,
+  .time_of_impact = time_of_impact_nodes,
+  .gap = gap_nodes,
+  .points = points_nodes,
+};
+static const SbContactOps penalty_ops = {
+  .begin_step = begin_step_nodes,
+  .start_active_set = start_nodes,
+  .gap = gap_nodes,
+  .points = points_nodes,
+};
+
+static const SbEffectOps constraint_effect = {
+  .setup = setup_nodes,
+  .accept = accept_nodes,
+  .history = history_nodes,
+  .save = save_nodes,
+  .load = load_nodes,
+  .destroy = SbContactDestroy,
+};
+static const SbEffectOps spring_effect = {
+  .setup = setup_nodes,
+  .force = force_nodes,
+  .tangent = tangent_nodes,
+  .accept = accept_nodes,
+  .history = history_nodes,
+  .save = save_nodes,
+  .load = load_nodes,
+  .destroy = SbContactDestroy,
+};
+
+PetscErrorCode SbContactNodesCreate(SbEffect e, const SbScope *scope)
+{
+  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
+                                        "torque_y", "torque_z", "contacts", "penetration"};
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
+  if (c->friction.mu_kinetic < 0)
+    c->friction.mu_kinetic = c->friction.mu;
+  PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
+             "start and stop in turn",
+             e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
+  PetscCall(SbOptionSecond(scope, "time_of_impact", &c->base.ends_step));
+  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "damping", &c->damping));
+  PetscCheck(
+    c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
+    e->name, (double)c->damping, e->name);
+  PetscCheck(c->bounce.e <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier",
+             e->name, (double)c->bounce.e, e->name);
+  PetscCheck(
+    c->bounce.e <= 0 || !c->base.ends_step, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
+    "that ends at the impact has no rebound; leave one of them out",
+    e->name, (double)c->bounce.e, e->name);
+
+  /* loads and history of the effect; exact constraints and friction give forces by constraints,
+     else force() acts */
+  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
+  e->ops = c->held ? constraint_effect : spring_effect;
+  e->nstate = SB_CONTACT_STATE;
+  e->by_node = PETSC_TRUE;
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  e->linear = c->held;
+
+  /* the response */
+  c->base.saddle = (PetscBool)(c->response == MULTIPLIER);
+  c->base.springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
+  if (c->held)
+    c->base.ops = &constraint_ops;
+  else
+    c->base.ops = c->response == AUGMENTED || c->base.ends_step ? &spring_ops : &penalty_ops;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -172,8 +172,6 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
-  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
-                                        "torque_y", "torque_z", "contacts", "penetration"};
   Contact *c = (Contact *)e->data;
   const char *why = NULL;
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
@@ -181,7 +179,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscReal steps;
 
   PetscFunctionBeginUser;
-  e->ops = SbContactNodeOps;
+  e->contact = &c->base;
+  c->base.effect = e;
   PetscCall(choose(e, &c->response, &why));
   if (why)
     SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
@@ -213,55 +212,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
   c->overlap.recovery = steps > 1 ? PetscExpReal(-1 / steps) : 0;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
-  e->euler = (PetscBool)(c->bounce.e > 0);
-  if (c->response == BARRIER) {
+  c->base.restitution = c->bounce.e;
+  if (c->response == BARRIER)
     PetscCall(SbBarrierCreate(e, scope));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
-  if (c->friction.mu_kinetic < 0)
-    c->friction.mu_kinetic = c->friction.mu;
-  PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
-             "start and stop in turn",
-             e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
-  PetscCall(SbOptionSecond(scope, "time_of_impact", &c->cut));
-  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
-  PetscCall(SbOptionReal(scope, "damping", &c->damping));
-  PetscCheck(
-    c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
-    e->name, (double)c->damping, e->name);
-  PetscCheck(!e->euler || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier",
-             e->name, (double)c->bounce.e, e->name);
-  PetscCheck(
-    !e->euler || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
-    "that ends at the impact has no rebound; leave one of them out",
-    e->name, (double)c->bounce.e, e->name);
-
-  e->nstate = SB_CONTACT_STATE;
-  e->by_node = PETSC_TRUE;
-  e->column = columns;
-  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
-  e->saddle = (PetscBool)(c->response == MULTIPLIER);
-  e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
-  if (!c->cut)
-    e->ops.time_of_impact = NULL;
-  if (!e->euler)
-    e->ops.restitution = NULL;
-  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
-  if (c->held) {
-    e->ops.force = NULL; /* forces come from the constraints */
-    e->ops.tangent = NULL;
-  } else {
-    e->ops.assemble_constraints = NULL;
-    e->linear = PETSC_FALSE;
-    if (c->response == PENALTY && !c->cut)
-      e->ops.update_active_set = NULL;
-  }
+  else
+    PetscCall(SbContactNodesCreate(e, scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -142,12 +142,12 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
                          3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
   b->k = b->w + nbody + 1;
   b->mass = b->k + nbody + 1;
-  b->w[nbody] = b->k[nbody] = b->mass[nbody] = e->width = PETSC_MAX_REAL;
+  b->w[nbody] = b->k[nbody] = b->mass[nbody] = b->contact.base.width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->w[i] = b->width > 0. ? b->width
                             : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube),
                                        0.5 * b->mesh->shortest);
-    e->width = PetscMin(e->width, b->w[i]);
+    b->contact.base.width = PetscMin(b->contact.base.width, b->w[i]);
     b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
@@ -205,11 +205,12 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
   return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
 }
 
-static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt,
-                                       const PetscReal u[], PetscBool *first,
-                                       SbInitialContacts *list)
+static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, PetscReal t,
+                                               PetscReal dt, const PetscReal u[], PetscBool *first,
+                                               SbInitialContacts *list)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
   const SbContactSurface m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal;
@@ -362,15 +363,16 @@ static void set_scale(SbEffect e, PetscReal scale)
 
   for (PetscInt i = 0; i < b->mesh->space->mesh->nbody; i++)
     b->w[i] *= scale / b->scale;
-  e->width *= scale / b->scale;
+  b->contact.base.width *= scale / b->scale;
   b->scale = scale;
   b->known = PETSC_FALSE;
 }
 
-static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscReal growth,
+static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, PetscReal growth,
                                           PetscBool *changed)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
   PetscReal far = b->mesh->size;
   PetscReal least;
 
@@ -383,7 +385,7 @@ static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscRea
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++)
     far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
-  least = WIDTH_LEAST * far / e->width;
+  least = WIDTH_LEAST * far / b->contact.base.width;
   if (least >= 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
   set_scale(e, PetscMax(factor, least) * b->scale);
@@ -391,10 +393,11 @@ static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt,
-                                    PetscReal speed, PetscReal u0[])
+static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
+                                         PetscReal speed, PetscReal u0[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
   const SbContactSurface m = b->mesh;
   PetscReal least = PETSC_MAX_REAL;
   PetscReal energy[2], unused;
@@ -402,7 +405,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
   PetscFunctionBeginUser;
   find_path(b, t, dt);
-  e->progress = 0.;
+  b->contact.base.progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
   if (!b->begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
@@ -449,10 +452,11 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
 /* After a solve: friction takes the normal forces and directions of the solution, while its lag is
    large. */
-static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool solved,
-                                  PetscBool *again)
+static PetscErrorCode update_friction_barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                              PetscBool solved, PetscBool *again)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
   PetscBool last, more;
 
   PetscFunctionBeginUser;
@@ -494,10 +498,10 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[],
-                                   const PetscReal u1[], PetscReal *part, PetscInt *nactive)
+static PetscErrorCode max_step_barrier(SbContact contact, SbSpace s, const PetscReal u0[],
+                                       const PetscReal u1[], PetscReal *part, PetscInt *nactive)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
@@ -521,9 +525,9 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscCall(SbBarrierUpdate(b, stage->u));
 
   /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
-  e->work = b->energy + 0.5 * b->obstacle_power;
+  b->contact.base.work = b->energy + 0.5 * b->obstacle_power;
   b->energy = gap_energy(b, &power);
-  e->work += 0.5 * power - b->energy;
+  b->contact.base.work += 0.5 * power - b->energy;
   for (PetscInt i = 0; i < b->friction.n; i++) {
     const FrictionPair *pair = &b->friction.pair[i];
     PetscReal u[3];
@@ -538,7 +542,8 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
       const PetscInt c = 3 * v + k % 3;
 
       if (v < m->nbody_vertex)
-        e->work -= force * u[k % 3] * pair->on.at.weight[k / 3] * (b->x[c] - b->start[c]);
+        b->contact.base.work -=
+          force * u[k % 3] * pair->on.at.weight[k / 3] * (b->x[c] - b->start[c]);
     }
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
@@ -547,13 +552,13 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     PetscReal push[15];
 
     if (m->own[spring->at.v[0]])
-      e->work += SbBarrierSpring(b, spring, push) * way;
+      b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->nspring - b->nbounce)
       continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
-  b->work += e->work;
+  b->work += b->contact.base.work;
   b->parted = PETSC_FALSE;
   if (asked > 0.)
     b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
@@ -700,10 +705,10 @@ static SbContactPoint point_of(const Barrier *b, const Term *t)
   return p;
 }
 
-static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage,
+static PetscErrorCode points_barrier(SbContact contact, SbSpace s, const SbStage *stage,
                                      SbContactPoints *list)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
   PetscBool *told;
 
   PetscFunctionBeginUser;
@@ -753,10 +758,10 @@ static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
-                                  PetscReal normal[])
+static PetscErrorCode gap_barrier(SbContact contact, SbSpace s, const SbStage *stage,
+                                  PetscReal gap[], PetscReal normal[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
   const SbContactSurface m = b->mesh;
 
   PetscFunctionBeginUser;
@@ -805,10 +810,11 @@ static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode nearest_barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size,
+static PetscErrorCode nearest_barrier(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
                                       char text[])
 {
-  const Barrier *b = (const Barrier *)e->data;
+  const Barrier *b = (const Barrier *)contact;
+  const SbEffect e = contact->effect;
   const PetscReal *x = b->x;
   const Active *least = NULL;
   struct {
@@ -898,6 +904,33 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static const SbContactOps barrier_ops = {
+  .initial_contacts = initial_contacts_barrier,
+  .begin_step = begin_step_barrier,
+  .find_impacts = SbContactFindImpacts_Barrier,
+  .gradient = SbContactGradient_Barrier,
+  .hessian = SbContactHessian_Barrier,
+  .max_step = max_step_barrier,
+  .update_friction = update_friction_barrier,
+  .impact_work = SbContactImpactWork_Barrier,
+  .scale_restitution = SbContactScaleRestitution_Barrier,
+  .gap = gap_barrier,
+  .points = points_barrier,
+  .nearest = nearest_barrier,
+  .gap_forces = SbContactGapForces_Barrier,
+  .scale_width = scale_width_barrier,
+};
+static const SbEffectOps barrier_effect = {
+  .setup = setup_barrier,
+  .force = SbEffectForce_Barrier,
+  .accept = accept_barrier,
+  .save = save_barrier,
+  .load = load_barrier,
+  .history = history_barrier,
+  .summary = summary_barrier,
+  .destroy = destroy_barrier,
+};
+
 PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
 {
   static const char *const obstacle[] = {
@@ -909,36 +942,15 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  b->effect = e;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
   PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
-  e->ops = (SbEffectOps){.setup = setup_barrier,
-                         .force = SbEffectForce_Barrier,
-                         .touching = touching_barrier,
-                         .begin_barrier = begin_barrier,
-                         .safe = safe_barrier,
-                         .lag = lag_barrier,
-                         .nearest = nearest_barrier,
-                         .meet = e->euler ? SbEffectMeet_Barrier : NULL,
-                         .restitution = e->euler ? SbEffectRestitution_Barrier : NULL,
-                         .scale_restitution = e->euler ? SbEffectScaleRestitution_Barrier : NULL,
-                         .potential = SbEffectPotential_Barrier,
-                         .hessian = SbEffectHessian_Barrier,
-                         .gap_forces = SbEffectGapForces_Barrier,
-                         .scale_width = scale_width_barrier,
-                         .accept = accept_barrier,
-                         .save = save_barrier,
-                         .load = load_barrier,
-                         .gap = gap_barrier,
-                         .contact_points = points_barrier,
-                         .history = history_barrier,
-                         .summary = summary_barrier,
-                         .destroy = destroy_barrier};
+  e->ops = barrier_effect;
+  b->contact.base.ops = &barrier_ops;
+  b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->nstate = 4;
   e->column = b->contact.obstacle ? obstacle : bodies;
   e->ncolumn =

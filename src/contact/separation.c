@@ -11,7 +11,7 @@
   stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is
   none left.
 
-  Restitution (its energy: src/model/restitution.c). At the start of a step the vertices are moved
+  Restitution (its energy: restitution.c). At the start of a step the vertices are moved
   in free flight. A pair whose gap falls to the barrier's width, or nearly, on this path has the
   direction n and the weights of its closest points there, and the speed of approach v = -n . sum
   weight v. In this step a spring holds it at or above
@@ -215,10 +215,10 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
   return (PetscBool)(spring->approach > 0.);
 }
 
-PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
-                                    const PetscReal v0[])
+PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,
+                                            const PetscReal u0[], const PetscReal v0[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
   const SbContactSurface m = b->mesh;
   PetscReal *u1, *x;
 
@@ -264,9 +264,9 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
+PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work)
 {
-  const Barrier *b = (const Barrier *)e->data;
+  const Barrier *b = (const Barrier *)contact;
   PetscReal push[15];
 
   PetscFunctionBeginUser;
@@ -279,9 +279,9 @@ PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share)
+PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal share)
 {
-  Barrier *b = (Barrier *)e->data;
+  Barrier *b = (Barrier *)contact;
 
   PetscFunctionBeginUser;
   b->contact.bounce.left = share;

@@ -3,7 +3,6 @@
   line here.
 */
 #include "sbremesh.h"
-#include "sbcontact.h"
 #include "scene_impl.h"
 #include "sblog.h"
 

@@ -47,10 +47,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
 
   /* loads without barrier contact, which has its own work */
-  if (m->npotential)
-    PetscCall(SbModelPotentialGradient(m, run->U, 1., PETSC_FALSE, NULL, loads));
-  for (PetscInt k = 0; k < m->npotential; k++)
-    own[0] += m->potential[k]->work;
+  if (m->contacts.npotential)
+    PetscCall(SbContactSetGradient(&m->contacts, run->U, 1., PETSC_FALSE, NULL, loads));
+  own[0] += SbContactSetWork(&m->contacts);
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped)
     PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
