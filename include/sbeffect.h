@@ -19,6 +19,9 @@ typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by
      SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
+  /* declares groups of nodes that it couples, by SbSpaceCouple(), before any effect is set up;
+     tangent() adds their blocks by SbSpaceAddCoupling(). Collective */
+  PetscErrorCode (*couplings)(SbEffect e, SbSpace space);
   /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpacePrescribe() */
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
   /* * writes prescribed displacements at time t into space->fixed_value (rows as in

@@ -198,7 +198,7 @@ static PetscErrorCode make_vertices(SbContactSurface m, PetscInt n, const SbFace
         m->mine[v] = 1;
         continue;
       }
-      PetscCall(PetscFindInt(m->gnode[e], s->nnode - s->nnode_owned, s->gnode + s->nnode_owned,
+      PetscCall(PetscFindInt(m->gnode[e], s->nnode_cell - s->nnode_owned, s->gnode + s->nnode_owned,
                              &m->node[e]));
       m->node[e] = m->node[e] < 0 ? -1 : s->nnode_owned + m->node[e];
     }

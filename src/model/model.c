@@ -108,6 +108,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
   PetscInt nlist = 0;
+  PetscBool coupled = PETSC_FALSE;
   PetscBool validate;
   SbEffect *list;
 
@@ -143,6 +144,16 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
+
+  /* nodes that effects couple, before arrays over nodes are made */
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (!m->effect[e]->ops.couplings)
+      continue;
+    SbEffectCall(m->effect[e], couplings, m->space);
+    coupled = PETSC_TRUE;
+  }
+  if (coupled)
+    PetscCall(SbSpaceCoupleDone(m->space));
 
   /* supports first: other effects need the prescribed unknowns */
   for (PetscInt k = 0; k < 2 * m->neffect; k++) {
