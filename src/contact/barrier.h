@@ -38,61 +38,109 @@ typedef struct {
 } Spring;
 
 typedef struct {
-  Contact contact; /* first, as options are read before the response is known */
-  SbContactSurface mesh;
-  SbContactPairs pairs;
-  PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w, *k, *mass; /* [nbody+1] width, m, stiffness, Pa, and mass, kg; obstacle: infinite */
+  PetscReal width, pressure; /* m, Pa; 0: by body */
+  PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
+  PetscBool verify;
+  PetscInt friction_solves;     /* most lagged-friction iterations of a step; 0: by default */
+  PetscReal friction_tolerance; /* of the lag */
+} BarrierOptions;
+
+/* Positions of the surfaces' vertices within a step. */
+typedef struct {
+  PetscBool begun;  /* the run has begun */
+  PetscReal *x, *u; /* [nvertex][3] current ones, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start; /* [nvertex][3] at the start of the step, m */
+  PetscReal *from, *to; /* [obstacle's vertices][3] at the start and the end of the step, m */
+  PetscReal *other;     /* [nvertex][3] end of a motion, m */
+  PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */
+  PetscBool known;      /* x and the active pairs are up to date for u and progress */
+} BarrierMotion;
+
+/* By body, [nbody+1]; the obstacle's are infinite. */
+typedef struct {
+  PetscReal *w, *k, *mass; /* width, m; stiffness, Pa; mass, kg */
   PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
-  PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
-  PetscReal *x,
-    *u; /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
-  PetscReal *start; /* [nvertex][3] at the start of the step, m */
-  PetscReal *from,
-    *to;            /* [obstacle's vertices][3] positions at the start and the end of the step, m */
-  PetscReal now;    /* SbContact.progress of x, the completed fraction of that path */
-  PetscReal *other; /* [nvertex][3] end of a motion, m */
-  PetscBool known;  /* x and active are up to date for u and progress */
-  PetscInt nactive, size;
-  Active *active;
-  FrictionPairs friction,
-    next;                 /* next: with closest points and normal forces at the end of the step */
-  SbContactBlocks blocks; /* of a Hessian while it is summed up */
-  SbPose pose[2];         /* of the obstacle at the start and the end of the step */
-  PetscInt lags, nlag;    /* lagged-friction iterations of a step: the most; of this step */
-  PetscReal lag_tolerance, lag; /* tolerance of the lag; the lag, relative to mu N of all pairs */
-  PetscReal least_lag; /* least lag of the solutions of this step; number of solutions since */
-  PetscInt nstuck;
-  PetscBool stuck_said;
-  PetscReal most_lag;               /* of the run */
-  PetscReal slip;                   /* e of friction, m */
-  PetscBool overlapping, announced; /* there is overlap; a warning was given */
-  PetscBool parted;                 /* there was at the start of this load step */
-  SbContactOverlap overlap;
+} BarrierWidths;
+
+typedef struct {
+  PetscInt n, size;
+  Active *pair; /* [n] ordered by number */
+} ActivePairs;
+
+typedef struct {
+  FrictionPairs pairs; /* in use */
+  FrictionPairs next;  /* with closest points and normal forces at the end of the step */
+  PetscReal slip;      /* sticking slip e, m */
+  PetscInt nlag;       /* lagged-friction iterations of this step */
+  PetscReal lag;       /* the last lag, relative to mu N of all pairs */
+  PetscReal least;     /* least lag of the solutions of this step */
+  PetscInt nstuck;     /* number of solutions since */
+  PetscBool said;      /* the warning that it does not settle was given */
+  PetscReal most;      /* largest lag of the run */
+  PetscReal loss;      /* since the start, this rank's, J */
+} PairFriction;
+
+/* Overlap of surfaces, and how it is separated. */
+typedef struct {
+  PetscBool overlapping; /* there is some */
+  PetscBool parted;      /* there was some at the start of this load step */
+  PetscBool searched;    /* it was searched for when the run began */
+  PetscBool announced;   /* the warning was given */
   PetscReal stiffer; /* factor on the stiffness of springs, by their success in the last steps */
-  PetscInt nspring, spring_size; /* those of overlap, the same on every rank, */
-  PetscInt nbounce;              /* then those of restitution, of this rank's pairs */
-  Spring *spring;
-  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
-  PetscInt most;             /* largest number of active pairs of the run */
-  PetscInt nsurface, *slot;  /* bodies that take part; [nbody] number among them, -1: it does not */
-  PetscInt *place;           /* [nsurface][nsurface] first column of a pair, the lower body first */
-  const char **column;       /* [ncolumn] all of the effect; NULL: none of pairs */
+  SbContactOverlap overlap;
+} Separation;
+
+typedef struct {
+  PetscInt n, size; /* those of overlap, the same on every rank, */
+  PetscInt nbounce; /* then those of restitution, of this rank's pairs */
+  Spring *spring;   /* [n] */
+} Springs;
+
+/* This rank's sums, J. */
+typedef struct {
+  PetscReal energy;         /* of the barrier at the start, then at the end of the step */
+  PetscReal obstacle_power; /* work along the obstacle's path in this step, forces of its start */
+  PetscReal work;           /* on the bodies since the start */
+} BarrierSums;
+
+/* Of the run, for the summary. */
+typedef struct {
+  PetscReal least, shortest; /* smallest gap, m; shortest safe part of an iteration */
+  PetscInt most;             /* largest number of active pairs */
+} BarrierRecord;
+
+/* History columns of pairs of bodies. */
+typedef struct {
+  PetscInt nsurface, *slot; /* bodies that take part; [nbody] number among them, -1: it does not */
+  PetscInt *place;          /* [nsurface][nsurface] first column of a pair, the lower body first */
+  const char **column;      /* [ncolumn] all of the effect; NULL: none of pairs */
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
-  PetscReal
-    energy; /* barrier's energy at the start, then at the end of the step, J; this rank's, as below */
-  PetscReal
-    obstacle_power; /* work along the obstacle's path in this step, forces of its start, J */
-  PetscReal work, friction_loss; /* since the start, J */
+} PairColumns;
+
+typedef struct {
+  Contact contact; /* first */
+  BarrierOptions options;
+  SbContactSurface surface;
+  SbContactPairs pairs;
+  BarrierMotion motion;
+  BarrierWidths widths;
+  ActivePairs active;
+  PairFriction friction;
+  Separation separation;
+  Springs springs;
+  SbContactBlocks blocks; /* of a Hessian while it is summed up */
+  BarrierSums sums;
+  BarrierRecord record;
+  PairColumns columns;
 } Barrier;
 
 /* The value of a pair from those of its sides: width or pressure. */
 static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
                                 const SbContactPair *pair)
 {
-  const PetscInt *part = b->mesh->part;
+  const PetscInt *part = b->surface->part;
 
   return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
 }
@@ -100,7 +148,7 @@ static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
 /* Whether this rank counts the pair. */
 static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
 {
-  return (PetscBool)b->mesh->own[pair->v[pair->v[0] < b->mesh->nbody_vertex ? 0 : 1]];
+  return (PetscBool)b->surface->own[pair->v[pair->v[0] < b->surface->nbody_vertex ? 0 : 1]];
 }
 
 /* Makes e, with its Contact, an effect of the response `barrier`. Not collective. */
@@ -113,7 +161,7 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
 /* f0'/y of the slip y, 1/m. */
 static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 {
-  return y < b->slip ? 2. / b->slip - y / PetscSqr(b->slip) : 1. / y;
+  return y < b->friction.slip ? 2. / b->friction.slip - y / PetscSqr(b->friction.slip) : 1. / y;
 }
 /* Into `next` normal forces and directions at the current positions, at the end of the step or its
    start. */
@@ -131,7 +179,7 @@ static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spr
   PetscReal g = 0.;
 
   for (PetscInt k = 0; k < spring->at.n; k++)
-    g += spring->at.weight[k] * SbDot3(spring->at.normal, b->x + 3 * spring->at.v[k]);
+    g += spring->at.weight[k] * SbDot3(spring->at.normal, b->motion.x + 3 * spring->at.v[k]);
   return g;
 }
 /* Its force, N, and the gradient of its energy by its vertices, N. */
@@ -157,7 +205,7 @@ typedef struct {
 } Term;
 static inline PetscInt nterm(const Barrier *b)
 {
-  return b->begun ? b->nactive + b->friction.n + b->nspring : 0;
+  return b->motion.begun ? b->active.n + b->friction.pairs.n + b->springs.n : 0;
 }
 void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
 

@@ -14,13 +14,14 @@
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[])
 {
-  const PetscInt first = 3 * b->mesh->nbody_vertex;
+  const PetscInt first = 3 * b->surface->nbody_vertex;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSurfaceGetPositions(b->mesh, u, x));
-  for (PetscInt k = first; k < 3 * b->mesh->nvertex; k++)
-    x[k] = progress == 1. ? b->to[k - first]
-                          : b->from[k - first] + progress * (b->to[k - first] - b->from[k - first]);
+  PetscCall(SbContactSurfaceGetPositions(b->surface, u, x));
+  for (PetscInt k = first; k < 3 * b->surface->nvertex; k++)
+    x[k] = progress == 1. ? b->motion.to[k - first]
+                          : b->motion.from[k - first] +
+                              progress * (b->motion.to[k - first] - b->motion.from[k - first]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,38 +43,41 @@ static int compare_active(const void *x, const void *y, void *unused)
 
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 {
-  const PetscInt n = 3 * b->mesh->space->nnode_owned;
+  const PetscInt n = 3 * b->surface->space->nnode_owned;
   PetscBool same;
 
   PetscFunctionBeginUser;
-  if (!b->begun)
+  if (!b->motion.begun)
     PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
-  PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
-  same = (PetscBool)(b->known && same && b->now == b->contact.base.progress);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
+  PetscCall(PetscArraycmp(u, b->motion.u, b->motion.known ? n : 0, &same));
+  same = (PetscBool)(b->motion.known && same && b->motion.progress == b->contact.base.progress);
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->surface->space->comm));
   if (same)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArraycpy(b->u, u, n));
-  b->now = b->contact.base.progress;
-  b->known = PETSC_TRUE;
-  PetscCall(SbBarrierPlace(b, u, b->contact.base.progress, b->x));
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
-  b->nactive = 0;
+  PetscCall(PetscArraycpy(b->motion.u, u, n));
+  b->motion.progress = b->contact.base.progress;
+  b->motion.known = PETSC_TRUE;
+  PetscCall(SbBarrierPlace(b, u, b->contact.base.progress, b->motion.x));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     Active a;
 
-    if (SbContactPairSweptApart(b->mesh, pair, b->x, b->x, b->w[0]))
+    if (SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
       continue;
-    a.gap = SbContactPairGap(b->mesh, pair, b->x, &a.at);
-    if (a.gap >= of_pair(b, b->w, pair))
+    a.gap = SbContactPairGap(b->surface, pair, b->motion.x, &a.at);
+    if (a.gap >= of_pair(b, b->widths.w, pair))
       continue;
     a.pair = *pair;
-    PetscCall(SbReserve(b->nactive + 1, sizeof(*b->active), &b->size, &b->active));
-    b->active[b->nactive++] = a;
+    PetscCall(
+      SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));
+    b->active.pair[b->active.n++] = a;
   }
-  if (b->nactive > 1)
-    PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, NULL));
+  if (b->active.n > 1)
+    PetscCall(
+      PetscTimSort(b->active.n, b->active.pair, sizeof(*b->active.pair), compare_active, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,8 +88,8 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
   for (int i = 0; i < 3; i++) {
     u[i] = -b->contact.base.progress * friction->rotation[i];
     for (int k = 0; k < 4; k++)
-      u[i] += friction->on.at.weight[k] *
-              (b->x[3 * friction->on.pair.v[k] + i] - b->start[3 * friction->on.pair.v[k] + i]);
+      u[i] += friction->on.at.weight[k] * (b->motion.x[3 * friction->on.pair.v[k] + i] -
+                                           b->motion.start[3 * friction->on.pair.v[k] + i]);
     normal += u[i] * friction->on.at.n[i];
   }
   for (int i = 0; i < 3; i++)
@@ -101,8 +105,8 @@ static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *ener
   PetscReal force = 0.;
   PetscReal w2 = 0.;
 
-  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
-                energy, gradient, PETSC_FALSE, NULL);
+  SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
+                of_pair(b, b->widths.k, pair), energy, gradient, PETSC_FALSE, NULL);
   for (int k = 0; k < 4; k++) {
     force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
     w2 += PetscSqr(a->at.weight[k]);
@@ -114,7 +118,7 @@ static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *ener
 static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
                    const PetscReal gradient[], PetscReal f[])
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt v = vertex[k];
@@ -141,13 +145,13 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
     const SbContactPair *pair = &a->pair;
     PetscReal d[3], energy, gradient[12];
     const PetscReal force = normal_force(b, a, &energy, gradient);
 
-    SbBarrier(a->gap, of_pair(b, b->w, pair), of_pair(b, b->k, pair), pair->area, d);
+    SbBarrier(a->gap, of_pair(b, b->widths.w, pair), of_pair(b, b->widths.k, pair), pair->area, d);
     if (d[0] <= 0.)
       continue;
     if (counts(b, pair))
@@ -161,10 +165,10 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
 
 void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
 {
-  const PetscInt k = i - b->nactive;
+  const PetscInt k = i - b->active.n;
 
-  if (k < b->friction.n) {
-    const Active *a = k < 0 ? &b->active[i] : &b->friction.pair[k].on;
+  if (k < b->friction.pairs.n) {
+    const Active *a = k < 0 ? &b->active.pair[i] : &b->friction.pairs.pair[k].on;
 
     t->n = 4;
     t->nfirst = SbContactPairSplit(&a->pair);
@@ -177,16 +181,16 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
       t->force = normal_force(b, a, &t->energy, t->gradient);
     else {
       PetscReal u[3];
-      const PetscReal y = SbBarrierSlip(b, &b->friction.pair[k], u);
-      const PetscReal w = b->slip;
-      const PetscReal N = b->friction.pair[k].force;
+      const PetscReal y = SbBarrierSlip(b, &b->friction.pairs.pair[k], u);
+      const PetscReal w = b->friction.slip;
+      const PetscReal N = b->friction.pairs.pair[k].force;
 
       for (int c = 0; c < 12; c++)
         t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
       t->energy = N * (y < w ? y * y / w - y * y * y / (3. * w * w) + w / 3. : y);
     }
   } else {
-    const Spring *spring = &b->spring[k - b->friction.n];
+    const Spring *spring = &b->springs.spring[k - b->friction.pairs.n];
 
     t->n = spring->at.n;
     for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++)
@@ -194,7 +198,7 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->v = spring->at.v;
     t->weight = spring->at.weight;
     t->normal = spring->at.normal;
-    t->counts = (PetscBool)b->mesh->own[spring->at.v[0]];
+    t->counts = (PetscBool)b->surface->own[spring->at.v[0]];
     t->force = SbBarrierSpring(b, spring, t->gradient);
     t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
   }
@@ -239,12 +243,12 @@ PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const Pet
   *energy += add_gradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
-  for (PetscInt i = 0; i < b->friction.n; i++) {
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     PetscReal slip[3];
 
-    (void)SbBarrierSlip(b, &b->friction.pair[i], slip);
-    if (SbDot3(slip, b->friction.pair[i].slip) < 0.)
-      b->friction.pair[i].turns = PETSC_TRUE;
+    (void)SbBarrierSlip(b, &b->friction.pairs.pair[i], slip);
+    if (SbDot3(slip, b->friction.pairs.pair[i].slip) < 0.)
+      b->friction.pairs.pair[i].turns = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -254,7 +258,7 @@ PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const Pet
 static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[],
                                  const PetscReal weight[], const PetscReal H[])
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
 
   PetscFunctionBeginUser;
   for (PetscInt p = 0; p < n; p++) {
@@ -283,13 +287,13 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
     const SbContactPair *pair = &a->pair;
 
-    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair),
-                  of_pair(b, b->k, pair), &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT),
-                  H);
+    SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
+                  of_pair(b, b->widths.k, pair), &energy, gradient,
+                  (PetscBool)(kind != SB_HESSIAN_EXACT), H);
     PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
   }
 
@@ -297,11 +301,11 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
      above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is
      treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full
      step leaves it beyond e, it slides. */
-  for (PetscInt i = 0; i < b->friction.n; i++) {
-    FrictionPair *friction = &b->friction.pair[i];
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    FrictionPair *friction = &b->friction.pairs.pair[i];
     PetscReal T[9];
     const PetscReal y = SbBarrierSlip(b, friction, friction->slip);
-    const PetscReal w = b->slip;
+    const PetscReal w = b->friction.slip;
     PetscReal slope = SbBarrierSlope(b, y);
     PetscReal curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
@@ -330,8 +334,8 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
   }
 
   /* active springs */
-  for (PetscInt i = 0; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
+  for (PetscInt i = 0; i < b->springs.n; i++) {
+    const Spring *spring = &b->springs.spring[i];
     PetscReal T[9];
 
     if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal)
@@ -340,7 +344,7 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
       T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];
     PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
   }
-  PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
+  PetscCall(SbContactBlocksToNodes(b->surface, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -348,7 +352,7 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
    vertices. */
 static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   const PetscInt *v = friction->on.pair.v;
   const PetscReal *weight = friction->on.at.weight;
   const PetscReal *n = friction->on.at.n;
@@ -362,50 +366,51 @@ static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *frictio
       continue;
     sign = weight[k] > 0. ? 1. : -1.;
     for (int i = 0; i < 3; i++)
-      at[i] += PetscAbsReal(weight[k]) * b->x[3 * v[k] + i];
+      at[i] += PetscAbsReal(weight[k]) * b->motion.x[3 * v[k] + i];
   }
   for (int i = 0; i < 3; i++)
     at[i] -= sign * friction->on.gap * n[i];
-  SbPoseInvert(&b->pose[end], at, X);
-  SbPoseApply(&b->pose[!end], X, other);
+  SbPoseInvert(&b->contact.partner.pose[end], at, X);
+  SbPoseApply(&b->contact.partner.pose[!end], X, other);
   for (int i = 0; i < 3; i++)
     friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
   for (int k = 0; k < 4; k++) {
     const PetscInt o = 3 * (v[k] - m->nbody_vertex);
 
     for (int i = 0; i < 3 && o >= 0; i++)
-      friction->rotation[i] += weight[k] * (b->to[o + i] - b->from[o + i]);
+      friction->rotation[i] += weight[k] * (b->motion.to[o + i] - b->motion.from[o + i]);
   }
 }
 
 PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
 {
   PetscFunctionBeginUser;
-  b->next.n = 0;
-  for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->nactive; i++) {
+  b->friction.next.n = 0;
+  for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->active.n; i++) {
     PetscReal energy, gradient[12];
-    FrictionPair friction = {.on = b->active[i]};
+    FrictionPair friction = {.on = b->active.pair[i]};
 
     friction.force = b->contact.friction.mu * normal_force(b, &friction.on, &energy, gradient);
-    if (b->contact.obstacle)
+    if (b->contact.partner.obstacle)
       find_rotation(b, end, &friction);
-    PetscCall(SbReserve(b->next.n + 1, sizeof(*b->next.pair), &b->next.size, &b->next.pair));
-    b->next.pair[b->next.n++] = friction;
+    PetscCall(SbReserve(b->friction.next.n + 1, sizeof(*b->friction.next.pair),
+                        &b->friction.next.size, &b->friction.next.pair));
+    b->friction.next.pair[b->friction.next.n++] = friction;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbBarrierSwapFriction(Barrier *b)
 {
-  const FrictionPairs friction = b->friction;
+  const FrictionPairs friction = b->friction.pairs;
 
-  b->friction = b->next;
-  b->next = friction;
+  b->friction.pairs = b->friction.next;
+  b->friction.next = friction;
 }
 
 PetscErrorCode SbBarrierLag(Barrier *b)
 {
-  const SbSpace s = b->mesh->space;
+  const SbSpace s = b->surface->space;
   PetscReal *f;
   PetscReal sum[2] = {0.};
 
@@ -420,10 +425,10 @@ PetscErrorCode SbBarrierLag(Barrier *b)
   SbBarrierSwapFriction(b);
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
-  for (PetscInt i = 0; i < b->next.n; i++)
-    sum[1] += counts(b, &b->next.pair[i].on.pair) ? b->next.pair[i].force : 0.;
+  for (PetscInt i = 0; i < b->friction.next.n; i++)
+    sum[1] += counts(b, &b->friction.next.pair[i].on.pair) ? b->friction.next.pair[i].force : 0.;
   PetscCall(PetscFree(f));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
-  b->lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;
+  b->friction.lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

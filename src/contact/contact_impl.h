@@ -34,6 +34,14 @@ typedef enum {
   BARRIER
 } SbResponse;
 
+/* The other side of a contact if that is a rigid obstacle, and its motion. */
+typedef struct {
+  SbObstacle obstacle;    /* NULL: contact between bodies */
+  PetscReal scale, at[3]; /* of the file of a mesh */
+  SbPath path;            /* torques are about the point of its axis, which moves with it */
+  SbPose pose[2];         /* at the start and the end of the step */
+} SbPartner;
+
 /* Coefficients of friction of an effect, and convergence in a step. */
 typedef struct {
   PetscReal mu, mu_kinetic;
@@ -71,110 +79,33 @@ static inline PetscReal SbRestitutionGap(const SbRestitution *r, PetscReal gap0,
   return speed > 0 ? gap0 + r->dt * r->left * r->e * speed : 0;
 }
 
-/* Friction state of a node. */
-typedef struct {
-  PetscInt slide[2]; /* tangential constraints, -1: none */
-  PetscBool slides;  /* slides in the solve; else it sticks */
-  PetscBool slid;    /* slid in the last step */
-  PetscBool crowded; /* also constrained by other effects: sticks by springs while in contact */
-  int flips;         /* changes of stick and slip, or reversals, within the step */
-  PetscReal tangent[2][3]; /* tangents; the first one is the slip direction */
-  PetscReal turning;       /* tangential stiffness normal to the slip direction, N/m */
-  PetscReal stretch[3];    /* deflection of sticking springs at the start of the step, m */
-  PetscReal force[3];      /* friction force on the node in the last solve, N */
-  PetscReal pressing;      /* normal force of the solve before, N */
-} SbFrictionState;
-
-/* n . u = value, m, of a node with the displacement u. */
-typedef struct {
-  PetscReal n[3], value;
-} Plane;
-
-/* A node of the surface that this rank owns. */
-typedef struct {
-  PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
-  PetscReal k;            /* stiffness of the springs, N/m */
-  PetscBool on;           /* active; with springs: at the end of the last step */
-  PetscBool was;          /* active at the end of the last step, without rebound */
-  PetscBool idle;         /* its spring does not act before the first solve of the step */
-  PetscReal gap0;         /* gap when the step began, m; with `time_of_impact yes` or restitution */
-  int toggles, flips;     /* activations within the step; changes of facet while active */
-  PetscInt along;         /* its constraint; -1: redundant, or inactive */
-  Plane surface;          /* of the obstacle's facet at the last search, n outward */
-  Plane plane;            /* on which it is constrained */
-  PetscBool valley;       /* constrained on two facets during a solve */
-  PetscBool undecided;    /* another solve is needed for that */
-  Plane other;            /* the second one */
-  PetscInt other_along;   /* as along */
-  PetscReal other_lambda; /* N */
-  PetscReal
-    rest; /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
-  PetscReal kept;     /* springs: the same at the end of the last step, m */
-  PetscReal gap;      /* after the last solve, beyond `rest`, m */
-  PetscReal approach; /* restitution: speed of approach, m/s; 0: no rebound */
-  PetscReal stiff;    /* of the spring in this step with its damper, N/m */
-  PetscReal before;   /* damper: force from the node's gap at the start of the step, N */
-  PetscReal lambda;   /* multiplier of the last solve, N */
-  PetscReal
-    wrong; /* constraints as springs: force at its position less that of the last solve, N */
-  SbFrictionState friction;
-  PetscReal start[3]; /* displacement with which it would stick, m */
-  PetscReal now[3];   /* that of the last solve, m */
-  PetscReal
-    stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
-} Touch;
-
+/* What every response has. */
 typedef struct {
   struct _p_SbContact base; /* first: what the program sees */
   SbResponse response;      /* not AUTO */
-  SbObstacle obstacle;      /* NULL: contact between bodies */
-  PetscReal scale, at[3];   /* of the file of a mesh */
-  SbPath path; /* of the obstacle; torques are about the point of its axis, which moves with it */
-  PetscBool self, pairs; /* between bodies: self-contact; columns for each pair of bodies */
+  SbPartner partner;
   SbFriction friction;
   SbOverlap overlap;
   SbRestitution bounce;
-
-  /* nodes against an obstacle */
-  PetscReal stiffness, damping; /* s */
-  PetscBool held;               /* active nodes are constrained; else force() acts on them */
-  PetscBool facets;             /* the obstacle is a mesh */
-  PetscInt n;
-  Touch *touch;     /* [n] */
-  PetscReal size;   /* of the bodies, m */
-  PetscBool first;  /* the step has not been solved yet */
-  PetscReal impact; /* fraction of the step at the first time of impact, 1: none */
-  SbPose from, to;  /* of the obstacle at the start and the end of the step */
 } Contact;
 
-/* Whether active nodes are constrained exactly. */
-static inline PetscBool exact(const Contact *c)
-{
-  return (PetscBool)(c->response == PROJECTED || c->response == MULTIPLIER);
-}
+/*
+  The obstacle (partner.c). Collective: SetUp.
 
-/* The obstacle's pose at time t. */
-void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
-/* Destroys what the Contact owns. */
-PetscErrorCode SbContactDestroy(SbEffect e);
-
-/* Makes e, with its Contact, an effect of nodes against an obstacle. Not collective. */
-PetscErrorCode SbContactNodesCreate(SbEffect e, const SbScope *scope);
-
-/* Friction (friction_nodes.c). Not collective. Begin: a step; touches: active at the end of the
-   last one. Enter: activates it: it sticks or slides by its motion without contact, which
-   penetrates by `depth` (m). Direction: of the contact force. Constrain: adds its tangential
-   constraints. Read: their forces after a solve, N being the normal force. */
-void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
-void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth);
-void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3]);
-PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch);
-void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N);
-/* Updates stick or slip of a node with the normal force N; returns the error of its friction, N. */
-PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N);
-/* Accepts a step for a node; presses: its normal force is positive. */
-void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses);
-#define SB_CONTACT_STATE 23 /* numbers in a record of a node */
+  Read     - the options of an obstacle and its path; without one nothing is done.
+  SetUp    - reads the file of a mesh; appends a line about it to the effect's note.
+  Pose     - where it is at time t.
+  BeginStep - its poses at both ends of a step from t to t + dt.
+  AddForce - adds the force f on a body at x, N, and its torque about the axis, N m, to values[6];
+             pose: at that time.
+*/
+PetscErrorCode SbPartnerRead(SbEffect e, const SbScope *scope, SbPartner *partner);
+PetscErrorCode SbPartnerSetUp(SbEffect e, MPI_Comm comm, SbPartner *partner);
+PetscErrorCode SbPartnerDestroy(SbPartner *partner);
+void SbPartnerPose(const SbPartner *partner, PetscReal t, SbPose *pose);
+void SbPartnerBeginStep(PetscReal t, PetscReal dt, SbPartner *partner);
+void SbPartnerAddForce(const SbPartner *partner, const SbPose *pose, const PetscReal x[3],
+                       const PetscReal f[3], PetscReal values[]);
 
 /* restitution.c: energy check of a converged step; `again`: coefficients were reduced.
    Collective. */

@@ -12,6 +12,7 @@
   needs an option that it lacks.
 */
 #include "barrier.h"
+#include "nodes.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
@@ -174,7 +175,6 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
   Contact *c = (Contact *)e->data;
   const char *why = NULL;
-  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
   PetscBool given;
   PetscReal steps;
 
@@ -185,27 +185,14 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   if (why)
     SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
 
-  /* the obstacle and its path; without one: options of contact between bodies */
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  if (text[0]) {
-    SbOptionName(scope, "obstacle", sizeof(option), option);
-    PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-    c->facets = (PetscBool)!strncmp(text, "mesh:", 5);
-    if (c->facets) {
-      PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
-      PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
-    }
-    PetscCall(SbPathRead(e, scope, PETSC_FALSE, &c->path));
-  } else {
-    for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-      PetscCall(SbOptionGiven(scope, exact_only[k], &given));
-      PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-                 "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
-                 "leave it out",
-                 e->name, exact_only[k]);
-    }
-    PetscCall(SbOptionBool(scope, "self", &c->self));
-    PetscCall(SbOptionBool(scope, "pairs", &c->pairs));
+  /* the obstacle and its path; contact between bodies has none of the options of obstacles */
+  PetscCall(SbPartnerRead(e, scope, &c->partner));
+  for (size_t k = 1; !c->partner.obstacle && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+    PetscCall(SbOptionGiven(scope, exact_only[k], &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
+               "leave it out",
+               e->name, exact_only[k]);
   }
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
@@ -222,7 +209,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
-  .size = sizeof(Barrier),
+  .size = PetscMax(sizeof(Barrier), sizeof(Nodes)),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

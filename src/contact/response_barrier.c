@@ -59,57 +59,59 @@ static PetscErrorCode find_bodies(SbEffect e, SbMesh mesh)
   static const char *const two_names[TWO] = {"force_x", "force_y", "force_z", "contacts"};
   static const char *const one_names[ONE] = {"normal_force", "contacts"};
   Barrier *p = (Barrier *)e->data;
-  const PetscBool self = p->contact.self;
+  const PetscBool self = p->options.self;
   const PetscInt fixed = e->ncolumn;
   PetscInt n = fixed;
   PetscInt64 npair;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
+  PetscCall(PetscMalloc1(mesh->nbody, &p->columns.slot));
   for (PetscInt i = 0; i < mesh->nbody; i++)
-    p->slot[i] = -1;
-  for (PetscInt v = 0; v < p->mesh->nbody_vertex; v++)
-    p->slot[p->mesh->part[v]] = 0;
+    p->columns.slot[i] = -1;
+  for (PetscInt v = 0; v < p->surface->nbody_vertex; v++)
+    p->columns.slot[p->surface->part[v]] = 0;
   for (PetscInt i = 0; i < mesh->nbody; i++)
-    if (p->slot[i] == 0)
-      p->slot[i] = p->nsurface++;
+    if (p->columns.slot[i] == 0)
+      p->columns.slot[i] = p->columns.nsurface++;
   PetscCheck(
-    p->nsurface > 1 || self, mesh->comm, PETSC_ERR_USER_INPUT,
+    p->columns.nsurface > 1 || self, mesh->comm, PETSC_ERR_USER_INPUT,
     "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
     "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
     e->name, e->name, e->name, e->name);
-  if (!p->contact.pairs)
+  if (!p->options.pairs)
     PetscFunctionReturn(PETSC_SUCCESS);
-  npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
+  npair = (PetscInt64)p->columns.nsurface * (p->columns.nsurface - 1) / 2 +
+          (self ? p->columns.nsurface : 0);
   PetscCheck(
     npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
     "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
     " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
     "-output_contacts yes",
-    e->name, p->nsurface, e->name, npair, PAIRS);
-  PetscCall(PetscMalloc3(n + TWO * (PetscInt)npair, &p->column, TWO * npair, &p->text,
-                         p->nsurface * p->nsurface, &p->place));
-  PetscCall(PetscArraycpy(p->column, e->column, n));
+    e->name, p->columns.nsurface, e->name, npair, PAIRS);
+  PetscCall(PetscMalloc3(n + TWO * (PetscInt)npair, &p->columns.column, TWO * npair,
+                         &p->columns.text, p->columns.nsurface * p->columns.nsurface,
+                         &p->columns.place));
+  PetscCall(PetscArraycpy(p->columns.column, e->column, n));
   for (PetscInt a = 0; a < mesh->nbody; a++) {
     for (PetscInt b = a; b < mesh->nbody; b++) {
-      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self))
+      if (p->columns.slot[a] < 0 || p->columns.slot[b] < 0 || (a == b && !self))
         continue;
-      p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
+      p->columns.place[p->columns.nsurface * p->columns.slot[a] + p->columns.slot[b]] = n;
       for (int k = 0; k < (a == b ? ONE : TWO); k++, n++) {
-        char *name = p->text[n - fixed];
+        char *name = p->columns.text[n - fixed];
 
-        SbFormat(sizeof(p->text[0]), name, "%s_%s_%s", mesh->body[a].name, mesh->body[b].name,
-                 (a == b ? one_names : two_names)[k]);
+        SbFormat(sizeof(p->columns.text[0]), name, "%s_%s_%s", mesh->body[a].name,
+                 mesh->body[b].name, (a == b ? one_names : two_names)[k]);
         for (PetscInt i = 0; i < n; i++)
-          PetscCheck(strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+          PetscCheck(strcmp(name, p->columns.column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
                      "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body "
                      "another name",
                      e->name, e->name, name);
-        p->column[n] = name;
+        p->columns.column[n] = name;
       }
     }
   }
-  e->column = p->column;
+  e->column = p->columns.column;
   e->ncolumn = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,58 +125,60 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscInt n, nmove, nobstacle;
 
   PetscFunctionBeginUser;
-  if (b->contact.obstacle)
-    PetscCall(SbObstacleSetUp(b->contact.obstacle, s->comm, b->contact.scale, b->contact.at,
-                              sizeof(e->note), e->note));
+  PetscCall(SbPartnerSetUp(e, s->comm, &b->contact.partner));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
-  PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.obstacle, &b->mesh));
+  PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.partner.obstacle, &b->surface));
   PetscCall(PetscFree(facet));
-  nmove = 3 * b->mesh->nvertex;
-  nobstacle = nmove - 3 * b->mesh->nbody_vertex;
+  nmove = 3 * b->surface->nvertex;
+  nobstacle = nmove - 3 * b->surface->nbody_vertex;
   s->coupled = PETSC_TRUE;
-  if (!b->contact.obstacle)
+  if (!b->contact.partner.obstacle)
     PetscCall(find_bodies(e, s->mesh));
 
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++)
     cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc7(3 * nbody + 3, &b->w, nmove, &b->x, nmove, &b->start, nmove, &b->other,
-                         3 * s->nnode_owned, &b->u, nobstacle, &b->from, nobstacle, &b->to));
-  b->k = b->w + nbody + 1;
-  b->mass = b->k + nbody + 1;
-  b->w[nbody] = b->k[nbody] = b->mass[nbody] = b->contact.base.width = PETSC_MAX_REAL;
+  PetscCall(PetscMalloc7(3 * nbody + 3, &b->widths.w, nmove, &b->motion.x, nmove, &b->motion.start,
+                         nmove, &b->motion.other, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+                         &b->motion.from, nobstacle, &b->motion.to));
+  b->widths.k = b->widths.w + nbody + 1;
+  b->widths.mass = b->widths.k + nbody + 1;
+  b->widths.w[nbody] = b->widths.k[nbody] = b->widths.mass[nbody] = b->contact.base.width =
+    PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
-    b->w[i] = b->width > 0. ? b->width
-                            : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube),
-                                       0.5 * b->mesh->shortest);
-    b->contact.base.width = PetscMin(b->contact.base.width, b->w[i]);
-    b->mass[i] = s->material[i]->density * s->mesh->body[i].volume;
-    b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
+    b->widths.w[i] = b->options.width > 0.
+                       ? b->options.width
+                       : PetscMin(PetscMin(WIDTH * b->surface->size, WIDTH_CUBE * cube),
+                                  0.5 * b->surface->shortest);
+    b->contact.base.width = PetscMin(b->contact.base.width, b->widths.w[i]);
+    b->widths.mass[i] = s->material[i]->density * s->mesh->body[i].volume;
+    b->widths.k[i] = b->options.pressure > 0. ? b->options.pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(
-    b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
+    b->widths.w[0] <= b->surface->shortest, s->comm, PETSC_ERR_USER_INPUT,
     "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
     "most half of that",
-    e->name, (double)b->width, (double)b->mesh->shortest);
-  b->mesh->self = b->contact.self;
-  PetscCall(SbContactPairsCreate(b->mesh, b->w[0], &b->pairs));
-  b->least = PETSC_MAX_REAL;
-  b->shortest = b->stiffer = b->scale = 1.;
+    e->name, (double)b->options.width, (double)b->surface->shortest);
+  b->surface->self = b->options.self;
+  PetscCall(SbContactPairsCreate(b->surface, b->widths.w[0], &b->pairs));
+  b->record.least = PETSC_MAX_REAL;
+  b->record.shortest = b->separation.stiffer = b->widths.scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
 static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
 
-  if (!b->contact.obstacle)
+  if (!b->contact.partner.obstacle)
     return;
-  SbContactPose(&b->contact, t, &b->pose[0]);
-  SbContactPose(&b->contact, t + dt, &b->pose[1]);
+  SbPartnerBeginStep(t, dt, &b->contact.partner);
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
-    SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
-    SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
+    SbPoseApply(&b->contact.partner.pose[0], m->X + 3 * v,
+                b->motion.from + 3 * (v - m->nbody_vertex));
+    SbPoseApply(&b->contact.partner.pose[1], m->X + 3 * v,
+                b->motion.to + 3 * (v - m->nbody_vertex));
   }
 }
 
@@ -189,7 +193,7 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
   const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
 
   for (int k = 0; k < 4; k++)
-    x[k] = b->x + 3 * pair->v[k];
+    x[k] = b->motion.x + 3 * pair->v[k];
   SbSubtract(x[edges ? 1 : 2], x[edges ? 0 : 1], p);
   SbSubtract(x[3], x[edges ? 2 : 1], q);
   SbCross(p, q, n);
@@ -211,35 +215,35 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
 {
   Barrier *b = (Barrier *)contact;
   const SbEffect e = contact->effect;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal;
 
   PetscFunctionBeginUser;
-  if (b->begun || t != 0.)
+  if (b->motion.begun || t != 0.)
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   *first = PETSC_TRUE;
   find_path(b, t, dt);
   PetscCall(SbContactSurfaceMarkDriven(m));
-  PetscCall(SbBarrierPlace(b, u, 0., b->x));
-  PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->searched));
-  b->searched = PETSC_TRUE;
+  PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
+  PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
+  b->separation.searched = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
-  SbContactSurfaceNormals(m, b->x, normal);
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+  SbContactSurfaceNormals(m, b->motion.x, normal);
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
     const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
     SbInitialContact touch = {.body = {one, two},
-                              .to = (e->dynamic ? 1. : APART) * of_pair(b, b->w, pair)};
+                              .to = (e->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair)};
     SbDistance d;
 
     if (one == two || !counts(b, pair))
       continue;
-    if (SbContactPairSweptApart(m, pair, b->x, b->x, NEARBY * touch.to))
+    if (SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, NEARBY * touch.to))
       continue;
-    touch.gap = SbContactPairGap(m, pair, b->x, &d);
+    touch.gap = SbContactPairGap(m, pair, b->motion.x, &d);
     if (touch.gap > NEARBY * touch.to)
       continue;
     for (int k = 0; k < 3; k++)
@@ -250,7 +254,7 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
     list->touch[list->n++] = touch;
   }
   PetscCall(PetscFree(normal));
-  b->known = PETSC_FALSE;
+  b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -260,7 +264,7 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
 
@@ -270,20 +274,20 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
-    PetscCall(SbBarrierPlace(b, u, 0., b->x));
-    SbContactSurfaceNormals(m, b->x, normal);
-    PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+    PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
+    SbContactSurfaceNormals(m, b->motion.x, normal);
+    PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
     PetscCall(PetscArrayzero(push, 4 * m->nvertex));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
-      const PetscReal goal = APART * of_pair(b, b->w, pair);
+      const PetscReal goal = APART * of_pair(b, b->widths.w, pair);
       PetscReal gap;
       PetscReal sum = 0.;
       SbDistance d;
 
       if (!counts(b, pair))
         continue;
-      gap = SbContactPairGap(m, pair, b->x, &d);
+      gap = SbContactPairGap(m, pair, b->motion.x, &d);
       if (gap >= 0.9 * goal)
         continue;
       if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
@@ -325,7 +329,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     }
   }
   PetscCall(PetscFree2(push, normal));
-  b->known = PETSC_FALSE;
+  b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -337,19 +341,20 @@ static PetscReal gap_energy(const Barrier *b, PetscReal *along)
   PetscReal sum = 0.;
 
   *along = 0.;
-  for (PetscInt i = 0; i < b->nactive; i++) {
+  for (PetscInt i = 0; i < b->active.n; i++) {
     Term t;
 
     SbBarrierTerm(b, i, &t);
     if (!t.counts)
       continue;
     sum += t.energy;
-    for (int k = 0; b->contact.obstacle && k < 4; k++) {
+    for (int k = 0; b->contact.partner.obstacle && k < 4; k++) {
       PetscReal way[3];
 
-      if (t.v[k] < b->mesh->nbody_vertex)
+      if (t.v[k] < b->surface->nbody_vertex)
         continue;
-      SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[b->now > 0.], b->x + 3 * t.v[k], way);
+      SbPoseWay(&b->contact.partner.pose[0], &b->contact.partner.pose[1],
+                &b->contact.partner.pose[b->motion.progress > 0.], b->motion.x + 3 * t.v[k], way);
       *along += SbDot3(t.gradient + 3 * k, way);
     }
   }
@@ -361,11 +366,11 @@ static void set_scale(SbEffect e, PetscReal scale)
 {
   Barrier *b = (Barrier *)e->data;
 
-  for (PetscInt i = 0; i < b->mesh->space->mesh->nbody; i++)
-    b->w[i] *= scale / b->scale;
-  b->contact.base.width *= scale / b->scale;
-  b->scale = scale;
-  b->known = PETSC_FALSE;
+  for (PetscInt i = 0; i < b->surface->space->mesh->nbody; i++)
+    b->widths.w[i] *= scale / b->widths.scale;
+  b->contact.base.width *= scale / b->widths.scale;
+  b->widths.scale = scale;
+  b->motion.known = PETSC_FALSE;
 }
 
 static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, PetscReal growth,
@@ -373,22 +378,22 @@ static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, P
 {
   Barrier *b = (Barrier *)contact;
   const SbEffect e = contact->effect;
-  PetscReal far = b->mesh->size;
+  PetscReal far = b->surface->size;
   PetscReal least;
 
   PetscFunctionBeginUser;
-  if (b->width > 0. || b->overlapping)
+  if (b->options.width > 0. || b->separation.overlapping)
     PetscFunctionReturn(PETSC_SUCCESS);
-  b->wider = factor > 1. ? factor : 0.;
-  b->growth = growth;
+  b->widths.wider = factor > 1. ? factor : 0.;
+  b->widths.growth = growth;
   if (factor > 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++)
-    far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
+  for (PetscInt k = 0; k < 3 * b->surface->nbody_vertex; k++)
+    far = PetscMax(far, PetscAbsReal(b->surface->X[k]));
   least = WIDTH_LEAST * far / b->contact.base.width;
   if (least >= 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  set_scale(e, PetscMax(factor, least) * b->scale);
+  set_scale(e, PetscMax(factor, least) * b->widths.scale);
   *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -398,7 +403,7 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
 {
   Barrier *b = (Barrier *)contact;
   const SbEffect e = contact->effect;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   PetscReal least = PETSC_MAX_REAL;
   PetscReal energy[2], unused;
   PetscBool moved;
@@ -406,45 +411,48 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscFunctionBeginUser;
   find_path(b, t, dt);
   b->contact.base.progress = 0.;
-  b->friction.n = b->nspring = b->nbounce = 0;
-  if (!b->begun)
+  b->friction.pairs.n = b->springs.n = b->springs.nbounce = 0;
+  if (!b->motion.begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
-  if (!b->begun || b->overlapping || b->parted) {
-    PetscCall(SbBarrierPlace(b, u0, 0., b->x));
-    PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
+  if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
+    PetscCall(SbBarrierPlace(b, u0, 0., b->motion.x));
+    PetscCall(SbBarrierSeparate(
+      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.)));
   }
-  if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
+  if (!b->motion.begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, &moved));
     if (moved)
       PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
   }
-  b->begun = PETSC_TRUE;
+  b->motion.begun = PETSC_TRUE;
   PetscCall(SbBarrierUpdate(b, u0));
-  if (b->wider > 0.) { /* widens the barrier as far as its energy grows by at most `growth` */
-    const PetscReal old = b->scale;
+  if (b->widths.wider >
+      0.) { /* widens the barrier as far as its energy grows by at most `growth` */
+    const PetscReal old = b->widths.scale;
 
     energy[0] = gap_energy(b, &unused);
-    set_scale(e, PetscMin(1., b->wider * old));
+    set_scale(e, PetscMin(1., b->widths.wider * old));
     PetscCall(SbBarrierUpdate(b, u0));
     energy[1] = gap_energy(b, &unused);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
-    if (energy[1] - energy[0] > b->growth)
+    if (energy[1] - energy[0] > b->widths.growth)
       set_scale(e, old);
-    b->wider = 0.;
+    b->widths.wider = 0.;
     PetscCall(SbBarrierUpdate(b, u0));
   }
-  PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
-  for (PetscInt i = 0; i < b->nactive; i++)
-    least = PetscMin(least, b->active[i].gap);
+  PetscCall(PetscArraycpy(b->motion.start, b->motion.x, 3 * m->nvertex));
+  for (PetscInt i = 0; i < b->active.n; i++)
+    least = PetscMin(least, b->active.pair[i].gap);
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
-  b->energy = gap_energy(b, &b->obstacle_power);
+  b->sums.energy = gap_energy(b, &b->sums.obstacle_power);
 
   /* friction with the normal forces at the start */
-  b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
-  b->nlag = b->nstuck = 0;
-  b->lag = 0.;
-  b->least_lag = PETSC_INFINITY;
+  b->friction.slip =
+    e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
+  b->friction.nlag = b->friction.nstuck = 0;
+  b->friction.lag = 0.;
+  b->friction.least = PETSC_INFINITY;
   PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
   SbBarrierSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -460,36 +468,41 @@ static PetscErrorCode update_friction_barrier(SbContact contact, SbSpace s, cons
   PetscBool last, more;
 
   PetscFunctionBeginUser;
-  if (b->contact.friction.mu <= 0. && (e->dynamic || !b->overlapping))
+  if (b->contact.friction.mu <= 0. && (e->dynamic || !b->separation.overlapping))
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (e->dynamic && !b->lags && !solved)
+  if (e->dynamic && !b->options.friction_solves && !solved)
     PetscFunctionReturn(PETSC_SUCCESS);
-  last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
-  if (last && (b->lags || e->dynamic))
+  last = (PetscBool)(++b->friction.nlag >= (b->options.friction_solves ? b->options.friction_solves
+                                            : e->dynamic               ? 2
+                                                                       : LAGS));
+  if (last && (b->options.friction_solves || e->dynamic))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, u));
 
   /* in a static run overlaps are separated within the step */
-  if (b->overlapping && !e->dynamic && b->nlag < PARTINGS) {
+  if (b->separation.overlapping && !e->dynamic && b->friction.nlag < PARTINGS) {
     PetscCall(SbBarrierSeparate(e, s, 0., PETSC_FALSE));
-    b->parted = *again = PETSC_TRUE;
+    b->separation.parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBarrierLag(b));
-  if (b->lag < FALLS * b->least_lag) {
-    b->least_lag = b->lag;
-    b->nstuck = 0;
+  if (b->friction.lag < FALLS * b->friction.least) {
+    b->friction.least = b->friction.lag;
+    b->friction.nstuck = 0;
   } else
-    b->nstuck += solved;
-  more = (PetscBool)(!last && b->nstuck < STUCK &&
-                     b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
-  if (!e->dynamic && !more && b->lag > b->lag_tolerance && !b->stuck_said) {
-    b->stuck_said = PETSC_TRUE;
+    b->friction.nstuck += solved;
+  more = (PetscBool)(!last && b->friction.nstuck < STUCK &&
+                     b->friction.lag > (e->dynamic && !b->options.friction_solves
+                                          ? MUCH
+                                          : b->options.friction_tolerance));
+  if (!e->dynamic && !more && b->friction.lag > b->options.friction_tolerance &&
+      !b->friction.said) {
+    b->friction.said = PETSC_TRUE;
     PetscCall(SbWarning(
       s->comm,
       "effect %s: friction does not settle, from solve to solve its forces change by %.2g of "
       "Coulomb's limit; try more -static_steps, or motion (-time euler_implicit)",
-      e->name, (double)b->lag));
+      e->name, (double)b->friction.lag));
   }
   if (!more)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -506,17 +519,17 @@ static PetscErrorCode max_step_barrier(SbContact contact, SbSpace s, const Petsc
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u0));
-  *nactive = b->nactive;
-  PetscCall(SbBarrierPlace(b, u1, 1., b->other));
-  PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part));
-  b->shortest = PetscMin(b->shortest, *part);
+  *nactive = b->active.n;
+  PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other, part));
+  b->record.shortest = PetscMin(b->record.shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   PetscReal power;
   PetscReal gained = 0.;
   PetscReal asked = 0.;
@@ -525,59 +538,61 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscCall(SbBarrierUpdate(b, stage->u));
 
   /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
-  b->contact.base.work = b->energy + 0.5 * b->obstacle_power;
-  b->energy = gap_energy(b, &power);
-  b->contact.base.work += 0.5 * power - b->energy;
-  for (PetscInt i = 0; i < b->friction.n; i++) {
-    const FrictionPair *pair = &b->friction.pair[i];
+  b->contact.base.work = b->sums.energy + 0.5 * b->sums.obstacle_power;
+  b->sums.energy = gap_energy(b, &power);
+  b->contact.base.work += 0.5 * power - b->sums.energy;
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    const FrictionPair *pair = &b->friction.pairs.pair[i];
     PetscReal u[3];
     const PetscReal slip = SbBarrierSlip(b, pair, u);
     const PetscReal force = pair->force * SbBarrierSlope(b, slip);
 
     if (!counts(b, &pair->on.pair))
       continue;
-    b->friction_loss += force * PetscSqr(slip);
+    b->friction.loss += force * PetscSqr(slip);
     for (int k = 0; k < 12; k++) {
       const PetscInt v = pair->on.pair.v[k / 3];
       const PetscInt c = 3 * v + k % 3;
 
       if (v < m->nbody_vertex)
         b->contact.base.work -=
-          force * u[k % 3] * pair->on.at.weight[k / 3] * (b->x[c] - b->start[c]);
+          force * u[k % 3] * pair->on.at.weight[k / 3] * (b->motion.x[c] - b->motion.start[c]);
     }
   }
-  for (PetscInt i = 0; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
+  for (PetscInt i = 0; i < b->springs.n; i++) {
+    const Spring *spring = &b->springs.spring[i];
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
     if (m->own[spring->at.v[0]])
       b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
-    if (i >= b->nspring - b->nbounce)
+    if (i >= b->springs.n - b->springs.nbounce)
       continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
-  b->work += b->contact.base.work;
-  b->parted = PETSC_FALSE;
+  b->sums.work += b->contact.base.work;
+  b->separation.parted = PETSC_FALSE;
   if (asked > 0.)
-    b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
+    b->separation.stiffer = gained < HALF * asked ? 2. * b->separation.stiffer
+                                                  : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
     PetscCall(SbBarrierLag(b));
-  b->most_lag = PetscMax(b->most_lag, b->lag);
+  b->friction.most = PetscMax(b->friction.most, b->friction.lag);
 
-  for (PetscInt i = 0; i < b->nactive; i++)
-    b->least = PetscMin(b->least, b->active[i].gap);
-  b->most = PetscMax(b->most, b->nactive);
-  if (!b->verify || b->overlapping)
+  for (PetscInt i = 0; i < b->active.n; i++)
+    b->record.least = PetscMin(b->record.least, b->active.pair[i].gap);
+  b->record.most = PetscMax(b->record.most, b->active.n);
+  if (!b->options.verify || b->separation.overlapping)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactOverlapFind(b->mesh, b->x, PETSC_FALSE, &b->overlap));
-  PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
+  PetscCall(SbContactOverlapFind(b->surface, b->motion.x, PETSC_FALSE, &b->separation.overlap));
+  PetscCheck(!b->separation.overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT
              " edges go through triangles, one at (%g, %g, %g) m",
-             e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
-             (double)b->overlap.place[1], (double)b->overlap.place[2]);
+             e->name, (double)stage->t, b->separation.overlap.ncrossing,
+             (double)b->separation.overlap.place[0], (double)b->separation.overlap.place[1],
+             (double)b->separation.overlap.place[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -598,21 +613,21 @@ static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stag
   };
   static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
   Barrier *b = (Barrier *)e->data;
-  const int *at = places[b->contact.obstacle != NULL];
+  const int *at = places[b->contact.partner.obstacle != NULL];
   PetscReal least = PETSC_MAX_REAL;
   SbPose pose;
 
   PetscFunctionBeginUser;
   (void)r;
   PetscCall(PetscArrayzero(values, e->ncolumn));
-  if (!b->begun)
+  if (!b->motion.begun)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
-  for (PetscInt i = 0; i < b->nactive; i++)
-    least = PetscMin(least, b->active[i].gap);
+  for (PetscInt i = 0; i < b->active.n; i++)
+    least = PetscMin(least, b->active.pair[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
-  if (b->contact.obstacle)
-    SbContactPose(&b->contact, stage->t, &pose);
+  if (b->contact.partner.obstacle)
+    SbPartnerPose(&b->contact.partner, stage->t, &pose);
   for (PetscInt i = 0; i < nterm(b); i++) {
     PetscReal force[3] = {0.};
     PetscReal *columns;
@@ -622,57 +637,52 @@ static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stag
     SbBarrierTerm(b, i, &t);
     if (!t.counts)
       continue;
-    values[at[CONTACTS]] += i < b->nactive || t.force > 0.;
-    if (i < b->nactive)
+    values[at[CONTACTS]] += i < b->active.n || t.force > 0.;
+    if (i < b->active.n)
       values[at[ENERGY]] += t.energy;
 
     /* force and torque of the obstacle on the bodies */
-    for (PetscInt k = 0; b->contact.obstacle && k < t.n; k++) {
-      PetscReal arm[3], moment[3];
+    for (PetscInt k = 0; b->contact.partner.obstacle && k < t.n; k++) {
+      const PetscReal *g = t.gradient + 3 * k;
 
-      if (t.v[k] >= b->mesh->nbody_vertex)
-        continue;
-      for (int j = 0; j < 3; j++)
-        arm[j] = b->x[3 * t.v[k] + j] - b->contact.path.point[j] - pose.d[j];
-      SbCross(arm, t.gradient + 3 * k, moment);
-      for (int j = 0; j < 3; j++) {
-        values[j] -= t.gradient[3 * k + j];
-        values[3 + j] -= moment[j];
-      }
+      if (t.v[k] < b->surface->nbody_vertex)
+        SbPartnerAddForce(&b->contact.partner, &pose, b->motion.x + 3 * t.v[k],
+                          (const PetscReal[3]){-g[0], -g[1], -g[2]}, values);
     }
-    if (b->contact.obstacle)
+    if (b->contact.partner.obstacle)
       continue;
 
     /* forces between two bodies, or of one on itself, and their columns */
     for (int k = 0; k < 3 * t.nfirst; k++)
       force[k % 3] -= t.gradient[k];
     values[3] += t.force;
-    if (i >= b->nactive && i < b->nactive + b->friction.n)
+    if (i >= b->active.n && i < b->active.n + b->friction.pairs.n)
       values[4] += PetscSqrtReal(SbDot3(force, force));
-    if (!b->column)
+    if (!b->columns.column)
       continue;
-    one = b->mesh->part[t.v[0]];
-    two = b->mesh->part[t.v[t.n - 1]];
-    columns =
-      values + b->place[b->nsurface * b->slot[PetscMin(one, two)] + b->slot[PetscMax(one, two)]];
+    one = b->surface->part[t.v[0]];
+    two = b->surface->part[t.v[t.n - 1]];
+    columns = values + b->columns.place[b->columns.nsurface * b->columns.slot[PetscMin(one, two)] +
+                                        b->columns.slot[PetscMax(one, two)]];
     columns[one == two ? 1 : 3] += t.force > 0.;
     if (one == two)
       columns[0] += t.force;
     for (int k = 0; k < 3 && one != two; k++)
       columns[k] += one > two ? force[k] : -force[k];
   }
-  if (!b->contact.obstacle)
-    values[5] = b->work;
-  values[at[LOSS]] = b->friction_loss;
+  if (!b->contact.partner.obstacle)
+    values[5] = b->sums.work;
+  values[at[LOSS]] = b->friction.loss;
   if (s->rank)
     PetscFunctionReturn(PETSC_SUCCESS);
   values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
-  values[at[LAG]] = b->lag;
-  values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
-  for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
+  values[at[LAG]] = b->friction.lag;
+  values[at[UNGUARDED]] =
+    b->separation.overlapping ? (PetscReal)b->separation.overlap.ncrossing : 0.;
+  for (PetscInt i = 0; i < b->springs.n; i++) /* of the overlaps found at the start of the step */
     values[at[PENETRATION]] =
-      PetscMax(values[at[PENETRATION]],
-               b->spring[i].at.depth + b->spring[i].start - SbBarrierSpringPlace(b, &b->spring[i]));
+      PetscMax(values[at[PENETRATION]], b->springs.spring[i].at.depth + b->springs.spring[i].start -
+                                          SbBarrierSpringPlace(b, &b->springs.spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -680,8 +690,8 @@ static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stag
    caller. */
 static SbContactPoint point_of(const Barrier *b, const Term *t)
 {
-  const PetscInt *part = b->mesh->part;
-  const PetscInt nbody = b->mesh->space->mesh->nbody;
+  const PetscInt *part = b->surface->part;
+  const PetscInt nbody = b->surface->space->mesh->nbody;
   const PetscInt first = part[t->v[0]];
   const PetscInt second = part[t->v[t->nfirst]];
   const PetscBool turned = (PetscBool)(first == nbody);
@@ -694,7 +704,7 @@ static SbContactPoint point_of(const Barrier *b, const Term *t)
   for (PetscInt k = turned ? t->nfirst : 0; k < (turned ? t->n : t->nfirst); k++) {
     sum += PetscAbsReal(t->weight[k]);
     for (int j = 0; j < 3; j++) {
-      p.x[j] += PetscAbsReal(t->weight[k]) * b->x[3 * t->v[k] + j];
+      p.x[j] += PetscAbsReal(t->weight[k]) * b->motion.x[3 * t->v[k] + j];
       p.force[j] -= t->gradient[3 * k + j];
     }
   }
@@ -716,7 +726,7 @@ static PetscErrorCode points_barrier(SbContact contact, SbSpace s, const SbStage
   PetscCall(SbBarrierUpdate(b, stage->u));
   PetscCall(PetscCalloc1(nterm(b), &told));
   for (PetscInt i = 0; i < nterm(b); i++) {
-    const PetscInt spring = i - b->nactive - b->friction.n;
+    const PetscInt spring = i - b->active.n - b->friction.pairs.n;
     SbContactPoint p, other;
     SbDistance d;
     Term t;
@@ -729,18 +739,19 @@ static PetscErrorCode points_barrier(SbContact contact, SbSpace s, const SbStage
       p.id[0] = -1 - spring;
       p.id[1] = t.v[0];
       p.id[2] = t.v[t.n - 1];
-      p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
-      if (spring < b->nspring - b->nbounce)
-        p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
-    } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
-      p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].on.pair, b->x, &d);
+      p.gap = SbBarrierSpringPlace(b, &b->springs.spring[spring]);
+      if (spring < b->springs.n - b->springs.nbounce)
+        p.gap -= b->springs.spring[spring].start + b->springs.spring[spring].at.depth;
+    } else if (i >= b->active.n) /* friction of a pair in contact only at the start of the step */
+      p.gap = SbContactPairGap(b->surface, &b->friction.pairs.pair[i - b->active.n].on.pair,
+                               b->motion.x, &d);
     else
-      p.gap = b->active[i].gap;
+      p.gap = b->active.pair[i].gap;
 
     /* friction there */
-    for (PetscInt k = b->nactive; i < b->nactive && k < b->nactive + b->friction.n; k++) {
-      const SbContactPair *pair = &b->active[i].pair;
-      const SbContactPair *with = &b->friction.pair[k - b->nactive].on.pair;
+    for (PetscInt k = b->active.n; i < b->active.n && k < b->active.n + b->friction.pairs.n; k++) {
+      const SbContactPair *pair = &b->active.pair[i].pair;
+      const SbContactPair *with = &b->friction.pairs.pair[k - b->active.n].on.pair;
 
       if (memcmp(pair, with, offsetof(SbContactPair, area)))
         continue; /* not the same features */
@@ -762,12 +773,12 @@ static PetscErrorCode gap_barrier(SbContact contact, SbSpace s, const SbStage *s
                                   PetscReal gap[], PetscReal normal[])
 {
   Barrier *b = (Barrier *)contact;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
     const PetscInt *vertex = a->pair.v;
 
     for (int k = 0; k < 4; k++) {
@@ -792,21 +803,21 @@ static PetscErrorCode gap_barrier(SbContact contact, SbSpace s, const SbStage *s
 static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char text[])
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal value[3] = {b->least, b->shortest, -(PetscReal)b->most};
+  PetscReal value[3] = {b->record.least, b->record.shortest, -(PetscReal)b->record.most};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 3, MPIU_REAL, MPI_MIN, s->comm));
-  SbFormat(size, text, "nothing came nearer than %.3g m", (double)b->w[0]);
+  SbFormat(size, text, "nothing came nearer than %.3g m", (double)b->widths.w[0]);
   if (value[2] == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
   SbFormat(size, text,
            "%.0f pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, shortest safe "
            "part of an "
            "iteration %.2g",
-           -(double)value[2], (double)value[0], (double)b->w[0], (double)value[1]);
+           -(double)value[2], (double)value[0], (double)b->widths.w[0], (double)value[1]);
   if (b->contact.friction.mu > 0.)
     SbAppend(size, text, ", friction lagged behind normal forces by at most %.2g of itself",
-             (double)b->most_lag);
+             (double)b->friction.most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -815,7 +826,7 @@ static PetscErrorCode nearest_barrier(SbContact contact, SbSpace s, PetscReal *g
 {
   const Barrier *b = (const Barrier *)contact;
   const SbEffect e = contact->effect;
-  const PetscReal *x = b->x;
+  const PetscReal *x = b->motion.x;
   const Active *least = NULL;
   struct {
     double gap;
@@ -823,9 +834,9 @@ static PetscErrorCode nearest_barrier(SbContact contact, SbSpace s, PetscReal *g
   } mine, first;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < b->nactive; i++)
-    if (!least || b->active[i].gap < least->gap)
-      least = &b->active[i];
+  for (PetscInt i = 0; i < b->active.n; i++)
+    if (!least || b->active.pair[i].gap < least->gap)
+      least = &b->active.pair[i];
   mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
   mine.rank = s->rank;
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
@@ -834,8 +845,8 @@ static PetscErrorCode nearest_barrier(SbContact contact, SbSpace s, PetscReal *g
   *gap = first.gap;
   if (s->rank == first.rank) {
     const SbContactPair *pair = &least->pair;
-    const PetscInt part[2] = {b->mesh->part[pair->v[0]],
-                              b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
+    const PetscInt part[2] = {b->surface->part[pair->v[0]],
+                              b->surface->part[pair->v[SbContactPairSplit(pair)]]};
     const char *name[2];
 
     for (int k = 0; k < 2; k++)
@@ -853,8 +864,8 @@ static PetscErrorCode nearest_barrier(SbContact contact, SbSpace s, PetscReal *g
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-  const PetscReal state[4] = {b->work, b->friction_loss, s->rank ? 0. : b->stiffer,
-                              s->rank ? 0. : b->scale};
+  const PetscReal state[4] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
+                              s->rank ? 0. : b->widths.scale};
 
   PetscFunctionBeginUser;
   *n = 1;
@@ -874,10 +885,10 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   (void)u;
   for (PetscInt k = 0; k < 4 * n; k++)
     sum[k % 4] += records[k];
-  b->work = s->rank ? 0. : sum[0];
-  b->friction_loss = s->rank ? 0. : sum[1];
-  b->stiffer = sum[2];
-  if (sum[3] > 0. && b->width == 0.)
+  b->sums.work = s->rank ? 0. : sum[0];
+  b->friction.loss = s->rank ? 0. : sum[1];
+  b->separation.stiffer = sum[2];
+  if (sum[3] > 0. && b->options.width == 0.)
     set_scale(e, sum[3]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -887,20 +898,21 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSurfaceDestroy(&b->mesh));
+  PetscCall(SbContactSurfaceDestroy(&b->surface));
   PetscCall(SbContactPairsDestroy(&b->pairs));
-  PetscCall(PetscFree7(b->w, b->x, b->start, b->other, b->u, b->from, b->to));
-  PetscCall(PetscFree(b->slot));
-  PetscCall(PetscFree3(b->column, b->text, b->place));
-  PetscCall(PetscFree(b->active));
-  PetscCall(PetscFree(b->friction.pair));
-  PetscCall(PetscFree(b->next.pair));
+  PetscCall(PetscFree7(b->widths.w, b->motion.x, b->motion.start, b->motion.other, b->motion.u,
+                       b->motion.from, b->motion.to));
+  PetscCall(PetscFree(b->columns.slot));
+  PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
+  PetscCall(PetscFree(b->active.pair));
+  PetscCall(PetscFree(b->friction.pairs.pair));
+  PetscCall(PetscFree(b->friction.next.pair));
   PetscCall(PetscFree(b->blocks.block));
   PetscCall(PetscFree(b->blocks.slot));
-  PetscCall(PetscFree(b->spring));
-  PetscCall(PetscFree(b->overlap.point));
-  PetscCall(PetscFree(b->overlap.near));
-  PetscCall(SbContactDestroy(e));
+  PetscCall(PetscFree(b->springs.spring));
+  PetscCall(PetscFree(b->separation.overlap.point));
+  PetscCall(PetscFree(b->separation.overlap.near));
+  PetscCall(SbPartnerDestroy(&b->contact.partner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -942,18 +954,22 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
-  PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
-  PetscCall(SbOptionBool(scope, "verify", &b->verify));
-  PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
-  PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
+  PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
+  PetscCall(SbOptionReal(scope, "barrier_pressure", &b->options.pressure));
+  PetscCall(SbOptionBool(scope, "verify", &b->options.verify));
+  if (!b->contact.partner.obstacle) {
+    PetscCall(SbOptionBool(scope, "self", &b->options.self));
+    PetscCall(SbOptionBool(scope, "pairs", &b->options.pairs));
+  }
+  PetscCall(SbOptionInt(scope, "friction_solves", &b->options.friction_solves));
+  PetscCall(SbOptionReal(scope, "friction_tolerance", &b->options.friction_tolerance));
   e->ops = barrier_effect;
   b->contact.base.ops = &barrier_ops;
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
   e->nstate = 4;
-  e->column = b->contact.obstacle ? obstacle : bodies;
-  e->ncolumn =
-    b->contact.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
+  e->column = b->contact.partner.obstacle ? obstacle : bodies;
+  e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
+                                           : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

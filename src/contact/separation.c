@@ -34,7 +34,7 @@
 /* Whether two bodies coincide: then no separation direction exists. */
 static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   PetscReal box[2][6];
   PetscReal most = 0.;
 
@@ -42,7 +42,7 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
     SbBoxClear(box[k]);
     for (PetscInt v = 0; v < m->nbody_vertex; v++)
       if (m->part[v] == body[k])
-        SbBoxAdd(box[k], b->x + 3 * v);
+        SbBoxAdd(box[k], b->motion.x + 3 * v);
   }
   for (int i = 0; i < 6; i++)
     most = PetscMax(most, PetscAbsReal(box[0][i] - box[1][i]));
@@ -52,37 +52,38 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactSurface m = b->mesh;
-  SbContactOverlap *o = &b->overlap;
+  const SbContactSurface m = b->surface;
+  SbContactOverlap *o = &b->separation.overlap;
   PetscBool inside = PETSC_FALSE;
   PetscInt body[2] = {0, 0};
 
   PetscFunctionBeginUser;
-  b->nspring = 0;
-  if (first && !b->contact.obstacle)
-    PetscCall(SbContactSurfaceIsInside(m, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(m, b->x, inside, o));
+  b->springs.n = 0;
+  if (first && !b->contact.partner.obstacle)
+    PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
+  PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
   PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
              "The effect %s: body %s is inside body %s when the run begins, or in the same place; "
              "move one of them by "
              "-body_%s_translate",
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name,
              s->mesh->body[body[0]].name);
-  b->overlapping =
+  b->separation.overlapping =
     (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * m->size));
 
   /* a body wholly inside the obstacle has no separation direction */
-  if (first && b->contact.obstacle && !b->overlapping) {
+  if (first && b->contact.partner.obstacle && !b->separation.overlapping) {
     SbPose pose;
 
-    SbContactPose(&b->contact, 0., &pose);
+    SbPartnerPose(&b->contact.partner, 0., &pose);
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       const char *name = s->mesh->body[m->part[v]].name;
-      const PetscReal *x = b->x + 3 * v;
+      const PetscReal *x = b->motion.x + 3 * v;
       PetscReal X[3], n[3];
 
       SbPoseInvert(&pose, x, X);
-      PetscCheck(m->driven[v] || SbObstacleDistance(b->contact.obstacle, X, n) > -SAME * m->size,
+      PetscCheck(m->driven[v] ||
+                   SbObstacleDistance(b->contact.partner.obstacle, X, n) > -SAME * m->size,
                  s->comm, PETSC_ERR_USER_INPUT,
                  "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; "
                  "move it by "
@@ -90,20 +91,20 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
                  e->name, name, (double)x[0], (double)x[1], (double)x[2], name);
     }
   }
-  if (b->pairs->near || b->overlapping)
+  if (b->pairs->near || b->separation.overlapping)
     b->pairs->known = PETSC_FALSE;
-  b->pairs->near = b->overlapping ? o->near : NULL;
-  b->known = PETSC_FALSE;
-  if (!b->overlapping)
+  b->pairs->near = b->separation.overlapping ? o->near : NULL;
+  b->motion.known = PETSC_FALSE;
+  if (!b->separation.overlapping)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* excludes pairs of gap zero, too, as of a vertex in a triangle */
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     SbDistance d;
 
-    if (SbContactPairGap(m, pair, b->x, &d) > SAME * m->size)
+    if (SbContactPairGap(m, pair, b->motion.x, &d) > SAME * m->size)
       continue;
     for (int k = 0; k < 4; k++)
       o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
@@ -113,7 +114,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   b->pairs->known = PETSC_FALSE;
 
   /* warns once, naming what overlaps */
-  if (!b->announced) {
+  if (!b->separation.announced) {
     const char *name[2];
 
     for (int k = 0; k < 2; k++)
@@ -133,7 +134,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
       o->n, (double)o->deepest, e->name));
   }
-  b->announced = PETSC_TRUE;
+  b->separation.announced = PETSC_TRUE;
 
   if (e->dynamic)
     SbOverlapBegin(&b->contact.overlap, dt);
@@ -141,18 +142,18 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     const SbPenetration *p = &o->point[i];
     const PetscInt one = m->part[p->v[0]];
     const PetscInt two = m->part[p->v[p->n - 1]];
-    const PetscReal w = PetscMin(b->w[one], b->w[two]);
-    const PetscReal k = PetscMin(b->k[one], b->k[two]);
+    const PetscReal w = PetscMin(b->widths.w[one], b->widths.w[two]);
+    const PetscReal k = PetscMin(b->widths.k[one], b->widths.k[two]);
     const PetscReal all = p->depth + 0.5 * w;
-    Spring spring = {.at = *p,
-                     .stiffness = b->stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
+    Spring spring = {
+      .at = *p, .stiffness = b->separation.stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
 
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start +
       (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact.overlap.left))) : all);
-    PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
-    b->spring[b->nspring++] = spring;
+    PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
+    b->springs.spring[b->springs.n++] = spring;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,7 +162,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   const SbCCDLimits limits = {
     .radius = SbContactPairRadius(m, pair), .separation = w, .keep = KEEP};
   const PetscReal gap = SbContactPairGap(m, pair, x0, &(SbDistance){0});
@@ -189,7 +190,7 @@ static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscR
 static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const PetscReal x[],
                              Spring *spring)
 {
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   const PetscBool turned = (PetscBool)(pair->v[0] >= m->nbody_vertex);
   SbDistance d;
 
@@ -210,7 +211,7 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
   spring->start = SbBarrierSpringPlace(b, spring);
   for (PetscInt k = 0; k < spring->at.n; k++)
     spring->approach -=
-      spring->at.weight[k] * SbDot3(spring->at.normal, b->other + 3 * spring->at.v[k]);
+      spring->at.weight[k] * SbDot3(spring->at.normal, b->motion.other + 3 * spring->at.v[k]);
   spring->approach = (spring->approach + spring->start) / b->contact.bounce.dt;
   return (PetscBool)(spring->approach > 0.);
 }
@@ -219,11 +220,11 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
                                             const PetscReal u0[], const PetscReal v0[])
 {
   Barrier *b = (Barrier *)contact;
-  const SbContactSurface m = b->mesh;
+  const SbContactSurface m = b->surface;
   PetscReal *u1, *x;
 
   PetscFunctionBeginUser;
-  b->nbounce = 0;
+  b->springs.nbounce = 0;
   b->contact.bounce.left = 1.;
   b->contact.bounce.dt = dt;
 
@@ -232,33 +233,33 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
   for (PetscInt i = 0; i < 3 * s->nnode; i++)
     u1[i] = u0[i] + dt * v0[i];
   PetscCall(SbBarrierUpdate(b, u0));
-  PetscCall(SbBarrierPlace(b, u1, 1., b->other));
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
+  PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.other));
 
   /* impacts on it */
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PetscReal w = of_pair(b, b->w, pair);
+    const PetscReal w = of_pair(b, b->widths.w, pair);
     PetscReal at;
     Spring spring;
 
-    if (SbContactPairSweptApart(m, pair, b->x, b->other, w))
+    if (SbContactPairSweptApart(m, pair, b->motion.x, b->motion.other, w))
       continue;
-    at = meets(b, pair, b->x, b->other, w);
+    at = meets(b, pair, b->motion.x, b->motion.other, w);
     if (at > 1.)
       continue;
     for (int k = 0; k < (pair->side ? 9 : 12); k++) {
       const PetscInt c = 3 * pair->v[k / 3] + k % 3;
 
-      x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
+      x[c] = b->motion.x[c] + at * (b->motion.other[c] - b->motion.x[c]);
     }
     if (!find_spring(b, pair, x, &spring))
       continue;
-    spring.stiffness = RIGID * of_pair(b, b->mass, pair) / PetscSqr(dt);
+    spring.stiffness = RIGID * of_pair(b, b->widths.mass, pair) / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact.bounce, 0., spring.approach);
-    PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
-    b->spring[b->nspring++] = spring;
-    b->nbounce++;
+    PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
+    b->springs.spring[b->springs.n++] = spring;
+    b->springs.nbounce++;
   }
   PetscCall(PetscFree2(u1, x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -270,10 +271,10 @@ PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work)
   PetscReal push[15];
 
   PetscFunctionBeginUser;
-  for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
+  for (PetscInt i = b->springs.n - b->springs.nbounce; i < b->springs.n; i++) {
+    const Spring *spring = &b->springs.spring[i];
 
-    if (b->mesh->own[spring->at.v[0]])
+    if (b->surface->own[spring->at.v[0]])
       *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -285,8 +286,8 @@ PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal sh
 
   PetscFunctionBeginUser;
   b->contact.bounce.left = share;
-  for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
-    Spring *spring = &b->spring[i];
+  for (PetscInt i = b->springs.n - b->springs.nbounce; i < b->springs.n; i++) {
+    Spring *spring = &b->springs.spring[i];
 
     /* a goal lowered below the spring's deflection would release it: keep it active for the next
        iteration */
