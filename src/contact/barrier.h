@@ -157,18 +157,42 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);
    Collective. */
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
 /* Tangential slip u of a pair since the step began, m; its length. */
-PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3]);
+static inline PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction,
+                                      PetscReal u[3])
+{
+  PetscReal normal = 0.;
+
+  for (int i = 0; i < 3; i++) {
+    u[i] = -b->contact.base.progress * friction->rotation[i];
+    for (int k = 0; k < 4; k++)
+      u[i] += friction->on.at.weight[k] * (b->motion.x[3 * friction->on.pair.v[k] + i] -
+                                           b->motion.start[3 * friction->on.pair.v[k] + i]);
+    normal += u[i] * friction->on.at.n[i];
+  }
+  for (int i = 0; i < 3; i++)
+    u[i] -= normal * friction->on.at.n[i];
+  return PetscSqrtReal(SbDot3(u, u));
+}
 /* f0'/y of the slip y, 1/m. */
 static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 {
   return y < b->friction.slip ? 2. / b->friction.slip - y / PetscSqr(b->friction.slip) : 1. / y;
 }
+/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
+PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,
+                               PetscReal gradient[12]);
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's
+   sum, J. */
+PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
+/* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of
+   e. */
+PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh);
 /* Into `next` normal forces and directions at the current positions, at the end of the step or its
    start. */
 PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
 /* Swaps `next` and the friction in use. */
 void SbBarrierSwapFriction(Barrier *b);
-/* Computes `lag` (barrier_terms.c), and `next` at the end of the step. Collective. */
+/* Computes `lag` (friction_pairs.c), and `next` at the end of the step. Collective. */
 PetscErrorCode SbBarrierLag(Barrier *b);
 /* Finds overlaps at the current positions, and the springs that separate them in a step of length
    dt, s; `first` of a run: errors where they cannot. Collective. */
@@ -226,3 +250,14 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
                                           PetscReal f[], PetscReal *bound);
 PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
                                         SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);
+PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                               PetscBool solved, PetscBool *again);
+PetscErrorCode SbContactGap_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
+                                    PetscReal gap[], PetscReal normal[]);
+PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
+                                       SbContactPoints *list);
+PetscErrorCode SbContactNearest_Barrier(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
+                                        char text[]);
+PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
+                                       const PetscReal r[], PetscReal values[]);
+PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);

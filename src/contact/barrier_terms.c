@@ -1,13 +1,6 @@
 /*
   barrier_terms.c - the pairs of the response `barrier` at an iterate, their energy and its
-  derivatives, and those of friction, described in response_barrier.c; lagged friction.
-
-  Normal forces and slip directions of friction are those of an earlier state y: the start of the
-  step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is
-  sum |F(x; x) - F(x; y)| over the nodes, relative to the sum of mu N over the pairs: the change of
-  normal forces, closest points and slip directions. Fixed-point iterations, one solve each, end
-  when it is small (Li et al. 2020, section 5.7). They converge if a change of friction changes
-  normal forces by less than itself.
+  derivatives, and those of friction, described in response_barrier.c.
 */
 #include "barrier.h"
 
@@ -81,25 +74,8 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3])
-{
-  PetscReal normal = 0.;
-
-  for (int i = 0; i < 3; i++) {
-    u[i] = -b->contact.base.progress * friction->rotation[i];
-    for (int k = 0; k < 4; k++)
-      u[i] += friction->on.at.weight[k] * (b->motion.x[3 * friction->on.pair.v[k] + i] -
-                                           b->motion.start[3 * friction->on.pair.v[k] + i]);
-    normal += u[i] * friction->on.at.n[i];
-  }
-  for (int i = 0; i < 3; i++)
-    u[i] -= normal * friction->on.at.n[i];
-  return PetscSqrtReal(SbDot3(u, u));
-}
-
-/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
-static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *energy,
-                              PetscReal gradient[12])
+PetscReal SbBarrierNormalForce(const Barrier *b, const Active *a, PetscReal *energy,
+                               PetscReal gradient[12])
 {
   const SbContactPair *pair = &a->pair;
   PetscReal force = 0.;
@@ -149,7 +125,7 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
     const Active *a = &b->active.pair[i];
     const SbContactPair *pair = &a->pair;
     PetscReal d[3], energy, gradient[12];
-    const PetscReal force = normal_force(b, a, &energy, gradient);
+    const PetscReal force = SbBarrierNormalForce(b, a, &energy, gradient);
 
     SbBarrier(a->gap, of_pair(b, b->widths.w, pair), of_pair(b, b->widths.k, pair), pair->area, d);
     if (d[0] <= 0.)
@@ -178,7 +154,7 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->normal = a->at.n;
     t->force = 0.;
     if (k < 0)
-      t->force = normal_force(b, a, &t->energy, t->gradient);
+      t->force = SbBarrierNormalForce(b, a, &t->energy, t->gradient);
     else {
       PetscReal u[3];
       const PetscReal y = SbBarrierSlip(b, &b->friction.pairs.pair[k], u);
@@ -206,7 +182,7 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
 
 /* f += sign times the gradient of all energies at the current positions, N; returns this rank's
    sum, J. */
-static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
+PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0.;
 
@@ -228,7 +204,7 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, stage->u));
-  (void)add_gradient(b, -1., f);
+  (void)SbBarrierAddGradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -240,7 +216,7 @@ PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const Pet
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
-  *energy += add_gradient(b, 1., f);
+  *energy += SbBarrierAddGradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
@@ -345,90 +321,5 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
     PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
   }
   PetscCall(SbContactBlocksToNodes(b->surface, &b->blocks, blocks));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Displacement in the step of the obstacle's contact point by rotation, beyond that of its
-   vertices. */
-static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
-{
-  const SbContactSurface m = b->surface;
-  const PetscInt *v = friction->on.pair.v;
-  const PetscReal *weight = friction->on.at.weight;
-  const PetscReal *n = friction->on.at.n;
-  PetscReal X[3];
-  PetscReal at[3] = {0};
-  PetscReal other[3];
-  PetscReal sign = 0.;
-
-  for (int k = 0; k < 4; k++) {
-    if (v[k] >= m->nbody_vertex || weight[k] == 0.)
-      continue;
-    sign = weight[k] > 0. ? 1. : -1.;
-    for (int i = 0; i < 3; i++)
-      at[i] += PetscAbsReal(weight[k]) * b->motion.x[3 * v[k] + i];
-  }
-  for (int i = 0; i < 3; i++)
-    at[i] -= sign * friction->on.gap * n[i];
-  SbPoseInvert(&b->contact.partner.pose[end], at, X);
-  SbPoseApply(&b->contact.partner.pose[!end], X, other);
-  for (int i = 0; i < 3; i++)
-    friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
-  for (int k = 0; k < 4; k++) {
-    const PetscInt o = 3 * (v[k] - m->nbody_vertex);
-
-    for (int i = 0; i < 3 && o >= 0; i++)
-      friction->rotation[i] += weight[k] * (b->motion.to[o + i] - b->motion.from[o + i]);
-  }
-}
-
-PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
-{
-  PetscFunctionBeginUser;
-  b->friction.next.n = 0;
-  for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->active.n; i++) {
-    PetscReal energy, gradient[12];
-    FrictionPair friction = {.on = b->active.pair[i]};
-
-    friction.force = b->contact.friction.mu * normal_force(b, &friction.on, &energy, gradient);
-    if (b->contact.partner.obstacle)
-      find_rotation(b, end, &friction);
-    PetscCall(SbReserve(b->friction.next.n + 1, sizeof(*b->friction.next.pair),
-                        &b->friction.next.size, &b->friction.next.pair));
-    b->friction.next.pair[b->friction.next.n++] = friction;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbBarrierSwapFriction(Barrier *b)
-{
-  const FrictionPairs friction = b->friction.pairs;
-
-  b->friction.pairs = b->friction.next;
-  b->friction.next = friction;
-}
-
-PetscErrorCode SbBarrierLag(Barrier *b)
-{
-  const SbSpace s = b->surface->space;
-  PetscReal *f;
-  PetscReal sum[2] = {0.};
-
-  PetscFunctionBeginUser;
-  PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
-
-  /* the normal forces cancel */
-  PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  (void)add_gradient(b, 1., f);
-  SbBarrierSwapFriction(b);
-  (void)add_gradient(b, -1., f);
-  SbBarrierSwapFriction(b);
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
-  for (PetscInt i = 0; i < b->friction.next.n; i++)
-    sum[1] += counts(b, &b->friction.next.pair[i].on.pair) ? b->friction.next.pair[i].force : 0.;
-  PetscCall(PetscFree(f));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
-  b->friction.lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
