@@ -104,70 +104,104 @@ static const char *const names_of_responses[] = {"auto",      "projected", "mult
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
-static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
+/* What contact effects ask for, one or several of them. */
+typedef struct {
+  PetscBool bodies;    /* some is contact between bodies */
+  PetscBool facets;    /* some obstacle is neither a half-space nor a bowl */
+  PetscBool lacks;     /* some obstacle has an option that `barrier` lacks */
+  SbResponse response; /* the option of the last one that gives it; AUTO: none does */
+} Wishes;
+
+/* Adds what one effect of the scene asks for, nothing if it is of another type. */
+static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
 {
-  PetscBool bodies = PETSC_FALSE;  /* some effect is contact between bodies */
-  PetscBool vertices = PETSC_TRUE; /* all obstacles are half-spaces and bowls */
-  PetscBool lacks = PETSC_FALSE;   /* some obstacle has an option that `barrier` lacks */
-  PetscBool possible = PETSC_TRUE;
-  PetscInt n = 0;
-  int choice;
-  char(*names)[SB_NAME_MAX] = NULL, text[PETSC_MAX_PATH_LEN];
-  SbResponse other = AUTO; /* option of this effect, or of the last one that has it */
+  char text[PETSC_MAX_PATH_LEN];
+  int response;
   SbScope scope;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = -1; i < n; i++) { /* this effect first */
-    const char *name = i < 0 ? e->name : names[i];
-
-    SbScopeSet(&scope, "effect", "", name);
-    PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
-    if (strcmp(text[0] ? text : name, "contact"))
-      continue;
-    SbScopeSet(&scope, "effect", "contact", name);
-    PetscCall(SbOptionChoice(&scope, "response", &choice));
-    if (choice != AUTO)
-      other = (SbResponse)choice;
-    PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
-    bodies = (PetscBool)(bodies || !text[0]);
-    vertices = (PetscBool)(vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
-    for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-      PetscBool given;
-
-      PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
-      lacks = (PetscBool)(lacks || given);
-    }
-    if (i >= 0)
-      continue;
-    *response = other;
-    PetscCheck(!bodies || other == AUTO || other == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
-               "it out, or "
-               "give -effect_%s_obstacle",
-               e->name, names_of_responses[other], e->name);
-    if (other != AUTO)
-      PetscFunctionReturn(PETSC_SUCCESS);
-    if (SbOptionFind(&SbRunScope, "effects"))
-      PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+  SbScopeSet(&scope, "effect", "", name);
+  PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
+  if (strcmp(text[0] ? text : name, "contact"))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  SbScopeSet(&scope, "effect", "contact", name);
+  PetscCall(SbOptionChoice(&scope, "response", &response));
+  if (response != AUTO)
+    wishes->response = (SbResponse)response;
+  PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
+  if (!text[0]) {
+    wishes->bodies = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscFree(names));
+  if (strncmp(text, "plane", 5) && strncmp(text, "bowl", 4))
+    wishes->facets = PETSC_TRUE;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+    PetscBool given;
 
-  /* the integrator, where the program has one */
+    PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
+    wishes->lacks = (PetscBool)(wishes->lacks || given);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
+static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
+{
+  PetscBool possible = PETSC_TRUE;
+  Wishes wishes = {0};
+
+  PetscFunctionBeginUser;
+
+  /* the effect's own option */
+  PetscCall(add_wishes(e->name, &wishes));
+  *response = wishes.response;
+  PetscCheck(!wishes.bodies || *response == AUTO || *response == BARRIER, PETSC_COMM_WORLD,
+             PETSC_ERR_USER_INPUT,
+             "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
+             "it out, or give -effect_%s_obstacle",
+             e->name, names_of_responses[*response], e->name);
+  if (*response != AUTO)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* what all effects of the scene ask for, and the integrator, where the program has them */
+  if (SbOptionFind(&SbRunScope, "effects")) {
+    PetscInt n;
+    char(*names)[SB_NAME_MAX];
+
+    PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+    for (PetscInt i = 0; i < n; i++)
+      PetscCall(add_wishes(names[i], &wishes));
+    PetscCall(PetscFree(names));
+  }
   if (SbOptionFind(&SbRunScope, "time")) {
-    PetscCall(SbOptionChoice(&SbRunScope, "time", &choice));
-    possible = (PetscBool)(choice == 0 || choice == 6); /* euler_implicit, static */
+    int time;
+
+    PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
+    possible = (PetscBool)(time == 0 || time == 6); /* euler_implicit, static */
   }
 
-  *why = bodies          ? "bodies meet each other"
-         : other != AUTO ? "the same as another effect"
-         : !possible     ? "-time"
-         : lacks         ? "an option that barrier lacks"
-         : vertices      ? "half-spaces and bowls only"
-                         : "edges and corners may touch";
-  if (other == AUTO)
-    other = !possible || lacks || vertices ? PROJECTED : BARRIER;
-  *response = bodies || other == BARRIER ? BARRIER : PROJECTED;
+  /* the first rule that holds */
+  {
+    const struct {
+      PetscBool holds;
+      SbResponse response;
+      const char *why;
+    } rule[] = {
+      {wishes.bodies, BARRIER, "bodies meet each other"},
+      {(PetscBool)(wishes.response == BARRIER), BARRIER, "the same as another effect"},
+      {(PetscBool)(wishes.response != AUTO), PROJECTED, "the same as another effect"},
+      {(PetscBool)!possible, PROJECTED, "-time"},
+      {wishes.lacks, PROJECTED, "an option that barrier lacks"},
+      {(PetscBool)!wishes.facets, PROJECTED, "half-spaces and bowls only"},
+      {PETSC_TRUE, BARRIER, "edges and corners may touch"},
+    };
+    size_t k = 0;
+
+    while (!rule[k].holds)
+      k++;
+    *response = rule[k].response;
+    *why = rule[k].why;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

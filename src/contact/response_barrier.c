@@ -23,7 +23,7 @@
   (friction_pairs.c), and reported.
 
   Initial contact. Bodies that touch when a run begins are moved apart rigidly
-  (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their
+  (initial_contacts.c), by the width or, in a static run, half of it; where that fails, by their
   vertices. Bodies that intersect are separated by penalty springs (separation.c).
 */
 #include "barrier.h"
@@ -31,7 +31,7 @@
 #define WIDTH 1e-3      /* default w over the size of the smallest body */
 #define WIDTH_CUBE 3e-3 /* largest default w over the cube root of its volume */
 #define PRESSURE 0.1    /* of Young's modulus of the softer side */
-#define SLIP 1e-4       /* sticking speed over the speed of a step (src/model/potential.c) */
+#define SLIP 1e-4       /* sticking speed over the speed of a step (SbModelStepSpeed()) */
 #define SLIP_LEAST \
   1e-7 /* least sticking slip e of a time step over the size of the smallest body */
 #define SLIP_STATIC 1e-5 /* the same of a static load step */

@@ -38,7 +38,7 @@
 
   Barrier contact. Its Hessian is the positive part of each pair's, and after a full step the exact
   one, which alone converges superlinearly near the solution. Friction whose slip reversed is
-  treated as sticking (src/effect/barrier_forces.c), and bounded from above where p is no descent
+  treated as sticking (src/contact/barrier_terms.c), and bounded from above where p is no descent
   direction. An indefinite tangent is shifted by the least sufficient multiple of the mass matrix
   (Nocedal and Wright, algorithm 3.3) before cells are filtered: in a collapse nearly all cells have
   a negative eigenvalue but the assembled tangent has few, and filtering leads to steps of a
