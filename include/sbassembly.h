@@ -13,12 +13,14 @@
 */
 typedef struct _p_SbPlan {
   PetscInt *di, *dj;  /* diagonal part: rows [nnode_owned+1], local columns ascending */
-  PetscInt *oi, *oj;  /* off-diagonal part: columns are local ghost nodes, ascending */
+  PetscInt *oi, *oj;  /* off-diagonal part: local ghost nodes, ascending by global number */
   PetscInt *diagonal; /* [nnode_owned] block index of (i, i) */
   /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the
      off-diagonal part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the
      first */
   PetscInt *offset;
+  PetscInt *coupling_start; /* [couplings.n] into coupling; NULL without couplings */
+  PetscInt *coupling;       /* [n^2] of a group of n nodes: block (a, b) at n a + b, as in offset */
   PetscInt *ui;   /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
   PetscInt npair; /* of blocks of a cell in upper: 10, or SB_PAIRS with a P2 body */
   PetscInt *

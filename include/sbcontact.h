@@ -1,59 +1,258 @@
 /*
-  sbcontact.h - layer 7: rigid obstacles, fixed or on a prescribed path.
+  sbcontact.h - layer 7: contact of bodies with obstacles and with each other.
+
+  A contact is an effect of the type `contact` (SbEffect.contact), with a table of operations of its
+  own. The program calls the functions below, for all contacts of a scene at once; none of them
+  depends on the partner, an obstacle or another body, or on the response (-effect_NAME_response).
 */
 #pragma once
-#include "sbfem.h"
+#include "sbeffect.h"
+#include "sbsolver.h"
 
-typedef struct _p_SbObstacle *SbObstacle;
-/*
-  SbObstacleCreate - reads the description of a rigid obstacle.
+typedef struct _p_SbContact *SbContact;
 
-  Not collective.
-
-  Input: option - full name, for messages; text (lengths in m)
-    plane:nx,ny,nz,d                 the half-space n.x <= d is solid
-    sphere:x,y,z,r   box:x0,y0,z0,x1,y1,z1   capsule:x0,y0,z0,x1,y1,z1,r
-    cylinder:x0,y0,z0,x1,y1,z1,r bowl:x,y,z,r                     everything outside the sphere is
-    solid mesh:FILE                        what a closed surface encloses: .stl, .obj, .off or .msh
-  Output: obstacle; the caller destroys it.
-  Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
-*/
-PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle);
-PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
-/*
-  SbObstacleSetUp - reads the file of a mesh: obstacle, before SbObstacleDistance(); no other shape
-  needs it.
-
-  Collective. Every rank holds the whole obstacle.
-
-  Input: scale, at - x <- scale x + at (m) for the coordinates of the file.
-  Output: note[size] - one line on the obstacle for the run's report is appended, with other shapes
-  nothing. Errors: those of SbTrianglesRead(), alike on all ranks.
-*/
-PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, PetscReal scale,
-                               const PetscReal at[3], size_t size, char note[]);
-/* Signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward
-   normal at the nearest point of its surface, or one of several (centre of a sphere). Not
-   collective. */
-PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
-
-/* Obstacles that only vertices can touch: a half-space, stored as a point of its surface and the
-   tip of the unit normal there; a bowl, as its centre. */
+/* Hessian of the contact energy in Newton's method: exact; each pair projected to positive
+   semi-definite; the same with friction majorized by quadratics, as its energy has a kink where
+   slip reverses. */
 typedef enum {
-  SB_SIDE_NONE,
-  SB_SIDE_PLANE,
-  SB_SIDE_BOWL
-} SbObstacleSide;
-/* A rigid motion: x = c + R (X - c) + d; R turns by an angle (rad) about the unit axis. */
+  SB_HESSIAN_EXACT,
+  SB_HESSIAN_PROJECTED,
+  SB_HESSIAN_MAJORIZED
+} SbContactHessian;
+
+/* An active contact point of a body. */
 typedef struct {
-  PetscReal R[9], c[3], d[3], axis[3], angle;
-} SbPose;
-/* Tangent of the arc from pose `from` to pose `to` at the end `at`, for the point x there: way = d1
-   - d0 + (angle1 - angle0) axis x (x - c - d), m. Not collective. */
-void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
-               PetscReal way[3]);
-/* Rotation by an angle (rad) about the unit axis through c, then the translation d. */
-void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
-               SbPose *pose);
-void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3]);
-void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3]);
+  PetscInt id[3];      /* identify it within its effect, the same for any partition */
+  PetscInt effect;     /* number of the effect in the scenario; filled by SbContactSetPoints() */
+  PetscInt body[2];    /* the body itself and its partner; -1: a rigid obstacle */
+  PetscReal x[3];      /* position on body[0], m */
+  PetscReal normal[3]; /* outward normal of the partner */
+  PetscReal gap;       /* m; negative inside */
+  PetscReal force[3];  /* on body[0], with friction, N */
+} SbContactPoint;
+/* Start with {0}; n = 0 empties it and keeps the memory. Release with PetscFree(list->point). */
+typedef struct {
+  PetscInt n, size;
+  SbContactPoint *point; /* [n] */
+} SbContactPoints;
+
+/* Two bodies that are in contact, or nearly so, when a run begins. */
+typedef struct {
+  PetscInt body[2];  /* nbody: an obstacle */
+  PetscReal n[3];    /* unit, from the second to the first */
+  PetscReal gap, to; /* the distance along n, and its target, m */
+} SbInitialContact;
+/* Start with {0}; release with PetscFree(list->touch). */
+typedef struct {
+  PetscInt n, size;
+  SbInitialContact *touch; /* [n] */
+} SbInitialContacts;
+
+/*
+  Operations of a response; a star: not collective. Each may be NULL: nothing is to be done. u, u0,
+  u1: local displacements [nnode][3], ghosts up to date, m; v0: velocities, m/s; f, r: forces
+  [nnode][3], N, right on owned nodes without communication. Numbers and lists are this rank's part.
+  Energies and bounds are added, flags set, `part` lowered: their caller gives the first values.
+
+  A response has an active set (constraints, or springs that an update changes), a potential, which
+  Newton's method minimises with the energies of the bodies, or forces of the effect alone.
+*/
+typedef struct {
+  /* at the start t of a run, first step dt: adds pairs whose gap at u is too small, or little
+     larger. first: set at the first step, alike on all ranks; else nothing is done */
+  PetscErrorCode (*initial_contacts)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
+                                     const PetscReal u[], PetscBool *first,
+                                     SbInitialContacts *list);
+  /* an attempt at a step from t to t + dt begins with u0 and the speed of SbContactSetBeginStep(),
+     m/s; where surfaces touch when the run begins, u0 is changed, ghosts too */
+  PetscErrorCode (*begin_step)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
+                               PetscReal speed, PetscReal u0[]);
+  /* * with restitution, after begin_step() of all contacts: finds the impacts of the step from u0
+     and v0 */
+  PetscErrorCode (*find_impacts)(SbContact c, SbSpace space, PetscReal dt, const PetscReal u0[],
+                                 const PetscReal v0[]);
+
+  /* the active set before the first solve, u as predicted at the end of the step */
+  PetscErrorCode (*start_active_set)(SbContact c, SbSpace space, const PetscReal u[]);
+  /* * SbSpaceAddConstraint(): of all contacts first normal, then tangential ones (across) */
+  PetscErrorCode (*assemble_constraints)(SbContact c, SbSpace space, PetscBool across);
+  /* after a solve and SbConstraintsComputeForces(): sets `changed` when another solve is needed */
+  PetscErrorCode (*update_active_set)(SbContact c, SbSpace space, const PetscReal u[],
+                                      PetscBool *changed);
+  /* * after the first solve of an attempt, with SbContact.ends_step: the fraction of the step,
+     0..1, at which the first new point comes into contact in the motion without contact; 1: none
+     does */
+  PetscErrorCode (*time_of_impact)(SbContact c, PetscReal *part);
+  /* * after the solve of a Newmark step: sets SbConstraint.velocity, the obstacle's, at its end */
+  PetscErrorCode (*target_velocity)(SbContact c, SbSpace space, const SbStage *stage);
+
+  /* the potential: energy += that at u, J; f += its gradient */
+  PetscErrorCode (*gradient)(SbContact c, SbSpace space, const PetscReal u[], PetscReal *energy,
+                             PetscReal f[]);
+  /* adds the blocks of its Hessian at u, or of the substitute (SbContactHessian), and to r, N, the
+     gradient of the substitute's quadratic model less the true one */
+  PetscErrorCode (*hessian)(SbContact c, SbSpace space, const PetscReal u[], SbContactHessian kind,
+                            SbBlocks *blocks, PetscReal r[]);
+  /* part: largest collision-free fraction of the motion from u0 to u1, and from the present
+     progress to 1; nactive: active pairs at u0 */
+  PetscErrorCode (*max_step)(SbContact c, SbSpace space, const PetscReal u0[], const PetscReal u1[],
+                             PetscReal *part, PetscInt *nactive);
+  /* lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and slip
+     directions from u; again: it did, and the step needs one more solve */
+  PetscErrorCode (*update_friction)(SbContact c, SbSpace space, const PetscReal u[],
+                                    PetscBool solved, PetscBool *again);
+
+  /* * restitution: work of the forces of impacts in the last solve, in the frame of the other side,
+     J */
+  PetscErrorCode (*impact_work)(SbContact c, PetscReal *work);
+  /* * multiplies coefficients of restitution by `share`, 0..1, in this step, and updates
+     constraints */
+  PetscErrorCode (*scale_restitution)(SbContact c, PetscReal share);
+
+  /* * lowers gap[nnode] of owned nodes, m, where a contact candidate is closer, and sets
+     normal[nnode][3] there, towards the node */
+  PetscErrorCode (*gap)(SbContact c, SbSpace space, const SbStage *stage, PetscReal gap[],
+                        PetscReal normal[]);
+  /* * adds the active contact points */
+  PetscErrorCode (*points)(SbContact c, SbSpace space, const SbStage *stage, SbContactPoints *list);
+  /* where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it and sets
+     `text` to the pair, in words */
+  PetscErrorCode (*nearest)(SbContact c, SbSpace space, PetscReal *gap, size_t size, char text[]);
+  /* f += the load that closes the gaps at u to first order; bound += half of force times gap, which
+     bounds the energy of the error by gaps, J */
+  PetscErrorCode (*gap_forces)(SbContact c, SbSpace space, const PetscReal u[], PetscReal f[],
+                               PetscReal *bound);
+  /* * multiplies a default width by `factor`. Smaller: at once, not below what rounding allows;
+     changed: it did, alike on all ranks. Larger: when the next step begins, if the energy grows by
+     at most `growth`, J, and not beyond the default */
+  PetscErrorCode (*scale_width)(SbContact c, PetscReal factor, PetscReal growth,
+                                PetscBool *changed);
+} SbContactOps;
+
+/* A contact of the scene; the first member of its effect's data. */
+struct _p_SbContact {
+  SbEffect effect;         /* its name, options, loads and history */
+  PetscInt number;         /* of the effect in the scenario */
+  const SbContactOps *ops; /* of its response */
+  PetscBool springs;       /* springs or friction, not constraints alone */
+  PetscBool saddle;        /* constraints are to be solved with their multipliers as unknowns */
+  PetscBool ends_step;     /* a step ends at the first time of impact */
+  PetscReal restitution;   /* coefficient; 0: none */
+  PetscReal progress;      /* of a potential: obstacles are at this fraction of their path */
+  PetscReal width;         /* the smallest gap below which surfaces repel, m */
+  PetscReal work;          /* on the bodies in the last accepted step, this rank's, J */
+};
+
+/* The contacts of a scene. All zero: there is none. */
+typedef struct {
+  SbSpace space; /* borrowed */
+  PetscInt n, nactive_set, npotential;
+  SbContact *contact;    /* [n] borrowed, in the order of the scenario */
+  SbContact *active_set; /* [nactive_set] those that have one */
+  SbContact *potential;  /* [npotential] those that have one */
+  SbContact ends_step;   /* the first one with the option time_of_impact; NULL: none */
+  PetscInt nconstraint;  /* those with constraints */
+  PetscInt nrestitution; /* those with restitution */
+  PetscReal speed;       /* of the present step, m/s: SbContactSetBeginStep() */
+  struct {
+    Vec U0, V0;     /* state at the start of the step; borrowed */
+    PetscReal dt;   /* length of the step, s */
+    PetscReal left; /* factor on the coefficients of restitution in this step */
+    int reductions;
+  } bounce; /* only with restitution */
+} SbContactSet;
+
+extern const SbEffectType SbEffectContact;
+
+/* Whether an effect is a contact with a potential. */
+static inline PetscBool SbEffectHasPotential(SbEffect e)
+{
+  return (PetscBool)(e->contact && e->contact->ops->gradient);
+}
+
+/* The contacts among n effects that are set up. Borrowed: space and effects. Not collective. */
+PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effect[],
+                                  SbContactSet *contacts);
+PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
+
+/*
+  In the order of a run; collective.
+
+  Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
+              moved apart rigidly, as far as potentials ask for it.
+  Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
+  BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
+              unchanged until the step ends, but for U0 when the run begins with surfaces that still
+              touch. speed: SbModelStepSpeed(), the scale of tolerances, m/s.
+*/
+PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U);
+PetscErrorCode SbContactSetResume(const SbContactSet *contacts);
+PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
+                                     PetscReal speed, Vec U0, Vec V0);
+
+/*
+  The active set, where contacts->nactive_set > 0; collective.
+
+  Start   - before the first solve: U, the guess at the end of the step, is projected onto the
+            constraints.
+  Update  - after a solve with the residual R without constraints; `again`: the set has changed, U
+            is projected onto the new constraints, and another solve is needed.
+  TimeOfImpact - after the first solve: part = fraction of the step at which the first new point of
+            any rank comes into contact, 1: none.
+  ProjectVelocity - V <- the nearest velocity that keeps active contacts closed, after a step of the
+            length dt that ended at t with the displacement U.
+*/
+PetscErrorCode SbContactSetStartActiveSet(const SbContactSet *contacts, Vec U);
+PetscErrorCode SbContactSetUpdateActiveSet(SbContactSet *contacts, Vec U, Vec R, PetscBool *again);
+PetscErrorCode SbContactSetTimeOfImpact(const SbContactSet *contacts, PetscReal *part);
+PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscReal t, PetscReal dt,
+                                           Vec U, Vec V);
+
+/*
+  The potential as Newton's method sees it, where contacts->npotential > 0; collective but for
+  Advance.
+
+  Advance  - obstacles are at the fraction `progress` of their path in the step.
+  MaxStep  - largest collision-free fraction of the motion from X to X - Y over all ranks, by
+             continuous collision detection, and the number of active pairs.
+  Gradient - F += scale times the gradient of the energy at U, N; free_only: not where prescribed.
+             energy: J, or NULL.
+  Hessian  - its blocks, and R as the operation `hessian` says, zero at prescribed unknowns.
+  UpdateFriction - lagged friction and restitution from X, an iterate of the step or (solved) its
+             solution; again: solve again.
+*/
+void SbContactSetAdvance(const SbContactSet *contacts, PetscReal progress);
+PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, PetscReal *part,
+                                   PetscInt *nactive);
+PetscErrorCode SbContactSetGradient(const SbContactSet *contacts, Vec U, PetscReal scale,
+                                    PetscBool free_only, PetscReal *energy, Vec F);
+PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContactHessian kind,
+                                   SbBlocks *blocks, Vec R);
+PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBool solved,
+                                          PetscBool *again);
+/* Work of potentials on the bodies in the last accepted step, this rank's, J. */
+PetscReal SbContactSetWork(const SbContactSet *contacts);
+
+/*
+  Output, after the step that ended at t with the displacement U and with its reactions known;
+  collective.
+
+  Gap     - G = gap of each node along the normal of the closest candidate surface, m; 0 where
+            nothing is near.
+  Force   - F = contact forces on the nodes, N.
+  Points  - appends the active contact points of this rank.
+  Nearest - the closest pair in the last attempt at a step, in words; "": none.
+*/
+PetscErrorCode SbContactSetGap(const SbContactSet *contacts, PetscReal t, Vec U, Vec G);
+PetscErrorCode SbContactSetForce(const SbContactSet *contacts, PetscReal t, Vec U, Vec F);
+PetscErrorCode SbContactSetPoints(const SbContactSet *contacts, PetscReal t, Vec U,
+                                  SbContactPoints *list);
+PetscErrorCode SbContactSetNearest(const SbContactSet *contacts, size_t size, char text[]);
+
+/* For the estimate of contact's error; collective. GapForces: F = nodal forces of potentials that
+   the gaps at U leave beyond exact contact, N, zero at prescribed unknowns; bound on their energy
+   over all ranks, J. ScaleWidths: widths times `factor`, growing by `growth` at most; changed: some
+   did. */
+PetscErrorCode SbContactSetGapForces(const SbContactSet *contacts, Vec U, Vec F, PetscReal *bound);
+PetscErrorCode SbContactSetScaleWidths(const SbContactSet *contacts, PetscReal factor,
+                                       PetscReal growth, PetscBool *changed);

@@ -39,6 +39,13 @@ typedef struct {
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
 typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
 
+/* Groups of nodes that an effect couples: those with a node that is owned here. */
+typedef struct {
+  PetscInt n, nstart, nnode; /* groups; room in the arrays */
+  PetscInt *start;           /* [n+1] */
+  PetscInt *node;            /* [start[n]] local nodes; global ones until SbSpaceCoupleDone() */
+} SbCouplings;
+
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
   MPI_Comm comm;
@@ -47,7 +54,9 @@ struct _p_SbSpace {
   DM dm; /* that of the mesh with the section of the nodes, three unknowns "displacement" each */
   PetscInt Nnode, nnode_owned, nnode;
   PetscInt gnode_start;
-  PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */
+  PetscInt nnode_cell; /* nodes of local cells; those behind are of couplings only */
+  PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending, those of
+                          couplings by themselves */
   PetscInt *cell_node; /* [ncell][4] local nodes; of P2 those at the vertices */
   PetscInt
     *edge_node; /* [ncell][6] local nodes at edges of P2 cells, -1: none; NULL without a P2 body */
@@ -81,8 +90,10 @@ struct _p_SbSpace {
     *batch_weight; /* [nbatch][4] of a cell's own node in the mean of the two; NULL without DG */
   SbJump jump;     /* NULL without face nodes */
   SbConstraints
-    constraints;     /* NULL unless an effect may constrain nodes along directions of their own */
-  PetscBool coupled; /* an effect may couple nodes that share no cell, in an assembled tangent */
+    constraints; /* NULL unless an effect may constrain nodes along directions of their own */
+  SbCouplings couplings;
+  PetscBool own_nodes; /* arrays over nodes are the space's, even if all nodes are vertices */
+  PetscBool coupled;   /* an effect may couple nodes that share no cell, in an assembled tangent */
   SbPack *
     batch_g; /* [nbatch][9] basis gradients of nodes 1..3, 1/m, of straight cells; 64-byte aligned */
   SbPack *batch_V;         /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
@@ -190,6 +201,25 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a,
                                 const PetscReal block[9]);
 
+/*
+  Couplings: groups of nodes that need not share a cell, declared before effects are set up.
+
+  SbSpaceCouple     - a group of n different nodes by their global numbers, to be called by every
+                      rank that owns one of them, with the nodes in the same order; other ranks may
+                      call it, too. Output: its number on this rank, -1: none of its nodes is owned
+                      here. Not collective. Error: PETSC_ERR_ARG_OUTOFRANGE for no such node.
+  SbSpaceCoupleDone - after the last one: nodes of groups that no local cell has become ghosts, so
+                      that arrays over nodes and vectors made before are no longer valid.
+                      Collective.
+  SbSpaceAddCoupling - between SbSpaceAssembleTangent() and SbSpaceFinishTangent(): A += K[3 n][3
+  n],
+                      row-major, N/m, for group `number`; rows of nodes owned here. The nodes are
+                      space->couplings.node[start[number] ...]. Not collective.
+*/
+PetscErrorCode SbSpaceCouple(SbSpace space, PetscInt n, const PetscInt gnode[], PetscInt *number);
+PetscErrorCode SbSpaceCoupleDone(SbSpace space);
+PetscErrorCode SbSpaceAddCoupling(SbSpace space, Mat A, PetscInt number, const PetscReal K[]);
+
 /* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with f
    NULL, A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
 PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
@@ -200,6 +230,9 @@ PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
+/* Writes the prescribed displacements of the last evaluation (fixed_value) into u[nnode_owned][3],
+   m, and projects it onto exact constraints. Not collective. */
+void SbSpaceSetPrescribed(SbSpace space, PetscScalar u[]);
 /* Zeroes the prescribed components of a vector, or all others. Not collective. */
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
 

@@ -343,3 +343,17 @@ void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18
    outside. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal point[3],
                       PetscReal weight[4]);
+
+/* A rigid motion: x = c + R (X - c) + d; R turns by an angle (rad) about the unit axis. */
+typedef struct {
+  PetscReal R[9], c[3], d[3], axis[3], angle;
+} SbPose;
+/* Tangent of the arc from pose `from` to pose `to` at the end `at`, for the point x there: way = d1
+   - d0 + (angle1 - angle0) axis x (x - c - d), m. Not collective. */
+void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
+               PetscReal way[3]);
+/* Rotation by an angle (rad) about the unit axis through c, then the translation d. */
+void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
+               SbPose *pose);
+void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3]);
+void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3]);

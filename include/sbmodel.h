@@ -3,7 +3,7 @@
   momenta.
 */
 #pragma once
-#include "sbeffect.h"
+#include "sbcontact.h"
 
 /* Scalars of one instant, summed over all ranks. SI. */
 typedef struct {
@@ -54,22 +54,14 @@ struct _p_SbModel {
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it; all of them lie in
      `lists` */
-  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
-    nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution, npotential;
-  SbEffect *lists, *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force,
-    *tangent, *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
-  struct _SbBounce {
-    Vec U0, V0;     /* state at the start of the step; borrowed */
-    PetscReal dt;   /* length of the step, s */
-    PetscReal left; /* factor on the coefficients of restitution in this step */
-    int reductions;
-  } bounce;             /* src/model/restitution.c; only with restitution */
-  PetscBool linear;     /* laws and effects: the tangent depends on the shifts only */
-  PetscBool may_filter; /* some law has the tangent auto */
+  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory;
+  SbEffect *lists, *prescribe, *force, *tangent, *nonsymmetric, *accept, *history;
+  SbContactSet contacts; /* those effects that are contacts */
+  PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
+  PetscBool may_filter;  /* some law has the tangent auto */
   PetscBool
-    barrier_apart; /* residuals of solves leave barrier contact out: SbModelPotentialGradient() */
-  PetscReal barrier_speed; /* scale of barrier contact's tolerances in the step, m/s; 0: static */
-  PetscReal mass;          /* kg */
+    barrier_apart; /* residuals of solves leave potentials of contact out: SbContactSetGradient() */
+  PetscReal mass;  /* kg */
   PetscBool dynamic;
   PetscReal
     load; /* load factor, 0..1 in static runs: on loads and displacements whose formulas have no t */
@@ -94,64 +86,6 @@ PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, Pet
 PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
-/*
-  Contact, for effects that have it (model->nbegin_step > 0). Begin: before the first solve of a
-  step from t to t + dt, U0 and V0 (NULL in a static run) at t, unchanged until the step ends; U,
-  the guess at t + dt, is projected onto the constraints. Update: after a solve with the residual R
-  without constraints; `again`: the active set has changed, U is projected onto the new constraints,
-  and another solve is needed. Collective.
-*/
-PetscErrorCode SbModelContactBeginStep(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0,
-                                       Vec U);
-PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, Vec R,
-                                             PetscBool *again);
-/* After effects have loaded their state from a checkpoint: assembles their constraints.
-   Collective. */
-PetscErrorCode SbModelContactResume(SbModel model);
-/* V <- the nearest velocity that keeps active contacts closed, after a step of the length dt that
-   ended at t with the displacement U. Collective. */
-PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
-/* G = gap of each node along the normal of the closest candidate surface, m, after the step that
-   ended at t with the displacement U; 0 where nothing is near. Collective. */
-PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
-/* F = contact forces on the nodes, N, after the step that ended at t with the displacement U, with
-   the reactions of that step known. Collective. */
-PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec F);
-/* Appends the active contact points of this rank, after the same step. Collective. */
-PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContactPoints *list);
-/*
-  Contact with a potential, response barrier, as Newton's method sees it: all effects that have it
-  together, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
-
-  Start: a run begins with U, dt being the length of its first step; bodies that touch are moved
-  apart rigidly. Begin: a step begins with U0, which is changed when the run begins with surfaces
-  that still touch. MaxStep: largest collision-free fraction of the motion from X to X - Y over all
-  ranks, by continuous collision detection, and the number of active pairs. UpdateFriction: lagged
-  friction and restitution from X, an iterate of the step or (solved) its solution; again: solve
-  again. V0: velocities at its start, or NULL.
-*/
-PetscErrorCode SbModelPotentialStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
-PetscErrorCode SbModelPotentialBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0);
-PetscErrorCode SbModelPotentialAdvance(SbModel model, PetscReal progress);
-PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal *part,
-                                       PetscInt *nactive);
-/* The closest pair in the last attempt at a step, in words, for the message of its failure. */
-PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
-PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved,
-                                              PetscBool *again);
-/* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy: J
-   or NULL */
-PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
-                                        PetscReal *energy, Vec F);
-PetscErrorCode SbModelPotentialHessian(SbModel model, Vec U, SbContactHessian kind,
-                                       SbBlocks *blocks, Vec R);
-/* For the estimate of contact's error. GapForces: F = nodal forces of the barrier that the gaps at
-   U leave beyond exact contact, N, zero at prescribed unknowns; bound on their energy over all
-   ranks, J. ScaleBarrierWidths: widths times `factor`, growing by `growth` at most; changed: some
-   did. */
-PetscErrorCode SbModelGapForces(SbModel model, Vec U, Vec F, PetscReal *bound);
-PetscErrorCode SbModelScaleBarrierWidths(SbModel model, PetscReal factor, PetscReal growth,
-                                         PetscBool *changed);
 /* Initial displacements and velocities of bodies, with their angular velocity. Collective. */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at U, or at rest (NULL).
@@ -163,6 +97,12 @@ PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
+/* The speed v of a step from t to t + dt, m/s, the scale of contact's tolerances: m v^2 / 2 is the
+   kinetic and strain energy of the bodies, of mass m, at its start U, V, plus half of the work of
+   all loads and support forces along the size of the smallest body. 0 in a static run (V NULL).
+   Collective. */
+PetscErrorCode SbModelStepSpeed(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V,
+                                PetscReal *speed);
 /* Strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N (may be
    NULL), and how many tets are inverted there. Collective. */
 PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi,

@@ -47,9 +47,10 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   /* tangent and contact blocks at rest, where the barrier is not softened */
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
-  PetscCall(SbModelPotentialBegin(p->scene.model, 0., h, zero, NULL));
+  PetscCall(SbContactSetBeginStep(&p->scene.model->contacts, 0., h, 0., zero, NULL));
   PetscCall(SbSpaceCreateVec(s, &p->F));
-  PetscCall(SbModelPotentialHessian(p->scene.model, zero, SB_HESSIAN_PROJECTED, &p->blocks, p->F));
+  PetscCall(
+    SbContactSetHessian(&p->scene.model->contacts, zero, SB_HESSIAN_PROJECTED, &p->blocks, p->F));
   PetscCall(SbSpaceGetLocalRead(s, zero, &u));
   stage.u = u;
   PetscCall(SbSpaceAssembleTangent(s, &stage, p->K));

@@ -6,7 +6,7 @@
   (r = 0; inside them the nearest side counts). A bowl is a sphere inverted. What a closed mesh
   encloses is in src/geometry/signed_distance.c.
 */
-#include "contact_mesh.h"
+#include "obstacle.h"
 
 #define SIDES 96  /* of a cylinder as triangles */
 #define LARGE 20. /* m; files of larger obstacles are in mm */
@@ -287,52 +287,4 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   default:
     return from_cylinder(p, x, n);
   }
-}
-
-void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
-               SbPose *pose)
-{
-  const PetscReal half = PetscSinReal(angle / 2);
-  const PetscReal s = PetscSinReal(angle);
-  const PetscReal v = 2 * half * half;
-  const PetscReal K[9] = {0, -axis[2], axis[1], axis[2], 0, -axis[0], -axis[1], axis[0], 0};
-  PetscReal K2[9];
-
-  SbMatMul(K, K, K2);
-  *pose = (SbPose){.c = {c[0], c[1], c[2]},
-                   .d = {d[0], d[1], d[2]},
-                   .axis = {axis[0], axis[1], axis[2]},
-                   .angle = angle};
-  for (int k = 0; k < 9; k++)
-    pose->R[k] = (k % 4 == 0) + s * K[k] + v * K2[k];
-}
-
-void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
-               PetscReal way[3])
-{
-  PetscReal arm[3];
-
-  for (int i = 0; i < 3; i++)
-    arm[i] = x[i] - at->c[i] - at->d[i];
-  SbCross(at->axis, arm, way);
-  for (int i = 0; i < 3; i++)
-    way[i] = (to->angle - from->angle) * way[i] + to->d[i] - from->d[i];
-}
-
-void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3])
-{
-  const PetscReal r[3] = {X[0] - pose->c[0], X[1] - pose->c[1], X[2] - pose->c[2]};
-
-  for (int i = 0; i < 3; i++)
-    x[i] = pose->c[i] + SbDot3(pose->R + 3 * i, r) + pose->d[i];
-}
-
-void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3])
-{
-  PetscReal r[3];
-
-  for (int i = 0; i < 3; i++)
-    r[i] = x[i] - pose->c[i] - pose->d[i];
-  for (int i = 0; i < 3; i++)
-    X[i] = pose->c[i] + pose->R[i] * r[0] + pose->R[3 + i] * r[1] + pose->R[6 + i] * r[2];
 }

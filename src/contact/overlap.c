@@ -16,7 +16,7 @@
   For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all
   of it.
 */
-#include "contact_mesh.h"
+#include "pairs.h"
 #include "sbgeometry.h"
 
 #define CANCEL 1e-3 /* relative length below which a sum of directions counts as zero */
@@ -53,7 +53,7 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
 }
 
 /* Whether an edge intersects a triangle. */
-static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edge, PetscInt t)
+static PetscBool goes_through(SbContactSurface m, const PetscReal x[], PetscInt edge, PetscInt t)
 {
   const PetscInt *e = m->edge + 2 * edge;
   const PetscInt *v = m->triangle + 3 * t;
@@ -82,7 +82,7 @@ static PetscBool goes_through(SbContactMesh m, const PetscReal x[], PetscInt edg
 
 /* Edges that intersect triangles of another body, or of the same one (m->self): hit[n][2], edge and
    triangle, ascending, of all ranks on each; the caller frees it. Collective. */
-static PetscErrorCode find_crossings(SbContactMesh m, const PetscReal x[], PetscInt *n,
+static PetscErrorCode find_crossings(SbContactSurface m, const PetscReal x[], PetscInt *n,
                                      PetscInt **hits)
 {
   PetscInt nmine = 0;
@@ -148,7 +148,7 @@ static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, c
 
 /* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle;
    signed distance of the edge's first end, m. */
-static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t,
+static PetscReal pierce(SbContactSurface m, const PetscReal x[], PetscInt e, PetscInt t,
                         PetscReal n[3], PetscReal *first)
 {
   const PetscInt *v = m->triangle + 3 * t;
@@ -168,7 +168,7 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 
 /* Adds a point at p with its other side, the triangle of the penetrated body that the ray along the
    separation direction leaves through, if there is any. */
-static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree,
+static PetscErrorCode add_inside(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
                                  PetscInt part, PetscReal depth, const PetscReal p[3],
                                  SbPenetration *point, SbContactOverlap *o)
 {
@@ -263,7 +263,7 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
+void SbContactSurfaceNormals(SbContactSurface m, const PetscReal x[], PetscReal normal[])
 {
   for (PetscInt k = 0; k < 3 * m->nvertex; k++)
     normal[k] = 0.;
@@ -279,7 +279,7 @@ void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal
 
 /* Propagates directions from the n vertices of list[], layer by layer along edges that intersect
    nothing. */
-static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
+static void spread_ways(SbContactSurface m, Ways *w, PetscInt n, PetscInt list[])
 {
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
     /* means of the sums; a vertex whose directions cancel has none */
@@ -314,135 +314,210 @@ static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
   }
 }
 
-/* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
-static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n,
-                                  const PetscInt hit[], SbContactOverlap *o)
-{
-  Ways w = {.x = x};
-  PetscInt *list;
-  PetscInt nlist = 0;
-  PetscInt nleading = 0;
-  uint8_t *paired;
+/* Work of find_inside(): the directions, the list of vertices that have one so far, the tree of
+   triangles. */
+typedef struct {
+  Ways ways;
+  PetscInt n, *list; /* [n] */
   SbBoxTree tree;
+} Search;
+
+static PetscErrorCode begin_search(SbContactSurface m, const PetscReal x[], Search *search)
+{
+  Ways *w = &search->ways;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc7(m->nvertex, &w.in, m->nvertex, &list, 3 * m->nvertex, &w.way, m->nvertex,
-                         &w.depth, m->nvertex, &w.sum, m->nvertex, &w.layer, m->nedge, &w.through));
-  PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
-  SbContactMeshNormals(m, x, w.normal);
+  *search = (Search){.ways = {.x = x}};
+  PetscCall(PetscCalloc7(m->nvertex, &w->in, m->nvertex, &search->list, 3 * m->nvertex, &w->way,
+                         m->nvertex, &w->depth, m->nvertex, &w->sum, m->nvertex, &w->layer,
+                         m->nedge, &w->through));
+  PetscCall(PetscMalloc1(3 * m->nvertex, &w->normal));
+  SbContactSurfaceNormals(m, x, w->normal);
   for (PetscInt v = 0; v < m->nvertex; v++) {
-    (void)SbNormalise(w.normal + 3 * v);
-    w.in[v] = -1;
+    (void)SbNormalise(w->normal + 3 * v);
+    w->in[v] = -1;
   }
-  PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w.start, &w.edge));
+  PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w->start, &w->edge));
   for (PetscInt k = 0; k < 2 * m->nedge; k++)
-    w.edge[k] /= 2;
-  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
+    w->edge[k] /= 2;
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &search->tree));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
+static PetscErrorCode end_search(Search *search)
+{
+  Ways *w = &search->ways;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBoxTreeDestroy(&search->tree));
+  PetscCall(PetscFree7(w->in, search->list, w->way, w->depth, w->sum, w->layer, w->through));
+  PetscCall(PetscFree(w->normal));
+  PetscCall(PetscFree(w->start));
+  PetscCall(PetscFree(w->edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An edge enters a body at the triangle hit[0] and leaves it at hit[1]: the midpoint between both
+   is inside. */
+static PetscErrorCode add_midpoint(SbContactSurface m, const Search *search, PetscInt e,
+                                   const PetscInt hit[2], SbContactOverlap *o)
+{
+  const PetscReal *x = search->ways.x;
+  const PetscInt *ends = m->edge + 2 * e;
+  PetscReal normal[2][3], s[2], unused, p[3];
+  PetscReal chord = 0.;
+  PetscReal at;
+  SbPenetration point = {.n = 2, .v = {ends[0], ends[1]}, .area = m->edge_area[e]};
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++)
+    s[k] = pierce(m, x, e, hit[k], normal[k], &unused);
+  at = 0.5 * (s[0] + s[1]);
+  point.weight[0] = 1. - at;
+  point.weight[1] = at;
+  for (int k = 0; k < 3; k++) {
+    point.normal[k] = normal[0][k] + normal[1][k];
+    p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
+    chord += PetscSqr((s[1] - s[0]) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
+  }
+  if (SbNormalise(point.normal) > CANCEL)
+    PetscCall(add_inside(m, x, &search->tree, m->part[m->triangle[3 * hit[0]]],
+                         PetscSqrtReal(chord), p, &point, o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An edge goes through triangle t once: one of its ends is inside, and the triangle's normal leads
+   out. */
+static void mark_end(SbContactSurface m, Search *search, PetscInt e, PetscInt t,
+                     SbContactOverlap *o)
+{
+  Ways *w = &search->ways;
+  const PetscReal *x = w->x;
+  const PetscInt *ends = m->edge + 2 * e;
+  PetscReal normal[3], first, p[3];
+  const PetscReal s = pierce(m, x, e, t, normal, &first);
+  const PetscInt v = ends[first < 0. ? 0 : 1];
+
+  for (int k = 0; k < 3; k++)
+    p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k] - x[3 * v + k];
+  if (suggest(w, v, m->part[m->triangle[3 * t]],
+              1. / PetscMax(SbDot3(p, p), PetscSqr(TINY * m->size)), normal, SbDot3(p, normal)) &&
+      !w->layer[v]) {
+    w->layer[v] = 1;
+    search->list[search->n++] = v;
+  }
+  o->near[v] = SB_OVERLAP_INSIDE;
+}
+
+/* What the intersections hit[n][2] of edges and triangles show: midpoints of edges, and ends of
+   edges that are inside. */
+static PetscErrorCode read_crossings(SbContactSurface m, PetscInt n, const PetscInt hit[],
+                                     Search *search, SbContactOverlap *o)
+{
+  uint8_t *paired; /* an intersection that belongs to an earlier one */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(n, &paired));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt e = hit[2 * i];
-    const PetscInt part = m->part[m->triangle[3 * hit[2 * i + 1]]];
-    const PetscInt *ends = m->edge + 2 * e;
-    PetscReal normal[3], other[3], first, p[3];
-    const PetscReal s = pierce(m, x, e, hit[2 * i + 1], normal, &first);
+    const PetscInt t = hit[2 * i + 1];
     PetscInt j = i + 1;
 
-    w.through[e] = 1;
+    search->ways.through[e] = 1;
     for (int k = 0; k < 5; k++) {
-      const PetscInt v = k < 2 ? ends[k] : m->triangle[3 * hit[2 * i + 1] + k - 2];
+      const PetscInt v = k < 2 ? m->edge[2 * e + k] : m->triangle[3 * t + k - 2];
 
       o->near[v] = PetscMax(o->near[v], SB_OVERLAP_INTERSECTED);
     }
     if (paired[i])
       continue;
 
-    /* it leaves the same body again: the midpoint between both intersections is inside */
+    /* whether the edge leaves the same body again */
     while (j < n && hit[2 * j] == e &&
-           (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part))
+           (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != m->part[m->triangle[3 * t]]))
       j++;
     if (j < n && hit[2 * j] == e) {
-      PetscReal unused;
-      PetscReal chord = 0.;
-      const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused);
-      const PetscReal at = 0.5 * (s + s2);
-      SbPenetration point = {
-        .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
-
       paired[j] = 1;
-      for (int k = 0; k < 3; k++) {
-        point.normal[k] = normal[k] + other[k];
-        p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
-        chord += PetscSqr((s2 - s) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
-      }
-      if (SbNormalise(point.normal) <= CANCEL)
-        continue;
-      PetscCall(add_inside(m, x, &tree, part, PetscSqrtReal(chord), p, &point, o));
-    } else { /* or one of its ends is inside */
-      const PetscInt v = ends[first < 0. ? 0 : 1];
-
-      for (int k = 0; k < 3; k++)
-        p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k] - x[3 * v + k];
-      if (suggest(&w, v, part, 1. / PetscMax(SbDot3(p, p), PetscSqr(TINY * m->size)), normal,
-                  SbDot3(p, normal)) &&
-          !w.layer[v]) {
-        w.layer[v] = 1;
-        list[nlist++] = v;
-      }
-      o->near[v] = SB_OVERLAP_INSIDE;
-    }
+      PetscCall(add_midpoint(m, search, e, (const PetscInt[2]){t, hit[2 * j + 1]}, o));
+    } else
+      mark_end(m, search, e, t, o);
   }
-  spread_ways(m, &w, nlist, list);
+  PetscCall(PetscFree(paired));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-  for (PetscInt v = 0; v < m->nvertex; v++) {
-    SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
+/* Vertices joined to an inside one by an edge that intersects nothing are inside, too. */
+static void spread_inside(SbContactSurface m, Search *search, SbContactOverlap *o)
+{
+  const Ways *w = &search->ways;
+  PetscInt *list = search->list;
+  PetscInt n = 0;
 
-    if (!w.layer[v] || SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.)
-      continue;
-    PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
-    PetscCall(add_inside(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, o));
-  }
-
-  /* vertices joined to an inside one by an edge that intersects nothing are inside, too */
-  nlist = 0;
   for (PetscInt v = 0; v < m->nvertex; v++)
     if (o->near[v] == SB_OVERLAP_INSIDE)
-      list[nlist++] = v;
-  for (PetscInt k = 0; k < nlist; k++) {
-    for (PetscInt j = w.start[list[k]]; j < w.start[list[k] + 1]; j++) {
-      const PetscInt *e = m->edge + 2 * w.edge[j];
+      list[n++] = v;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = w->start[list[k]]; j < w->start[list[k] + 1]; j++) {
+      const PetscInt *e = m->edge + 2 * w->edge[j];
       const PetscInt to = e[0] == list[k] ? e[1] : e[0];
 
-      if (w.through[w.edge[j]] || o->near[to] == SB_OVERLAP_INSIDE)
+      if (w->through[w->edge[j]] || o->near[to] == SB_OVERLAP_INSIDE)
         continue;
       o->near[to] = SB_OVERLAP_INSIDE;
-      list[nlist++] = to;
+      list[n++] = to;
     }
   }
+}
 
-  /* keep those whose own outward normal opposes the direction, if there are any */
+/* Keeps the points whose own outward normal opposes the direction, if there are any. */
+static void keep_opposed(const PetscReal normal[], SbContactOverlap *o)
+{
+  PetscInt nleading = 0;
+
   for (PetscInt i = 0; i < o->n; i++) {
     const SbPenetration p = o->point[i];
-    PetscReal normal[3] = {0.};
+    PetscReal own[3] = {0.};
 
     for (PetscInt k = 0; k < p.n && p.weight[k] > 0.; k++)
       for (int j = 0; j < 3; j++)
-        normal[j] += p.weight[k] * w.normal[3 * p.v[k] + j];
-    if (SbDot3(normal, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(normal, normal)))
+        own[j] += p.weight[k] * normal[3 * p.v[k] + j];
+    if (SbDot3(own, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(own, own)))
       o->point[nleading++] = p;
   }
   if (nleading)
     o->n = nleading;
+}
 
-  PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree7(w.in, list, w.way, w.depth, w.sum, w.layer, w.through));
-  PetscCall(PetscFree2(paired, w.normal));
-  PetscCall(PetscFree(w.start));
-  PetscCall(PetscFree(w.edge));
+/* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
+static PetscErrorCode find_inside(SbContactSurface m, const PetscReal x[], PetscInt n,
+                                  const PetscInt hit[], SbContactOverlap *o)
+{
+  Search search;
+  const Ways *w = &search.ways;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_search(m, x, &search));
+  PetscCall(read_crossings(m, n, hit, &search, o));
+
+  /* directions and depths of the vertices inside */
+  spread_ways(m, &search.ways, search.n, search.list);
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
+
+    if (!w->layer[v] || SbDot3(w->way + 3 * v, w->way + 3 * v) == 0. || w->depth[v] <= 0.)
+      continue;
+    PetscCall(PetscArraycpy(point.normal, w->way + 3 * v, 3));
+    PetscCall(add_inside(m, x, &search.tree, w->in[v], w->depth[v], x + 3 * v, &point, o));
+  }
+
+  spread_inside(m, &search, o);
+  keep_opposed(w->normal, o);
+  PetscCall(end_search(&search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A feature that penetrates a half-space, bowl, sphere or capsule. */
-static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbContactPair *pair,
+static PetscErrorCode add_behind(SbContactSurface m, const PetscReal x[], const SbContactPair *pair,
                                  SbContactOverlap *o)
 {
   SbPenetration point = {.n = 0, .area = pair->area};
@@ -473,7 +548,7 @@ static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContactOverlap *o)
+static PetscErrorCode find_behind(SbContactSurface m, const PetscReal x[], SbContactOverlap *o)
 {
   const PetscInt first = m->nbody_vertex;
 
@@ -507,7 +582,7 @@ static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscBool inside,
+PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *o)
 {
   PetscInt n, *hit;
@@ -571,8 +646,8 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, const PetscReal x[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2],
-                                     PetscBool *found)
+PetscErrorCode SbContactSurfaceIsInside(SbContactSurface m, const PetscReal x[], PetscInt body[2],
+                                        PetscBool *found)
 {
   const SbMesh mesh = m->space->mesh;
   const PetscInt nbody = mesh->nbody;

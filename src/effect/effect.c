@@ -104,8 +104,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCheck(e->from < e->until, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-effect_%s_from %g s is not before -effect_%s_until %g s", name, (double)e->from,
              name, (double)e->until);
-  PetscCheck((e->ops.force || e->ops.prescribe) && !e->ops.begin_step && !e->ops.hessian,
-             PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck((e->ops.force || e->ops.prescribe) && !e->contact, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-effect_%s_from and _until are for loads, fixed and prescribed_displacement: effects "
              "of type %s "
              "act all the time",

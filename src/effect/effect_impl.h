@@ -10,13 +10,6 @@
 PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
                                 PetscBool position, SbFormula formulas[]);
 
-/* A path given by the options displacement, angle, axis and axis_point; formulas as above. */
-typedef struct {
-  SbFormula displacement[3], angle; /* m, degrees */
-  PetscReal axis[3], point[3];      /* unit vector; m */
-} SbPath;
-PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, SbPath *path);
-
 /*
   Items of the named sets on this rank, each once even when it is in several of the sets.
   Collective; the caller releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on

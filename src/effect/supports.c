@@ -21,7 +21,7 @@
   scenario counts.
 */
 #include "effect_impl.h"
-#include "sbcontact.h"
+#include "sbgeometry.h"
 
 #define COMPONENTS "x|y|z|xy|yz|xz|xyz"
 

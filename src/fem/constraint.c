@@ -483,3 +483,15 @@ void SbConstraintsAddTangent(SbSpace s, const PetscReal x[], PetscReal y[])
       y[3 * node + k] += SbDot3(block + 3 * k, x + 3 * node);
   }
 }
+
+void SbSpaceSetPrescribed(SbSpace s, PetscScalar u[])
+{
+  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
+    const PetscInt node = s->fixed_node[k / 3];
+
+    if (s->fixed[node] & (1 << k % 3))
+      u[3 * node + k % 3] = s->fixed_value[k];
+  }
+  if (s->constraints)
+    SbConstraintsPrescribe(s, PETSC_FALSE, u);
+}

@@ -392,9 +392,10 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
 {
   PetscFunctionBeginUser;
   PetscCall(DMDestroy(&s->dm));
-  if (!s->vertices) {
-    PetscCall(PetscFree(s->gnode));
+  if (!s->vertices)
     PetscCall(PetscFree(s->cell_node));
+  if (!s->vertices || s->own_nodes) {
+    PetscCall(PetscFree(s->gnode));
     PetscCall(PetscFree4(s->node_x, s->node_body, s->node_set, s->node_orig));
   }
   PetscCall(PetscFree(s->edge_node));

@@ -11,7 +11,7 @@
 #include "fem_impl.h"
 #include "sblog.h"
 
-/* Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight).
+/* Cliques of nodes in lanes: those of the cells (width nodes each) or of the faces (eight).
    The slot of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the
    group that they repeat. */
 typedef struct {
@@ -27,6 +27,54 @@ static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
+/* Number of nodes of a coupling. */
+static inline PetscInt group_size(SbSpace s, PetscInt c)
+{
+  return s->couplings.start[c + 1] - s->couplings.start[c];
+}
+
+/* Couplings around each owned node: around[nnode_owned+1] into at_group, entries of couplings.node,
+   and group_of each entry; room for the positions of their blocks. The caller frees the arrays. */
+static PetscErrorCode plan_couplings(SbSpace s, SbPlan p, PetscInt **around, PetscInt **at_group,
+                                     PetscInt **group_of)
+{
+  const SbCouplings *g = &s->couplings;
+  PetscInt total = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBucketByKey(g->start[g->n], g->node, s->nnode_owned, around, at_group));
+  PetscCall(PetscMalloc1(g->start[g->n], group_of));
+  for (PetscInt c = 0; c < g->n; c++)
+    total += PetscSqr(group_size(s, c));
+  PetscCall(PetscMalloc2(g->n, &p->coupling_start, total, &p->coupling));
+  total = 0;
+  for (PetscInt c = 0; c < g->n; c++) {
+    for (PetscInt e = g->start[c]; e < g->start[c + 1]; e++)
+      (*group_of)[e] = c;
+    p->coupling_start[c] = total;
+    for (PetscInt e = 0; e < PetscSqr(group_size(s, c)); e++)
+      p->coupling[total++] = SB_NOT_OWNED;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sorts the ghosts among n local nodes, which are ascending, by their global numbers. */
+static PetscErrorCode sort_ghosts(SbSpace s, PetscInt n, PetscInt column[])
+{
+  PetscInt first = 0;
+  PetscInt *gnode;
+
+  PetscFunctionBeginUser;
+  while (column[first] < s->nnode_owned)
+    first++;
+  PetscCall(PetscMalloc1(n - first, &gnode));
+  for (PetscInt k = first; k < n; k++)
+    gnode[k - first] = s->gnode[column[k]];
+  PetscCall(PetscSortIntWithArray(n - first, gnode, column + first));
+  PetscCall(PetscFree(gnode));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -37,6 +85,10 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   PetscInt widest = 1;
   PetscInt capacity = nrow;
   PetscInt nfresh = 0;
+  PetscInt *around = NULL; /* [nnode_owned+1] offsets into `at_group`: entries of couplings.node of
+                              each owned node */
+  PetscInt *at_group = NULL;
+  PetscInt *group_of = NULL; /* [couplings.start[n]] the coupling of an entry */
   Groups group[2] = {{.node = s->batch_clique, .nodes = w}, {.nodes = 8}};
   SbPlan p;
 
@@ -52,12 +104,18 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     PetscCall(SbBucketByKey(g->nodes * SB_BATCH * nbatch, g->node, nrow, &g->start, &g->slot));
   }
 
+  // the groups of nodes that effects couple
+  if (s->couplings.n)
+    PetscCall(plan_couplings(s, p, &around, &at_group, &group_of));
+
   // upper bound for the graph: a node shares each group with all its other nodes
   for (PetscInt i = 0; i < nrow; i++) {
     PetscInt most = 1;
 
     for (PetscInt k = 0; k < ngroup; k++)
       most += (group[k].nodes - 1) * (group[k].start[i + 1] - group[k].start[i]);
+    for (PetscInt k = around ? around[i] : 0; around && k < around[i + 1]; k++)
+      most += group_size(s, group_of[at_group[k]]) - 1;
     widest = PetscMax(widest, most);
     capacity += most - 1;
   }
@@ -90,8 +148,22 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
       }
     }
 
-    // sort in local order: ghosts are sorted by global number, so each part is in global order
+    for (PetscInt k = around ? around[i] : 0; around && k < around[i + 1]; k++) {
+      const PetscInt c = group_of[at_group[k]];
+
+      for (PetscInt e = s->couplings.start[c]; e < s->couplings.start[c + 1]; e++) {
+        if (seen[s->couplings.node[e]] == i)
+          continue;
+        seen[s->couplings.node[e]] = i;
+        column[n++] = s->couplings.node[e];
+      }
+    }
+
+    // sort in local order: ghosts are sorted by global number, so each part is in global order, but
+    // for ghosts of couplings alone
     PetscCall(PetscSortInt(n, column));
+    if (around && n && column[n - 1] >= s->nnode_cell)
+      PetscCall(sort_ghosts(s, n, column));
 
     // the row of the graph: owned columns in the diagonal part, ghosts in the off-diagonal part
     for (PetscInt k = 0; k < n; k++) {
@@ -116,6 +188,17 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 
       for (PetscInt b = 0; b < w * SB_BATCH; b += SB_BATCH)
         offset[b] = position[node[b]];
+    }
+
+    // and those of the blocks of its couplings
+    for (PetscInt k = around ? around[i] : 0; around && k < around[i + 1]; k++) {
+      const PetscInt c = group_of[at_group[k]];
+      const PetscInt size = group_size(s, c);
+      const PetscInt *node = s->couplings.node + s->couplings.start[c];
+      const PetscInt a = at_group[k] - s->couplings.start[c];
+
+      for (PetscInt b = 0; b < size; b++)
+        p->coupling[p->coupling_start[c] + size * a + b] = position[node[b]];
     }
   }
   if (s->jump) {
@@ -142,6 +225,9 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     PetscCall(PetscFree(group[k].start));
     PetscCall(PetscFree(group[k].slot));
   }
+  PetscCall(PetscFree(around));
+  PetscCall(PetscFree(at_group));
+  PetscCall(PetscFree(group_of));
   PetscCall(PetscFree3(seen, position, column));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -155,6 +241,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree4(p->di, p->dj, p->oi, p->oj));
   PetscCall(PetscFree2(p->diagonal, p->offset));
+  PetscCall(PetscFree2(p->coupling_start, p->coupling));
   PetscCall(PetscFree2(p->ui, p->upper));
   PetscCall(PetscFree2(p->face_term[0], p->face_term[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));

@@ -174,6 +174,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   s->element = element;
   s->material = material;
   PetscCall(SbLayoutNodes(s));
+  s->nnode_cell = s->nnode;
   PetscCall(find_regions(s));
   PetscCall(tabulate_batches(s));
   PetscCall(SbLayoutCliques(s));
@@ -241,6 +242,8 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(SbLayoutDestroy(s));
   PetscCall(PetscFree(s->batch_clique));
   PetscCall(PetscFree(s->batch_weight));
+  PetscCall(PetscFree(s->couplings.start));
+  PetscCall(PetscFree(s->couplings.node));
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));
   PetscCall(PetscFree(s->batch_memory));
@@ -267,7 +270,7 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
     sums[0] += s->node_mass[i];
   }
   for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++)
-    PetscCheck(s->gnode[i] > s->gnode[i - 1], PETSC_COMM_SELF, PETSC_ERR_PLIB,
+    PetscCheck(s->gnode[i] > s->gnode[i - 1] || i == s->nnode_cell, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Ghost nodes are not sorted");
   for (PetscInt b = 0; b < s->nbatch_owned; b++)
     for (PetscInt l = 0; l < SB_BATCH; l++)

@@ -128,9 +128,9 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
   if (!(error > 0.))
     PetscFunctionReturn(PETSC_SUCCESS);
   if (error < ROOM * allowed) {
-    PetscCall(SbModelScaleBarrierWidths(l->run->model, PetscMin(3., AIM * allowed / error),
-                                        step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL,
-                                        &changed));
+    PetscCall(SbContactSetScaleWidths(&l->run->model->contacts, PetscMin(3., AIM * allowed / error),
+                                      step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL,
+                                      &changed));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (error <= allowed)
@@ -143,7 +143,7 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
     l->mesh_bounds = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbModelScaleBarrierWidths(l->run->model, AIM * allowed / error, 0., &changed));
+  PetscCall(SbContactSetScaleWidths(&l->run->model->contacts, AIM * allowed / error, 0., &changed));
   l->narrowed += changed;
   l->width_bounds = (PetscBool)(l->width_bounds || !changed);
   *again = (PetscBool)(*again || changed);
@@ -164,7 +164,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
     PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
     l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
   }
-  if (step->solved && run->model->npotential)
+  if (step->solved && run->model->contacts.npotential)
     PetscCall(update_widths(l, step, again));
   if (!l->may_tune || !step->solved)
     PetscFunctionReturn(PETSC_SUCCESS);

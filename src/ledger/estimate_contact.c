@@ -8,7 +8,7 @@
   stiffness to theirs; the elastic energy of delta is that of the error.
 
   The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n
-  (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the
+  (src/contact/barrier_terms.c) is the error of the state. In a dynamic run K includes inertia: the
   error is relative to the same step without gaps.
 */
 #include "ledger_impl.h"
@@ -43,7 +43,7 @@ PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *er
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &F));
-  PetscCall(SbModelGapForces(l->run->model, U, F, &energy));
+  PetscCall(SbContactSetGapForces(&l->run->model->contacts, U, F, &energy));
   if (energy > PetscSqr(enough)) {
     PetscCall(moved_energy(l, U, F, &strained));
     energy = PetscMin(energy, strained);
@@ -61,26 +61,26 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
   SbContactPoints list = {0};
 
   PetscFunctionBeginUser;
-  if (m->npotential) {
+  if (m->contacts.npotential) {
     PetscCall(SbEstimateGaps(l, step->U, 0., error));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
   /* half the force times gap of all points, J */
   energy = 0.;
-  PetscCall(SbModelContactPoints(m, step->t, step->U, &list));
+  PetscCall(SbContactSetPoints(&m->contacts, step->t, step->U, &list));
   for (PetscInt i = 0; i < list.n; i++)
     energy +=
       0.5 * PetscAbsReal(list.point[i].gap * SbDot3(list.point[i].force, list.point[i].normal));
   PetscCall(PetscFree(list.point));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &energy, 1, MPIU_REAL, MPI_SUM, m->comm));
-  for (PetscInt e = 0; e < m->nbegin_step; e++)
-    springs = (PetscBool)(springs || m->begin_step[e]->springs);
+  for (PetscInt e = 0; e < m->contacts.nactive_set; e++)
+    springs = (PetscBool)(springs || m->contacts.active_set[e]->springs);
   if (springs && !m->dynamic && energy > 0.) {
     Vec F;
 
     PetscCall(VecDuplicate(step->U, &F));
-    PetscCall(SbModelContactForce(m, step->t, step->U, F));
+    PetscCall(SbContactSetForce(&m->contacts, step->t, step->U, F));
     PetscCall(moved_energy(l, step->U, F, &strained));
     PetscCall(VecDestroy(&F));
     energy = PetscMin(energy, strained);

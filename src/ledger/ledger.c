@@ -176,7 +176,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscCall(PetscArraycpy(l->space_error, l->space->body2, m->nbody));
     l->error[SB_ERROR_SPACE] =
       PetscMax(m->dynamic ? l->error[SB_ERROR_SPACE] : 0., PetscSqrtReal(l->space->total2));
-    if ((m->nbegin_step || m->npotential) && step->R)
+    if ((m->contacts.nactive_set || m->contacts.npotential) && step->R)
       PetscCall(SbEstimateContact(l, step, &contact));
     l->error[SB_ERROR_CONTACT] = PetscMax(m->dynamic ? l->error[SB_ERROR_CONTACT] : 0., contact);
     l->own_work += SPACE_WORK;
@@ -280,7 +280,8 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(carry(l));
   end(l);
   run->want_energies = PETSC_TRUE;
-  if (run->model->nbegin_step || run->model->npotential || l->quantity.kind == SB_QUANTITY_REACTION)
+  if (run->model->contacts.nactive_set || run->model->contacts.npotential ||
+      l->quantity.kind == SB_QUANTITY_REACTION)
     run->want_residual = PETSC_TRUE;
   run->post_solve.fn = examine_step;
   run->post_solve.ctx = l;

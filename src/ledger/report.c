@@ -167,12 +167,12 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
     SbAppend(
       ROOM, w,
       "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
-      m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
+      m->body[body].name, m->contacts.nactive_set || m->contacts.npotential ? "cr" : "p2 (or cr)");
     return;
   }
 
   /* solutions are not smooth at the boundary of a contact area */
-  if (m->nbegin_step || m->npotential || times >= cost_of_half)
+  if (m->contacts.nactive_set || m->contacts.npotential || times >= cost_of_half)
     return;
   SbAppend(ROOM, w,
            "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it "

@@ -127,3 +127,42 @@ PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, Pets
   *ninverted = (PetscInt)sum[1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbModelStepSpeed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V,
+                                PetscReal *speed)
+{
+  const SbSpace s = m->space;
+  SbEvaluation at = {.U = U, .V = V};
+  PetscReal load = 0.;
+  PetscReal *f;
+  SbEnergies energies;
+
+  PetscFunctionBeginUser;
+  *speed = 0.;
+  if (!V)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbModelEnergies(m, U, V, &energies));
+  if (PetscIsInfOrNanReal(energies.strain))
+    energies.strain = 0.;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbEvaluationBegin(m, t + dt, &at));
+  PetscCall(SbModelExternalForces(m, &at.stage, PETSC_TRUE, 1., f));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+
+  /* support forces: internal forces at prescribed nodes */
+  if (m->nprescribe) {
+    PetscCall(PetscArrayzero(f, 3 * s->nnode));
+    PetscCall(SbSpaceAddInternalForce(s, &at.stage, f));
+    for (PetscInt i = 0; i < s->nnode_owned; i++)
+      if (s->fixed[i])
+        load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  }
+  PetscCall(SbEvaluationEnd(m, &at));
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &load, 1, MPIU_REAL, MPI_SUM, m->comm));
+  *speed = PetscSqrtReal(
+    (2. * (energies.kinetic + energies.strain) + load * SbBodySmallest(m->nbody, m->body)) /
+    m->mass);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

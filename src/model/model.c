@@ -20,6 +20,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
     PetscCall(SbEffectDestroy(&m->effect[e]));
   PetscCall(PetscFree(m->effect));
   PetscCall(PetscFree(m->lists));
+  PetscCall(SbContactSetDestroy(&m->contacts));
   PetscCall(SbSpaceDestroy(&m->space));
   PetscCall(SbMeshDestroy(&m->mesh));
   for (PetscInt k = 0; k < m->nmaterial; k++)
@@ -92,7 +93,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 
 /* Lists of the effects that have an operation, in scenario order, one after the other in
    m->lists. */
-#define NLIST 12
+#define NLIST 6
 #define SORT_INTO_LIST(m, op)                                        \
   do {                                                               \
     PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST"); \
@@ -107,6 +108,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
   PetscInt nlist = 0;
+  PetscBool coupled = PETSC_FALSE;
   PetscBool validate;
   SbEffect *list;
 
@@ -143,6 +145,16 @@ PetscErrorCode SbModelSetUp(SbModel m)
   m->load = 1.;
   m->linear = m->space->linear;
 
+  /* nodes that effects couple, before arrays over nodes are made */
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (!m->effect[e]->ops.couplings)
+      continue;
+    SbEffectCall(m->effect[e], couplings, m->space);
+    coupled = PETSC_TRUE;
+  }
+  if (coupled)
+    PetscCall(SbSpaceCoupleDone(m->space));
+
   /* supports first: other effects need the prescribed unknowns */
   for (PetscInt k = 0; k < 2 * m->neffect; k++) {
     SbEffect effect = m->effect[k % m->neffect];
@@ -158,17 +170,12 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(PetscMalloc1(NLIST * m->neffect, &m->lists));
   list = m->lists;
   SORT_INTO_LIST(m, prescribe);
-  SORT_INTO_LIST(m, begin_step);
-  SORT_INTO_LIST(m, assemble_constraints);
-  SORT_INTO_LIST(m, update_active_set);
-  SORT_INTO_LIST(m, time_of_impact);
-  SORT_INTO_LIST(m, restitution);
-  SORT_INTO_LIST(m, potential);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, nonsymmetric);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
+  PetscCall(SbContactSetCreate(m->space, m->neffect, m->effect, &m->contacts));
   for (PetscInt i = 0; i < m->space->nnode_owned; i++)
     mass += m->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(&mass, &m->mass, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -253,7 +260,7 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
     for (PetscInt i = 0; i < n; i++)
       f[i] *= m->load;
   for (PetscInt e = 0; e < m->nforce; e++)
-    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential) &&
+    if (!m->force[e]->steady && !(apart && SbEffectHasPotential(m->force[e])) &&
         SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
   if (sign != 1.)
@@ -369,14 +376,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
     if (!m->prescribe[e]->steady)
       SbEffectCall(m->prescribe[e], prescribe, s, t);
   PetscCall(VecGetArray(U, &u));
-  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
-    const PetscInt node = s->fixed_node[k / 3];
-
-    if (s->fixed[node] & (1 << k % 3))
-      u[3 * node + k % 3] = s->fixed_value[k];
-  }
-  if (s->constraints)
-    SbConstraintsPrescribe(s, PETSC_FALSE, u);
+  SbSpaceSetPrescribed(s, u);
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

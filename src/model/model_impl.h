@@ -4,9 +4,6 @@
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c: energy check of a converged active set; `again`: coefficients were reduced.
-   Collective. */
-PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1,
    and f[nnode][3], zero, of F; V, A and F may be NULL. Collective. */
 typedef struct {

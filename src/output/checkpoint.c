@@ -219,7 +219,7 @@ static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *su
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
   if (!sum)
-    PetscCall(SbModelContactResume(m));
+    PetscCall(SbContactSetResume(&m->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

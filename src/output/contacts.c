@@ -63,7 +63,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
-  PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
+  PetscCall(SbContactSetPoints(&run->model->contacts, step->t, step->U, &c->list));
 
   /* Sends this rank's contact points to the ranks of their slices; sorts the received ones. */
   for (PetscInt i = 0; i < c->list.n; i++)

@@ -59,10 +59,10 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(step->U, &x));
   if (!strcmp(f->name, "contact_force")) {
-    PetscCall(SbModelContactForce(run->model, step->t, step->U, x));
+    PetscCall(SbContactSetForce(&run->model->contacts, step->t, step->U, x));
     PetscCall(SbPointsForces(run, out, PETSC_FALSE, x, values));
   } else {
-    PetscCall(SbModelContactGap(run->model, step->t, step->U, x));
+    PetscCall(SbContactSetGap(&run->model->contacts, step->t, step->U, x));
     PetscCall(SbPointsValues(run, out, x, values));
   }
   PetscCall(VecDestroy(&x));

@@ -104,7 +104,7 @@ static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, Pe
   out->line.within = now;
   if (run->ts)
     PetscCall(TSGetTimeStep(run->ts, &dt));
-  if (run->model->nbegin_step)
+  if (run->model->contacts.nactive_set)
     (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
   if (linear >= 0)
     (void)snprintf(solve, sizeof(solve), ", linear iteration %" PetscInt_FMT, linear);

@@ -222,6 +222,6 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     PetscCall(PetscFree(records));
   }
   PetscCall(SbSpaceRestoreLocalRead(b->space, to->U, &u));
-  PetscCall(SbModelContactResume(b));
+  PetscCall(SbContactSetResume(&b->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

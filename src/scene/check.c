@@ -90,8 +90,9 @@ PetscErrorCode SbSceneCheck(SbModel model)
 
   PetscFunctionBeginUser;
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
-    constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
-                              (model->effect[e]->ops.potential && model->effect[e]->springs));
+    constrained =
+      (PetscBool)(model->effect[e]->ops.prescribe ||
+                  (SbEffectHasPotential(model->effect[e]) && model->effect[e]->contact->springs));
   for (PetscInt i = 0; i < model->nbody; i++) {
     if (strncmp(model->body[i].mesh, "box:", 4))
       PetscCall(check_mesh_file(model->comm, &model->body[i]));

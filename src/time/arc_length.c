@@ -252,15 +252,15 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->nbegin_step  ? m->begin_step[0]->name
-                     : m->npotential ? m->potential[0]->name
-                                     : "";
+  const char *name = m->contacts.nactive_set  ? m->contacts.active_set[0]->effect->name
+                     : m->contacts.npotential ? m->contacts.potential[0]->effect->name
+                                              : "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
   PetscCheck(
-    !m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
+    !m->contacts.nactive_set && !m->contacts.npotential, m->comm, PETSC_ERR_USER_INPUT,
     "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
     "dynamic run with damping",
     name);

@@ -72,7 +72,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   Aim aim;
 
   PetscFunctionBeginUser;
-  if (!m->nbegin_step) {
+  if (!m->contacts.nactive_set) {
     PetscCall(solve(run, U, reason));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -85,7 +85,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, NULL, NULL));
 
   /* the initial active set */
-  PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->V, U));
+  PetscCall(SbContactSetStartActiveSet(&m->contacts, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
 
@@ -118,13 +118,10 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     run->contact_round = round;
     PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
     m->space->rough = rough;
-    PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->R, &again));
+    PetscCall(SbContactSetUpdateActiveSet(&m->contacts, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
       /* the first time of impact, if the step may end there */
-      for (PetscInt e = 0; e < m->ntime_of_impact; e++)
-        SbEffectCall(m->time_of_impact[e], time_of_impact, &run->time_of_impact);
-      PetscCallMPI(
-        MPI_Allreduce(MPI_IN_PLACE, &run->time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
+      PetscCall(SbContactSetTimeOfImpact(&m->contacts, &run->time_of_impact));
       if (run->time_of_impact < APART || run->time_of_impact > 1. - APART)
         run->time_of_impact = 1.;
       if (run->time_of_impact < 1.)

@@ -3,10 +3,10 @@
   work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
   change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
   times angle); damping dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own
-  work (src/effect/barrier.c), as the energy of its gaps may change much in a step. The rest of the
-  difference between the energies at the start and now was dissipated (negative: added) by the
-  integrator. A stable implicit one adds little; if one adds most of the energy, it is unstable, and
-  the run means nothing from there on.
+  work (src/contact/response_barrier.c), as the energy of its gaps may change much in a step. The
+  rest of the difference between the energies at the start and now was dissipated (negative: added)
+  by the integrator. A stable implicit one adds little; if one adds most of the energy, it is
+  unstable, and the run means nothing from there on.
 */
 #include "time_impl.h"
 
@@ -47,10 +47,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
 
   /* loads without barrier contact, which has its own work */
-  if (m->npotential)
-    PetscCall(SbModelPotentialGradient(m, run->U, 1., PETSC_FALSE, NULL, loads));
-  for (PetscInt k = 0; k < m->npotential; k++)
-    own[0] += m->potential[k]->work;
+  if (m->contacts.npotential)
+    PetscCall(SbContactSetGradient(&m->contacts, run->U, 1., PETSC_FALSE, NULL, loads));
+  own[0] += SbContactSetWork(&m->contacts);
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped)
     PetscCall(SbModelDampingPower(m, run->U, run->V, &power));

@@ -187,8 +187,9 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
              "same method");
   for (PetscInt e = 0; e < model->neffect; e++) {
-    r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
-    barrier = (PetscBool)(barrier || model->effect[e]->ops.hessian);
+    r->saddle =
+      (PetscBool)(r->saddle || (model->effect[e]->contact && model->effect[e]->contact->saddle));
+    barrier = (PetscBool)(barrier || SbEffectHasPotential(model->effect[e]));
   }
   if (r->saddle)
     PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->saddle_choice));
@@ -206,8 +207,8 @@ static SbMethodSettings method_settings(SbRun run)
   const PetscReal m = (2. - r) / (1. + r);
   const PetscReal f = 1. / (1. + r);
   const PetscReal *n = run->newmark;
-  const PetscBool impulses = (PetscBool)(run->model->nbegin_step > 0);
-  const PetscBool separate = (PetscBool)(run->model->npotential > 0);
+  const PetscBool impulses = (PetscBool)(run->model->contacts.nactive_set > 0);
+  const PetscBool separate = (PetscBool)(run->model->contacts.npotential > 0);
   SbMethodSettings set = {.method = SB_METHOD_EULER_IMPLICIT, .alpha_m = 1., .alpha_f = 1.};
 
   if (run->preset == SB_TIME_NEWMARK)
@@ -440,7 +441,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetApplicationContext(run->ts, run));
   PetscCall(TSSetPostStep(run->ts, after_step));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
-  m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
+  m->barrier_apart = (PetscBool)(m->contacts.npotential && run->preset != SB_TIME_EULER_IMPLICIT);
   if (m->barrier_apart)
     run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
   if (run->preset != SB_TIME_ALPHA2)
@@ -459,13 +460,14 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   const char *name;
 
   PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->neffect; e++)
+  for (PetscInt k = 0; k < m->contacts.n; k++)
     PetscCheck(
-      !m->effect[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
+      m->contacts.contact[k]->restitution <= 0. || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
+      PETSC_ERR_USER_INPUT,
       "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
-      m->effect[e]->name);
-  if (m->npotential) {
-    name = m->potential[0]->name;
+      m->contacts.contact[k]->effect->name);
+  if (m->contacts.npotential) {
+    name = m->contacts.potential[0]->effect->name;
     PetscCheck(
       implicit, m->comm, PETSC_ERR_USER_INPUT,
       "-effect_%s_response barrier needs -time euler_implicit, newmark, genalpha or static", name);
@@ -473,20 +475,20 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
                m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped",
                name);
-    PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
+    PetscCheck(!m->contacts.nactive_set, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_response barrier and -effect_%s_response of another kind do not go "
                "together: give "
                "both the same",
-               name, m->begin_step[0]->name);
+               name, m->contacts.active_set[0]->effect->name);
     PetscCheck(
       matrix, m->comm, PETSC_ERR_USER_INPUT,
       "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
       "cg_two_level",
       run->solver, name);
   }
-  if (!m->nbegin_step)
+  if (!m->contacts.nactive_set)
     PetscFunctionReturn(PETSC_SUCCESS);
-  name = m->begin_step[0]->name;
+  name = m->contacts.active_set[0]->effect->name;
   PetscCheck(implicit, m->comm, PETSC_ERR_USER_INPUT,
              "The effect %s needs several solves in a step: use -time euler_implicit, newmark, "
              "genalpha or static",
@@ -504,25 +506,26 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
       "-time newmark with the effect %s needs -mass lumped: velocities of contact are corrected "
       "node by node",
       name);
-    for (PetscInt e = 0; e < m->nbegin_step; e++)
-      PetscCheck(!m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
+    for (PetscInt e = 0; e < m->contacts.nactive_set; e++)
+      PetscCheck(!m->contacts.active_set[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
                  "-time newmark gains energy by springs and friction of the effect %s: give "
                  "-effect_%s_response "
                  "projected or multiplier and no friction, or use euler_implicit or genalpha",
-                 m->begin_step[e]->name, m->begin_step[e]->name);
+                 m->contacts.active_set[e]->effect->name, m->contacts.active_set[e]->effect->name);
   }
   PetscCheck(
-    m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+    m->dynamic || !m->contacts.ends_step, m->comm, PETSC_ERR_USER_INPUT,
     "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
     "leave it out",
-    m->ntime_of_impact ? m->time_of_impact[0]->name : "");
-  PetscCheck(run->preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+    m->contacts.ends_step ? m->contacts.ends_step->effect->name : "");
+  PetscCheck(run->preset != SB_TIME_GENALPHA || !m->contacts.ends_step, m->comm,
+             PETSC_ERR_USER_INPUT,
              "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the "
              "acceleration of a "
              "short step, in which nodes are stopped, into a long one; use euler_implicit",
-             m->ntime_of_impact ? m->time_of_impact[0]->name : "");
+             m->contacts.ends_step ? m->contacts.ends_step->effect->name : "");
   PetscCheck(
-    matrix || (!run->solver_used->matrix_free && !m->nassemble_constraints), m->comm,
+    matrix || (!run->solver_used->matrix_free && !m->contacts.nconstraint), m->comm,
     PETSC_ERR_USER_INPUT,
     "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use -solver "
     "rotated or cg_two_level",
@@ -572,7 +575,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(check_contact(run, explicit));
 
   /* the solver for barrier contact, for the log's header */
-  if (m->npotential) {
+  if (m->contacts.npotential) {
     PetscCall(SbContactSystemDescribe(run->contact_choice, reason, sizeof(reason)));
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
@@ -669,8 +672,7 @@ PetscErrorCode SbRunSolve(SbRun run)
     run->wall_start = MPI_Wtime();
   run->paused = PETSC_FALSE;
   run->seen.U = NULL;
-  if (m->npotential)
-    PetscCall(SbModelPotentialStart(m, run->t0, run->dt, run->U));
+  PetscCall(SbContactSetStart(&m->contacts, run->t0, run->dt, run->U));
   if (run->ts) {
     TSConvergedReason reason;
     PetscInt step;

@@ -38,7 +38,7 @@
 
   Barrier contact. Its Hessian is the positive part of each pair's, and after a full step the exact
   one, which alone converges superlinearly near the solution. Friction whose slip reversed is
-  treated as sticking (src/effect/barrier_forces.c), and bounded from above where p is no descent
+  treated as sticking (src/contact/barrier_terms.c), and bounded from above where p is no descent
   direction. An indefinite tangent is shifted by the least sufficient multiple of the mass matrix
   (Nocedal and Wright, algorithm 3.3) before cells are filtered: in a collapse nearly all cells have
   a negative eigenvalue but the assembled tangent has few, and filtering leads to steps of a
@@ -157,10 +157,10 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   at->psi /= PetscSqr(part);
 
   /* contact is evaluated at x */
-  if (m->npotential) {
+  if (m->contacts.npotential) {
     PetscCall(VecZeroEntries(at->contact));
-    PetscCall(
-      SbModelPotentialGradient(m, at->x, run->barrier_weight, PETSC_TRUE, &energy, at->contact));
+    PetscCall(SbContactSetGradient(&m->contacts, at->x, run->barrier_weight, PETSC_TRUE, &energy,
+                                   at->contact));
     at->gaps = run->barrier_weight * energy;
     at->psi += at->gaps;
   }
@@ -191,8 +191,8 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
 
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
-  if (m->npotential) {
-    PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
+  if (m->contacts.npotential) {
+    PetscCall(SbContactSetHessian(&m->contacts, snes->vec_sol, n->kind, &n->blocks, n->rhs));
     PetscCall(VecAYPX(n->rhs, n->run->barrier_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++)
       for (int i = 0; i < 9; i++)
@@ -248,8 +248,8 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  const PetscBool keep =
-    (PetscBool)(n->run->nonsymmetric.U && n->whole && snes->norm < n->initial && !m->npotential);
+  const PetscBool keep = (PetscBool)(n->run->nonsymmetric.U && n->whole &&
+                                     snes->norm < n->initial && !m->contacts.npotential);
   PetscReal shift = n->shift / SHIFT_MORE;
   PetscReal least = 0.;
   PetscReal modelled = 0.;
@@ -371,7 +371,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 
   /* forces without a potential: ascent steps may be provisional, too */
   const PetscBool circulatory =
-    (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
+    (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->contacts.npotential);
   PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, barrier,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* no provisional step into a barrier */
@@ -431,7 +431,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
                               to->gaps <= from->gaps);
 
     /* the minimum of E is before a barrier, or far beyond a full step: bracket it by slopes */
-    barrier = (PetscBool)(m->npotential && plain);
+    barrier = (PetscBool)(m->contacts.npotential && plain);
     if (barrier && enough && to->slope < 0.)
       low = *s;
     else if (barrier && slope < 0. && (to->gaps > from->gaps || best->s > 0.))
@@ -452,7 +452,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
           far = 0.5 * (low + high);
         else if (*s >= 1.) {
           PetscCall(VecScale(Y, FARTHER * *s));
-          PetscCall(SbModelPotentialMaxStep(m, X, Y, &far, &nactive));
+          PetscCall(SbContactSetMaxStep(&m->contacts, X, Y, &far, &nactive));
           PetscCall(VecScale(Y, 1. / (FARTHER * *s)));
           if (far < 1.)
             tries = TRIES;
@@ -475,8 +475,9 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     if (n->provisional) {
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
-        if (m->npotential)
-          PetscCall(SbModelPotentialMaxStep(m, X, Y, s, &nactive)); /* for the new direction */
+        if (m->contacts.npotential)
+          PetscCall(
+            SbContactSetMaxStep(&m->contacts, X, Y, s, &nactive)); /* for the new direction */
         PetscCall(find_slopes(n, Y, from));
         continue;
       }
@@ -552,16 +553,16 @@ static PetscErrorCode approach(SNES snes)
   PetscInt nactive, inverted, before;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelPotentialAdvance(m, 0.));
+  SbContactSetAdvance(&m->contacts, 0.);
   PetscCall(VecWAXPY(Y, -1., X, start));
-  PetscCall(SbModelPotentialMaxStep(m, start, Y, &part, &nactive));
+  PetscCall(SbContactSetMaxStep(&m->contacts, start, Y, &part, &nactive));
   if (part == 1. && !nactive) {
-    PetscCall(SbModelPotentialAdvance(m, 1.));
+    SbContactSetAdvance(&m->contacts, 1.);
     PetscCall(VecZeroEntries(Y));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, &part, &nactive));
+    PetscCall(SbContactSetMaxStep(&m->contacts, X, Y, &part, &nactive));
     if (!nactive)
       PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(SbModelPotentialAdvance(m, 0.));
+    SbContactSetAdvance(&m->contacts, 0.);
   }
 
   /* D: increment of the prescribed displacements */
@@ -575,30 +576,30 @@ static PetscErrorCode approach(SNES snes)
     /* the rest of the motion at once */
     PetscCall(VecCopy(D, Y));
     PetscCall(VecScale(Y, progress - 1.));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, &part, &nactive));
+    PetscCall(SbContactSetMaxStep(&m->contacts, X, Y, &part, &nactive));
     if (part == 1.) {
       PetscCall(VecAXPY(X, -1., Y));
-      PetscCall(SbModelPotentialAdvance(m, 1.));
+      SbContactSetAdvance(&m->contacts, 1.);
       PetscFunctionReturn(PETSC_SUCCESS);
     }
 
     /* in part, with Newton's steps of the bodies */
     PetscCall(SNESComputeFunction(snes, X, F));
     PetscCall(VecWAXPY(n->to.x, DIFFERENCE, D, X));
-    PetscCall(SbModelPotentialAdvance(m, progress + DIFFERENCE));
+    SbContactSetAdvance(&m->contacts, progress + DIFFERENCE);
     PetscCall(SNESComputeFunction(snes, n->to.x, n->to.r));
-    PetscCall(SbModelPotentialAdvance(m, progress));
+    SbContactSetAdvance(&m->contacts, progress);
     PetscCall(VecAXPY(n->to.r, -1., F));
     PetscCall(VecAXPY(F, (1. - progress) / DIFFERENCE, n->to.r));
     PetscCall(find_direction(snes, &filtered, &slope));
     if (snes->reason)
       PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(VecAXPY(Y, progress - 1., D));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, &s, &nactive));
+    PetscCall(SbContactSetMaxStep(&m->contacts, X, Y, &s, &nactive));
     PetscCall(SbModelStrainEnergy(m, X, NULL, &energy, &before));
     for (whole = s;; s *= 0.5) {
       PetscCall(VecWAXPY(n->to.x, -s, Y, X));
-      PetscCall(SbModelPotentialAdvance(m, progress + s * (1. - progress)));
+      SbContactSetAdvance(&m->contacts, progress + s * (1. - progress));
       PetscCall(SbModelStrainEnergy(m, n->to.x, NULL, &energy, &inverted));
 
       /* a prescribed motion may invert a tet unavoidably */
@@ -642,10 +643,10 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
       snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  enough = m->dynamic ? SETTLED * m->barrier_speed * run->barrier_dt : SETTLED_STATIC * size;
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    springs = (PetscBool)(springs || m->potential[e]->springs);
-    width = PetscMin(width, m->potential[e]->width);
+  enough = m->dynamic ? SETTLED * m->contacts.speed * run->barrier_dt : SETTLED_STATIC * size;
+  for (PetscInt e = 0; e < m->contacts.npotential; e++) {
+    springs = (PetscBool)(springs || m->contacts.potential[e]->springs);
+    width = PetscMin(width, m->contacts.potential[e]->width);
   }
   if (springs)
     enough *= STICKING;
@@ -668,7 +669,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const Vec F = snes->vec_func;
   const Vec Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
-  const PetscBool barrier = (PetscBool)(m->npotential > 0);
+  const PetscBool barrier = (PetscBool)(m->contacts.npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0.;
   PetscReal s = 1.;
@@ -713,7 +714,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
     if (barrier && !snes->reason)
-      PetscCall(SbModelPotentialMaxStep(m, X, Y, &s, &nactive));
+      PetscCall(SbContactSetMaxStep(&m->contacts, X, Y, &s, &nactive));
     if (!snes->reason)
       PetscCall(search(snes, slope, &s));
     if (snes->reason)
@@ -751,7 +752,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (barrier && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 
-      PetscCall(SbModelPotentialUpdateFriction(m, X, (PetscBool)(snes->reason > 0), &again));
+      PetscCall(SbContactSetUpdateFriction(&m->contacts, X, (PetscBool)(snes->reason > 0), &again));
       if (!again)
         continue;
       snes->reason = SNES_CONVERGED_ITERATING;
@@ -786,7 +787,7 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
 static PetscErrorCode SNESSetUp_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
-  const PetscBool barrier = (PetscBool)(n->run->model->npotential > 0);
+  const PetscBool barrier = (PetscBool)(n->run->model->contacts.npotential > 0);
   Vec *w;
 
   PetscFunctionBeginUser;
@@ -862,7 +863,7 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
 
     PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix,
                                   "-snes_max_it", &given));
-    n->patient = (PetscBool)(m->npotential && !given);
+    n->patient = (PetscBool)(m->contacts.npotential && !given);
     n->run = run;
     n->least = 0.;
     for (PetscInt b = 0; b < m->nbody; b++)
@@ -870,7 +871,7 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
         4. * PETSC_MACHINE_EPSILON * SbMaterialYoungModulus(m->material[b]) * m->body[b].volume;
   }
   PetscCheck(
-    ours || !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
+    ours || !m->contacts.npotential, m->comm, PETSC_ERR_USER_INPUT,
     "-snes_type %s does not keep surfaces apart: with contact of response barrier leave it out",
     ((PetscObject)snes)->type_name);
   PetscCall(SbModelProjectTangent(m, (PetscBool)!ours));

@@ -144,8 +144,8 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   if (so->set.alpha_f != 1.)
     PetscCall(VecScale(F, 1. / so->set.alpha_f));
   if (so->run->model->barrier_apart)
-    PetscCall(
-      SbModelPotentialGradient(so->run->model, X, so->run->barrier_weight, PETSC_TRUE, NULL, F));
+    PetscCall(SbContactSetGradient(&so->run->model->contacts, X, so->run->barrier_weight,
+                                   PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -246,7 +246,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   if (*ok && so->set.separate) {
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
-    PetscCall(SbModelPotentialGradient(run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
+    PetscCall(SbContactSetGradient(&run->model->contacts, so->X1, -1., PETSC_TRUE, NULL, so->work));
     PetscCall(VecPointwiseDivide(so->work, so->work, run->mass));
     PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
     PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
@@ -258,7 +258,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
        acceleration */
     PetscCall(VecCopy(so->V1, so->work));
     if (SbSpaceIsConstrained(run->model->space))
-      PetscCall(SbModelContactVelocity(run->model, ts->ptime + h, h, so->X1, so->V1));
+      PetscCall(
+        SbContactSetProjectVelocity(&run->model->contacts, ts->ptime + h, h, so->X1, so->V1));
     PetscCall(VecAYPX(so->work, -1., so->V1));
     PetscCall(VecCopy(so->A1, so->own1));
     PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->own1));
@@ -277,7 +278,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     if (reason == SNES_DIVERGED_LINEAR_SOLVE)
       PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else
-      PetscCall(SbModelPotentialNearest(run->model, sizeof(why), why));
+      PetscCall(SbContactSetNearest(&run->model->contacts, sizeof(why), why));
     PetscCall(SbRunFail(run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)h,
                         reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],
@@ -323,7 +324,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscReal next, h;
 
     /* one attempt */
-    run->may_end_at_impact = (PetscBool)(run->model->ntime_of_impact && !cuts && so->whole == 0.);
+    run->may_end_at_impact =
+      (PetscBool)(run->model->contacts.ends_step && !cuts && so->whole == 0.);
     run->time_of_impact = 1.;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
     ts->snes_its = run->newton_total - run->newton_before + run->newton_step;

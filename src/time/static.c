@@ -60,7 +60,7 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 
   PetscFunctionBeginUser;
   *is = PETSC_FALSE;
-  if (!m->nbegin_step || m->linear)
+  if (!m->contacts.nactive_set || m->linear)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(l->X, &forces));
   PetscCall(VecDuplicate(l->X, &way));
@@ -157,7 +157,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
 
       if (reason == SNES_DIVERGED_LINEAR_SOLVE)
         PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
-      PetscCall(SbModelPotentialNearest(l->run->model, sizeof(near), near));
+      PetscCall(SbContactSetNearest(&l->run->model->contacts, sizeof(near), near));
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
                           SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
     }
@@ -181,7 +181,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
   PetscReal slowest = 0.;
   PetscInt step = run->step0;
   PetscInt cuts = 0;
-  const PetscBool contact = (PetscBool)(run->model->nbegin_step || run->model->npotential);
+  const PetscBool contact =
+    (PetscBool)(run->model->contacts.nactive_set || run->model->contacts.npotential);
   Vec X;
 
   PetscFunctionBeginUser;

@@ -44,9 +44,13 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
-    /* begin the step in barrier contact */
-    if (run->model->npotential) {
-      PetscCall(SbModelPotentialBegin(run->model, step->t, step->dt, step->U0, run->V));
+    /* contact begins the step */
+    if (run->model->contacts.n) {
+      PetscReal speed;
+
+      PetscCall(SbModelStepSpeed(run->model, step->t, step->dt, step->U0, run->V, &speed));
+      PetscCall(
+        SbContactSetBeginStep(&run->model->contacts, step->t, step->dt, speed, step->U0, run->V));
       run->barrier_start = step->U0;
       run->barrier_dt = step->dt;
     }
@@ -79,8 +83,8 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscCall(SbRunRejectInverted(run, step->t, step->dt, (Vec[2]){step->U0, step->U}, ok));
 
   /* restore prescribed motions to the start of the step, in case the run ends there */
-  if (!*ok && run->model->npotential)
-    PetscCall(SbModelPotentialAdvance(run->model, 0.));
+  if (!*ok)
+    SbContactSetAdvance(&run->model->contacts, 0.);
 
   /* warn of much shorter steps, once until they have the requested length again */
   if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened &&

@@ -43,8 +43,8 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   Vec own;
 
   PetscFunctionBeginUser;
-  if (!run->A ||
-      !(SbRunIsExplicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
+  if (!run->A || !(SbRunIsExplicit(run) ||
+                   (run->preset == SB_TIME_NEWMARK && !run->model->contacts.nactive_set)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
   PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, PETSC_TRUE, own));

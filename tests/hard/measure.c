@@ -93,11 +93,11 @@ static PetscErrorCode look_finite(HardRun *r, const SbStep *step)
 static PetscErrorCode look_depth(HardRun *r, const SbStep *step)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; step->step && i < r->model->nbegin_step; i++) {
+  for (PetscInt i = 0; step->step && i < r->model->contacts.nactive_set; i++) {
     PetscReal depth;
 
-    PetscCall(
-      contact_column(r->run, step->t, r->model->begin_step[i]->name, "penetration", &depth));
+    PetscCall(contact_column(r->run, step->t, r->model->contacts.active_set[i]->effect->name,
+                             "penetration", &depth));
     r->value[HARD_DEPTH] = PetscMax(r->value[HARD_DEPTH], depth / r->size);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

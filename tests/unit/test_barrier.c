@@ -1,7 +1,7 @@
 // @ranks 1
 /* The barrier of a pair: its derivatives by differences, with the radius of an obstacle, for
    parallel edges, a half-space and a bowl. */
-#include <sbbarrier.h>
+#include "../../src/contact/pairs.h"
 #include "pair_reference.h"
 
 #define NRANDOM 4000
@@ -34,7 +34,7 @@ static void check_function(void)
   SB_CHECK(b[0] >= PETSC_INFINITY, "where surfaces touch: %g", b[0]);
 }
 
-static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const PetscReal x[],
+static PetscReal energy_at(SbContactSurface m, const SbContactPair *pair, const PetscReal x[],
                            PetscReal gradient[])
 {
   PetscReal energy, gap;
@@ -55,7 +55,7 @@ static void check_crossing(void)
   PetscReal x[12], gradient[12];
   PetscReal last = 0.;
   PetscReal b[3];
-  struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
+  struct _p_SbContactSurface mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   const SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE, .v = {0, 1, 2, 3}, .area = 0.7};
 
   for (PetscReal gap = 0.02; gap > 1e-5; gap *= 0.8) {
@@ -77,7 +77,7 @@ static void check_crossing(void)
 
 /* Gradient, Hessian and projected Hessian against central differences, for the motion of the first
    nv vertices, which belong to bodies. */
-static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv,
+static void check_pair(SbContactSurface m, const SbContactPair *pair, PetscReal x[12], int nv,
                        PetscInt *tried)
 {
   const PetscReal step = 1e-6;
@@ -131,7 +131,7 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscReal x[12], X[12], u[3], n[3];
-  struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
+  struct _p_SbContactSurface mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2, 3}, .area = 0.7};
   PetscInt tried[7] = {0};
 

@@ -1,7 +1,7 @@
 // @ranks 1
 /* Second derivatives by pairs of surface vertices, distributed to nodes: equal to S^T H S of dense
    matrices, each entry once, none at prescribed components. */
-#include <sbbarrier.h>
+#include "../../src/contact/pairs.h"
 #include "pair_reference.h"
 
 #define NV 7 /* vertices, the last one with its nodes on other ranks alone */
@@ -13,7 +13,7 @@
 int main(int argc, char **argv)
 {
   struct _p_SbSpace space = {.nnode_owned = OWN, .nnode = NN, .Nnode = NN};
-  struct _p_SbContactMesh m = {.space = &space, .nbody_vertex = NV, .nvertex = NV};
+  struct _p_SbContactSurface m = {.space = &space, .nbody_vertex = NV, .nvertex = NV};
   PetscInt start[NV + 1], node[NV * EACH];
   PetscInt count[OWN][NN] = {{0}};
   PetscReal weight[NV * EACH];

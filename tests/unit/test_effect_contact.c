@@ -54,8 +54,9 @@ static PetscErrorCode check_options(void)
     PetscCall(PetscOptionsClear(NULL));
   }
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
-  SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.assemble_constraints &&
-             e->ops.update_active_set && x.space->constraints && !SbConstraintsSeparate(x.space),
+  SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->contact->ops->assemble_constraints &&
+             e->contact->ops->update_active_set && x.space->constraints &&
+             !SbConstraintsSeparate(x.space),
            "projected, without friction");
   SB_CHECK(e->ncolumn == 8, "columns");
   PetscCall(SbEffectDestroy(&e));
@@ -63,21 +64,21 @@ static PetscErrorCode check_options(void)
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
-  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints &&
-             SbConstraintsSeparate(x.space),
+  SB_CHECK(e->linear && e->contact->saddle && !e->ops.tangent &&
+             e->contact->ops->assemble_constraints && SbConstraintsSeparate(x.space),
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
-  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.assemble_constraints &&
-             !e->ops.update_active_set && !x.space->constraints,
+  SB_CHECK(!e->linear && e->ops.tangent && !e->contact->ops->assemble_constraints &&
+             !e->contact->ops->update_active_set && !x.space->constraints,
            "penalty");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
-  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints &&
+  SB_CHECK(e->linear && !e->ops.tangent && e->contact->ops->assemble_constraints &&
              SbConstraintsSeparate(x.space) && x.space->constraints->nonsymmetric,
            "friction has constraints");
   PetscCall(SbEffectDestroy(&e));
@@ -107,10 +108,11 @@ static PetscErrorCode press(Fixture *x, SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
-  PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, u0));
+  PetscCall((*e->contact->ops->begin_step)(e->contact, x->space, 0, 0.1, 0, u0));
+  PetscCall((*e->contact->ops->start_active_set)(e->contact, x->space, u0));
   push(x, 1);
-  if (e->ops.update_active_set)
-    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
+  if (e->contact->ops->update_active_set)
+    PetscCall((*e->contact->ops->update_active_set)(e->contact, x->space, x->u, &changed));
   PetscCall(PetscFree(u0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -210,14 +212,15 @@ static PetscErrorCode rub(Fixture *x, const char *options)
   PetscCall(SbSpacePrescribeDone(x->space));
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   push(x, 0.15);
-  PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, x->u));
+  PetscCall((*e->contact->ops->begin_step)(e->contact, x->space, 0, 0.1, 0, u0));
+  PetscCall((*e->contact->ops->start_active_set)(e->contact, x->space, x->u));
   for (int solve = 0; solve < 3; solve++) {
     SbSpaceClearConstraints(x->space);
     for (int across = 0; across < 2; across++)
-      PetscCall((*e->ops.assemble_constraints)(e, x->space, (PetscBool)across));
+      PetscCall((*e->contact->ops->assemble_constraints)(e->contact, x->space, (PetscBool)across));
     PetscCall(SbSpaceAssembleConstraints(x->space));
     SbConstraintsComputeForces(x->space, x->u, x->f);
-    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
+    PetscCall((*e->contact->ops->update_active_set)(e->contact, x->space, x->u, &changed));
   }
   PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
   SbConstraintsAddForces(x->space, x->f);
@@ -288,16 +291,16 @@ static PetscErrorCode check_scene(void)
   PetscFunctionBeginUser;
   PetscCall(PetscLogDefaultBegin());
   PetscCall(test_scene_open(BLOCK "-effects gravity,floor " FLOOR, &t));
-  SB_CHECK(t.model->nbegin_step == 1 && t.model->nassemble_constraints == 1 &&
-             t.model->nupdate_active_set == 1 && t.model->space->constraints,
+  SB_CHECK(t.model->contacts.nactive_set == 1 && t.model->contacts.nconstraint == 1 &&
+             t.model->contacts.active_set[0]->ops->update_active_set && t.model->space->constraints,
            "a scene with contact");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &before));
   SB_CHECK(before.count > 0, "contact is logged");
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_open(BLOCK "-effects gravity", &t));
-  SB_CHECK(!t.model->nbegin_step && !t.model->nassemble_constraints &&
-             !t.model->nupdate_active_set && !t.model->space->constraints,
+  SB_CHECK(!t.model->contacts.nactive_set && !t.model->contacts.nconstraint &&
+             !t.model->contacts.n && !t.model->space->constraints,
            "a scene without contact has nothing of it");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &info));

@@ -4,7 +4,7 @@
   closest points on the surface; poses; errors of the description.
 */
 #include "effect_fixture.h"
-#include <sbcontact.h>
+#include "../../src/contact/obstacle.h"
 
 static const char *const texts[] = {"plane:0,3,4,5",
                                     "sphere:0.3,0.2,-0.1,0.7",

@@ -6,7 +6,7 @@
 // @ranks 1 3
 #include "mesh_test.h"
 #include "surface_files.h"
-#include <sbcontact.h>
+#include "../../src/contact/obstacle.h"
 #include <sbkernel.h>
 
 static const PetscReal zero[3] = {0, 0, 0};

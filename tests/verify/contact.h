@@ -126,7 +126,7 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->U, &F));
-  PetscCall(SbModelContactForce(run->model, t, run->U, F));
+  PetscCall(SbContactSetForce(&run->model->contacts, t, run->U, F));
   PetscCall(contact_body_sums(run->model, F, PETSC_FALSE, force));
   PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -327,7 +327,7 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
     const SbEffect f = m->effect[i];
     PetscReal value[64] = {0};
 
-    if (!f->ops.begin_step && !f->ops.potential)
+    if (!f->contact)
       continue;
     if (run->reaction)
       PetscCall(contact_columns(run, step->t, run->reaction, f, value));

@@ -7,7 +7,7 @@
   end inside the bowl, and resting bodies are supported.
 */
 #pragma once
-#include "../../src/effect/barrier_impl.h"
+#include "../../src/contact/barrier.h"
 #include "contact.h"
 
 #define POUR_G 9.81
@@ -95,13 +95,13 @@ static inline PetscReal pour_depth(const Barrier *s, const PetscInt from[], Pets
   PetscReal depth = PETSC_MAX_REAL;
 
   for (PetscInt i = 0; i < n && depth > 0; i++) {
-    const PetscInt *v = s->mesh->triangle + 3 * from[i];
+    const PetscInt *v = s->surface->triangle + 3 * from[i];
     PetscReal a[3], b[3], r[3], normal[3];
 
     for (int k = 0; k < 3; k++) {
-      a[k] = s->x[3 * v[1] + k] - s->x[3 * v[0] + k];
-      b[k] = s->x[3 * v[2] + k] - s->x[3 * v[0] + k];
-      r[k] = s->x[3 * v[0] + k] - p[k];
+      a[k] = s->motion.x[3 * v[1] + k] - s->motion.x[3 * v[0] + k];
+      b[k] = s->motion.x[3 * v[2] + k] - s->motion.x[3 * v[0] + k];
+      r[k] = s->motion.x[3 * v[0] + k] - p[k];
     }
     SbCross(a, b, normal);
     depth = PetscMin(depth, SbDot3(r, normal) / PetscSqrtReal(SbDot3(normal, normal)));
@@ -121,19 +121,21 @@ static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++)
-    PetscCall(PetscMalloc1(s->mesh->ntriangle, &list[b]));
-  for (PetscInt f = 0; f < s->mesh->ntriangle; f++)
-    list[s->mesh->part[s->mesh->triangle[3 * f]]][n[s->mesh->part[s->mesh->triangle[3 * f]]]++] = f;
-  for (PetscInt f = 0; f < s->mesh->ntriangle; f++) {
+    PetscCall(PetscMalloc1(s->surface->ntriangle, &list[b]));
+  for (PetscInt f = 0; f < s->surface->ntriangle; f++)
+    list[s->surface->part[s->surface->triangle[3 * f]]]
+        [n[s->surface->part[s->surface->triangle[3 * f]]]++] = f;
+  for (PetscInt f = 0; f < s->surface->ntriangle; f++) {
     for (int q = 0; q < 3 * 8; q++) {
-      const PetscInt a = s->mesh->triangle[3 * f + q / 8];
-      const PetscInt b = s->mesh->triangle[3 * f + (q / 8 + 1) % 3];
+      const PetscInt a = s->surface->triangle[3 * f + q / 8];
+      const PetscInt b = s->surface->triangle[3 * f + (q / 8 + 1) % 3];
       PetscReal p[3];
 
       for (int k = 0; k < 3; k++)
-        p[k] = s->x[3 * a + k] + (PetscReal)(q % 8) / 8 * (s->x[3 * b + k] - s->x[3 * a + k]);
+        p[k] = s->motion.x[3 * a + k] +
+               (PetscReal)(q % 8) / 8 * (s->motion.x[3 * b + k] - s->motion.x[3 * a + k]);
       for (PetscInt o = 0; o < m->nbody; o++)
-        if (o != s->mesh->part[s->mesh->triangle[3 * f]])
+        if (o != s->surface->part[s->surface->triangle[3 * f]])
           *inside = PetscMax(*inside, pour_depth(s, list[o], n[o], p));
     }
   }

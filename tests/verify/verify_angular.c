@@ -33,7 +33,7 @@ static PetscErrorCode torques(SbRun run, const SbStep *step, PetscReal torque[6]
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(torque, 6));
   PetscCall(VecDuplicate(step->U, &F));
-  PetscCall(SbModelContactForce(run->model, step->t, step->U, F));
+  PetscCall(SbContactSetForce(&run->model->contacts, step->t, step->U, F));
   PetscCall(VecGetArrayRead(F, &f));
   PetscCall(VecGetArrayRead(step->U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {

@@ -311,12 +311,12 @@ static PetscErrorCode gaps(void)
     error =
       PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
     test_print("  plate, -accuracy %g: force off by %.1e, width %.1e m\n", asked[i], error,
-               t.model->potential[0]->width);
+               t.model->contacts.potential[0]->width);
     SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g",
              asked[i], error);
-    SB_CHECK(!i || t.model->potential[0]->width < 0.2 * width, "width %g, then %g m", width,
-             t.model->potential[0]->width);
-    width = t.model->potential[0]->width;
+    SB_CHECK(!i || t.model->contacts.potential[0]->width < 0.2 * width, "width %g, then %g m",
+             width, t.model->contacts.potential[0]->width);
+    width = t.model->contacts.potential[0]->width;
     PetscCall(test_scene_close(&t));
 
     PetscCall(test_open(&t, "%s -accuracy %g", ball, asked[i]));

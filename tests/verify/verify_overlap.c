@@ -8,7 +8,7 @@
   body is not affected. A self-intersecting bent bar has separation directions.
 */
 #include "contact.h"
-#include "sbbarrier.h"
+#include "../../src/contact/pairs.h"
 
 #define DEPTH 0.05
 #define STEP 0.004
@@ -100,7 +100,7 @@ static PetscErrorCode check_ring(const char *element)
   SbContactOverlap o = {0};
   PetscReal *x;
   PetscReal radial = 0;
-  SbContactMesh m;
+  SbContactSurface m;
   SbFacet *facet;
   PetscInt nfacet, set;
   SbSpace s;
@@ -115,7 +115,7 @@ static PetscErrorCode check_ring(const char *element)
   s = t.run->model->space;
   PetscCall(SbSpaceFindSet(s, "boundary", "the test", &set));
   PetscCall(SbSpaceGetSetFacets(s, set, &nfacet, &facet));
-  PetscCall(SbContactMeshCreate(s, nfacet, facet, NULL, &m));
+  PetscCall(SbContactSurfaceCreate(s, nfacet, facet, NULL, &m));
   m->self = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &x));
   for (PetscInt i = 0; i < m->nvertex; i++) {
@@ -143,7 +143,7 @@ static PetscErrorCode check_ring(const char *element)
   PetscCall(PetscFree(o.near));
   PetscCall(PetscFree(x));
   PetscCall(PetscFree(facet));
-  PetscCall(SbContactMeshDestroy(&m));
+  PetscCall(SbContactSurfaceDestroy(&m));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,7 +49,7 @@ static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w,
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(force, sizeof(PetscReal) * 2 * BODIES * (BODIES + 1) * 3));
   n[0] = n[1] = 0;
-  PetscCall(SbModelContactPoints(run->model, t, run->U, &list));
+  PetscCall(SbContactSetPoints(&run->model->contacts, t, run->U, &list));
   for (PetscInt i = 0; i < list.n; i++) {
     const SbContactPoint *p = &list.point[i];
 

@@ -1,5 +1,5 @@
 /*
-  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, on
+  contact_surface.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, on
   every rank.
 
   A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose
@@ -14,7 +14,7 @@
   triangles. A half-space and a bowl touch vertices only; they are stored as two vertices, a point
   and the tip of the normal there, or as one, the centre.
 */
-#include "contact_mesh.h"
+#include "pairs.h"
 
 /* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k behind corner
    k. */
@@ -48,8 +48,8 @@ static PetscInt own_point(SbSpace s, const SbFacet *f, PetscInt k)
 
 /* Records of own vertices, of 7 + 2 count numbers: id, part, count, place, area, then nodes with
    weights. */
-static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt *size,
-                               PetscReal **records)
+static PetscErrorCode list_own(SbContactSurface m, PetscInt n, const SbFacet facet[],
+                               PetscInt *size, PetscReal **records)
 {
   const SbSpace s = m->space;
   const SbMesh mesh = s->mesh;
@@ -126,7 +126,7 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
 
 /* The vertices of all ranks in the order of their numbers, and room for `nobstacle` of the
    obstacle. */
-static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet facet[],
+static PetscErrorCode make_vertices(SbContactSurface m, PetscInt n, const SbFacet facet[],
                                     PetscInt nobstacle)
 {
   const SbSpace s = m->space;
@@ -198,7 +198,7 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
         m->mine[v] = 1;
         continue;
       }
-      PetscCall(PetscFindInt(m->gnode[e], s->nnode - s->nnode_owned, s->gnode + s->nnode_owned,
+      PetscCall(PetscFindInt(m->gnode[e], s->nnode_cell - s->nnode_owned, s->gnode + s->nnode_owned,
                              &m->node[e]));
       m->node[e] = m->node[e] < 0 ? -1 : s->nnode_owned + m->node[e];
     }
@@ -213,7 +213,7 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
 /* The triangles of all ranks, in the order of numbers that no partition changes: a facet is one,
    with P2 four. Corners go by the number of the vertex, or, in the middle of a side, by that of its
    node. */
-static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet facet[],
+static PetscErrorCode make_triangles(SbContactSurface m, PetscInt n, const SbFacet facet[],
                                      PetscInt nobstacle)
 {
   static const int part[5][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}, {0, 1, 2}};
@@ -270,7 +270,7 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
 
 /* The edges of all triangles, each once, its area a third of that of the triangles around; `lone`:
    the obstacle is an edge of its own. */
-static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
+static PetscErrorCode make_edges(SbContactSurface m, PetscBool lone)
 {
   PetscInt(*side)[3];
 
@@ -307,11 +307,11 @@ static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
-                                   SbObstacle obstacle, SbContactMesh *mesh)
+PetscErrorCode SbContactSurfaceCreate(SbSpace s, PetscInt n, const SbFacet facet[],
+                                      SbObstacle obstacle, SbContactSurface *mesh)
 {
   SbTriangles o = {0};
-  SbContactMesh m;
+  SbContactSurface m;
   PetscInt nbody_edge = 0;
 
   PetscFunctionBeginUser;
@@ -357,7 +357,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
+PetscErrorCode SbContactSurfaceMarkDriven(SbContactSurface m)
 {
   const SbSpace s = m->space;
   const PetscInt n = m->start[m->nbody_vertex];
@@ -377,7 +377,7 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], PetscReal x[])
+PetscErrorCode SbContactSurfaceGetPositions(SbContactSurface m, const PetscReal u[], PetscReal x[])
 {
   PetscReal *mine = m->buffer;
   PetscReal *all = m->buffer + 3 * m->nlocal;
@@ -400,9 +400,9 @@ PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh)
+PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *mesh)
 {
-  SbContactMesh m = *mesh;
+  SbContactSurface m = *mesh;
 
   PetscFunctionBeginUser;
   if (!m)

@@ -1,5 +1,5 @@
 /*
-  barrier.c - the barrier potential of a contact pair and its derivatives.
+  pair_energy.c - the barrier potential of a contact pair and its derivatives.
 
   The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential
   contact", ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
@@ -14,7 +14,7 @@
   apart than the gap d, so vertex-triangle pairs are inactive; without it gaps fell to 1e-9 m, with
   tiny Newton steps (docs/reports/contact.md).
 */
-#include "sbbarrier.h"
+#include "pairs.h"
 
 #define MOLLIFIED 1e-3 /* e / (|a|^2 |b|^2) */
 #define NEAR 2.        /* bound of e / (|a| |b| ((d + r)^2 - r^2)) */
@@ -58,9 +58,9 @@ static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, Petsc
   f[4] = -2. * (1. - 2. * y) * slope / e;
 }
 
-void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, const SbDistance *g,
-                   const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
-                   PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
+void SbBarrierPair(SbContactSurface m, const SbContactPair *pair, PetscReal gap,
+                   const SbDistance *g, const PetscReal x[], PetscReal width, PetscReal pressure,
+                   PetscReal *energy, PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
 {
   PetscReal b[3], at[12], across[12], C[144];
   PetscReal f[6] = {1.};

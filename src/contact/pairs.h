@@ -1,18 +1,17 @@
 /*
-  sbbarrier.h - layer 7: barrier contact of surfaces. Vertices, edges and triangles of bodies and of
-  an obstacle, contact pairs, continuous collision detection, the barrier potential.
+  pairs.h - surfaces in contact: vertices, edges and triangles of bodies and of an obstacle, contact
+  pairs, continuous collision detection, penetrations, the barrier potential of a pair.
 
   Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every
   element. A rank evaluates every pair that has one of its own nodes: forces on them are complete
   without communication, and summed in an order that no partition changes.
 */
 #pragma once
-#include "sbcontact.h"
-#include "sbgeometry.h"
+#include "obstacle.h"
 #include "sbsolver.h"
 
-typedef struct _p_SbContactMesh *SbContactMesh;
-struct _p_SbContactMesh {
+typedef struct _p_SbContactSurface *SbContactSurface;
+struct _p_SbContactSurface {
   SbSpace space;                  /* borrowed */
   PetscBool self;                 /* self-contact, too; set by the caller, false at first */
   PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
@@ -22,7 +21,7 @@ struct _p_SbContactMesh {
                               global numbers ascending */
   PetscInt *node; /* the same as local nodes, -1: not known here */
   PetscReal *weight;
-  uint8_t *fixed; /* bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
+  uint8_t *fixed; /* bit c: component c of the node is prescribed; SbContactSurfaceMarkDriven() */
   PetscInt *part; /* [nvertex] body, nbody: the obstacle */
   PetscInt *id;   /* [nbody_vertex] number in the mesh that no partition changes */
   uint8_t *mine;  /* [nvertex] some node is owned here */
@@ -37,7 +36,7 @@ struct _p_SbContactMesh {
   SbObstacleSide side; /* half-space or bowl, whose vertices are described there */
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
-  /* of SbContactMeshGetPositions() */
+  /* of SbContactSurfaceGetPositions() */
   PetscInt nlocal, *local;    /* own vertices of bodies, in order[] */
   PetscMPIInt *count, *first; /* [ranks] */
   PetscInt *order;            /* [nbody_vertex] vertex of each received one */
@@ -46,16 +45,29 @@ struct _p_SbContactMesh {
 
 /* The surface of the facets of SbEffectFacets() and of an obstacle that is set up (NULL: none).
    MarkDriven, once all effects are set up: marks prescribed unknowns. Collective. */
-PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[],
-                                   SbObstacle obstacle, SbContactMesh *mesh);
-PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh);
-PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
+PetscErrorCode SbContactSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
+                                      SbObstacle obstacle, SbContactSurface *mesh);
+PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *mesh);
+PetscErrorCode SbContactSurfaceMarkDriven(SbContactSurface mesh);
 /* x[nvertex][3] of the bodies' vertices from local displacements u (ghosts up to date), m.
    Collective. */
-PetscErrorCode SbContactMeshGetPositions(SbContactMesh mesh, const PetscReal u[], PetscReal x[]);
+PetscErrorCode SbContactSurfaceGetPositions(SbContactSurface mesh, const PetscReal u[],
+                                            PetscReal x[]);
+/* Area of a triangle of the vertices v; n[3], its normal, twice as long. */
+static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscInt v[3],
+                                              PetscReal n[3])
+{
+  PetscReal a[3], b[3];
+
+  SbSubtract(x + 3 * v[1], x + 3 * v[0], a);
+  SbSubtract(x + 3 * v[2], x + 3 * v[0], b);
+  SbCross(a, b, n);
+  return 0.5 * PetscSqrtReal(SbDot3(n, n));
+}
+
 /* Outward normals of all vertices at x, of twice the area of the triangles around, m^2. Not
    collective. */
-void SbContactMeshNormals(SbContactMesh mesh, const PetscReal x[], PetscReal normal[]);
+void SbContactSurfaceNormals(SbContactSurface mesh, const PetscReal x[], PetscReal normal[]);
 
 /* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the
    obstacle. */
@@ -74,19 +86,19 @@ static inline int SbContactPairSplit(const SbContactPair *pair)
 }
 
 /* Radius of the obstacle if it is one of the sides, m. */
-static inline PetscReal SbContactPairRadius(SbContactMesh mesh, const SbContactPair *pair)
+static inline PetscReal SbContactPairRadius(SbContactSurface mesh, const SbContactPair *pair)
 {
   return PetscMax(pair->v[0], pair->v[SbContactPairSplit(pair)]) >= mesh->nbody_vertex
            ? mesh->radius
            : 0.;
 }
 
-/* Search and its results; x0 and x1 below are arrays of SbContactMeshGetPositions(). */
+/* Search and its results; x0 and x1 below are arrays of SbContactSurfaceGetPositions(). */
 typedef struct _p_SbContactPairs *SbContactPairs;
 struct _p_SbContactPairs {
-  SbContactMesh mesh; /* borrowed */
-  PetscReal reach;    /* pairs nearer than this are found, m */
-  PetscReal margin;   /* by which boxes are grown, m */
+  SbContactSurface mesh; /* borrowed */
+  PetscReal reach;       /* pairs nearer than this are found, m */
+  PetscReal margin;      /* by which boxes are grown, m */
   PetscReal
     *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
@@ -101,17 +113,17 @@ struct _p_SbContactPairs {
     most; /* searches; number of pairs at which they end, and whether the last one did */
   PetscBool full;
 };
-PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscReal reach, SbContactPairs *pairs);
+PetscErrorCode SbContactPairsCreate(SbContactSurface mesh, PetscReal reach, SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
 /* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not
    collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
 /* The gap, m: the distance less the radius; closest points and direction in `distance`. Not
    collective. */
-PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
+PetscReal SbContactPairGap(SbContactSurface mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
 /* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m. */
-static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbContactPair *pair,
+static inline PetscBool SbContactPairSweptApart(SbContactSurface mesh, const SbContactPair *pair,
                                                 const PetscReal x0[], const PetscReal x1[],
                                                 PetscReal distance)
 {
@@ -163,13 +175,13 @@ typedef struct {
   uint8_t *near;        /* [nvertex] SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
 /* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
-PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, const PetscReal x[], PetscBool inside,
+PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
    a tet of body[0] is within the surface of body[1] at x. Slow: for the start of a run.
    Collective. */
-PetscErrorCode SbContactMeshIsInside(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
-                                     PetscBool *found);
+PetscErrorCode SbContactSurfaceIsInside(SbContactSurface mesh, const PetscReal x[],
+                                        PetscInt body[2], PetscBool *found);
 
 /* Energy of a gap d, J, and its first two derivatives: barrier of the width w (m), pressure k (Pa)
    and area (m^2); 0 from w on, infinite at 0. */
@@ -181,7 +193,7 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J;
   gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
-void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap,
+void SbBarrierPair(SbContactSurface mesh, const SbContactPair *pair, PetscReal gap,
                    const SbDistance *distance, const PetscReal x[], PetscReal width,
                    PetscReal pressure, PetscReal *energy, PetscReal gradient[12], PetscBool clamp,
                    PetscReal H[144]);
@@ -199,4 +211,5 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt 
                                   const PetscReal H[], PetscInt ld);
 /* Moves the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at
    prescribed components, each pair of nodes once. Not collective. */
-PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, SbContactBlocks *blocks, SbBlocks *nodes);
+PetscErrorCode SbContactBlocksToNodes(SbContactSurface mesh, SbContactBlocks *blocks,
+                                      SbBlocks *nodes);

@@ -1,5 +1,5 @@
 /*
-  contact_blocks.c - the Hessian of contact, summed over pairs of vertices, then assembled at the
+  pair_blocks.c - the Hessian of contact, summed over pairs of vertices, then assembled at the
   nodes.
 
   A vertex of the surface is at x_v = X_v + sum_j w_vj u_j, so the derivative by the nodes is S^T H
@@ -10,7 +10,7 @@
   Sums run in the order of pairs of features and of vertices, which does not depend on the
   partition.
 */
-#include "sbbarrier.h"
+#include "pairs.h"
 
 /* Slot of the vertex pair in the hash table: where it is, or the free one where it belongs. */
 static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt w)
@@ -55,7 +55,7 @@ PetscErrorCode SbContactBlocksAdd(SbContactBlocks *b, PetscInt v, PetscInt w, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, SbContactBlocks *b, SbBlocks *to)
+PetscErrorCode SbContactBlocksToNodes(SbContactSurface m, SbContactBlocks *b, SbBlocks *to)
 {
   const SbSpace s = m->space;
   const PetscInt nv = m->nbody_vertex;

@@ -1,5 +1,5 @@
 /*
-  contact_pairs.c - pairs of features (vertex-triangle, edge-edge) that may come into contact, their
+  pairs.c - pairs of features (vertex-triangle, edge-edge) that may come into contact, their
   gaps, and the collision-free part of a motion.
 
   Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles
@@ -12,7 +12,7 @@
   "Codimensional incremental potential contact", ACM TOG 40(4), 2021, section 5; src/geometry/ccd.c)
   leaves a tenth of each gap. A half-space and a bowl have roots of quadratic polynomials.
 */
-#include "sbbarrier.h"
+#include "pairs.h"
 #include "sbgeometry.h"
 #include "sblog.h"
 
@@ -26,7 +26,7 @@ static inline void places(const SbContactPair *pair, const PetscReal x[], PetscR
     at[k] = x[3 * pair->v[k / 3] + k % 3];
 }
 
-PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const PetscReal x[],
+PetscReal SbContactPairGap(SbContactSurface m, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *g)
 {
   PetscReal at[12], r[3], length;
@@ -72,7 +72,7 @@ struct SbContactFeatures {
 };
 
 /* Vertices of feature i; `own` is room for one. */
-static inline const PetscInt *vertices_of(SbContactMesh m, int kind, PetscInt i, PetscInt *own)
+static inline const PetscInt *vertices_of(SbContactSurface m, int kind, PetscInt i, PetscInt *own)
 {
   *own = i;
   return kind == VERTEX ? own : kind == TRIANGLE ? m->triangle + 3 * i : m->edge + 2 * i;
@@ -120,7 +120,7 @@ static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
 /* Adds the pair of a vertex i and a triangle j, or of two edges, if they may come into contact. */
 static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i, PetscInt j)
 {
-  const SbContactMesh m = p->mesh;
+  const SbContactSurface m = p->mesh;
   const PetscBool edges = (PetscBool)(kind == SB_PAIR_EDGE_EDGE);
   const PetscInt low = PetscMin(i, j);
   const PetscInt high = PetscMax(i, j);
@@ -161,7 +161,7 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscReal reach, SbContactPairs *pairs)
+PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbContactPairs *pairs)
 {
   const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle,
                             m->nedge};
@@ -238,7 +238,7 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
                                     {2 * VERTEX + 1, 2 * TRIANGLE},
                                     {2 * EDGE, 2 * EDGE},
                                     {2 * EDGE, 2 * EDGE + 1}};
-  const SbContactMesh m = p->mesh;
+  const SbContactSurface m = p->mesh;
   PetscInt found[2 * CHUNK];
 
   PetscFunctionBeginUser;
@@ -344,7 +344,7 @@ static PetscReal first_root(PetscReal a, PetscReal b, PetscReal c)
 }
 
 /* The collision-free fraction of the motion for one pair. */
-static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal most,
+static PetscReal safe_part(SbContactSurface m, const SbContactPair *pair, PetscReal most,
                            const PetscReal x0[], const PetscReal x1[])
 {
   PetscReal a[12], b[12], r0[3], dr[3], n0[3], dn[3], left;
@@ -377,7 +377,7 @@ static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], const PetscReal x1[],
                                      PetscReal *part)
 {
-  const SbContactMesh m = p->mesh;
+  const SbContactSurface m = p->mesh;
   PetscReal whole = 1.;
   PetscReal safe;
 

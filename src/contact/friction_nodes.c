@@ -1,6 +1,6 @@
 /*
-  friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it
-  slides.
+  friction_nodes.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip
+  if it slides.
 
   A sticking pair has two exact tangential constraints, or two springs. A sliding pair has its
   contact force along n - mu d, d the direction of the slip, so that friction uses N of the same
@@ -14,7 +14,7 @@
   A node in the corner of two obstacles cannot stick to both by exact constraints: they would be
   redundant. Such a pair sticks by springs while in contact.
 */
-#include "contact.h"
+#include "nodes.h"
 
 #define FLIPS \
   10 /* changes of a pair between stick and slip within a step, after which it has springs */
@@ -34,7 +34,7 @@ void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 }
 
 /* Whether a pair sticks by springs. */
-static inline PetscBool springs(const Contact *c, const SbFrictionState *g)
+static inline PetscBool springs(const Nodes *c, const SbFrictionState *g)
 {
   return (PetscBool)(!exact(c) || g->crowded);
 }
@@ -46,9 +46,9 @@ static inline PetscBool careful(const SbFrictionState *g)
   return (PetscBool)(g->flips > FLIPS);
 }
 
-static PetscReal coefficient(const Contact *c, const SbFrictionState *g)
+static PetscReal coefficient(const Nodes *c, const SbFrictionState *g)
 {
-  return g->slid ? c->friction.mu_kinetic : c->friction.mu;
+  return g->slid ? c->contact.friction.mu_kinetic : c->contact.friction.mu;
 }
 
 /* Tangential part of a vector; returns its length. */
@@ -62,17 +62,17 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 }
 
 /* Tangential slip of the step plus earlier deflection of springs, m; returns its length. */
-static PetscReal slip(const Touch *touch, PetscReal s[3])
+static PetscReal slip(const ContactNode *touch, PetscReal s[3])
 {
   for (int k = 0; k < 3; k++)
-    s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
-  return across(touch->plane.n, s);
+    s[k] = touch->friction.stretch[k] + touch->friction.now[k] - touch->friction.start[k];
+  return across(touch->facets.plane.n, s);
 }
 
 /* Rotates the two tangents, the first one along v or its tangential part. */
-static void turn(Touch *touch, const PetscReal v[3])
+static void turn(ContactNode *touch, const PetscReal v[3])
 {
-  const PetscReal *n = touch->plane.n;
+  const PetscReal *n = touch->facets.plane.n;
   SbFrictionState *g = &touch->friction;
   PetscReal t[3] = {v[0], v[1], v[2]};
   PetscReal length = across(n, t);
@@ -89,7 +89,7 @@ static void turn(Touch *touch, const PetscReal v[3])
   SbCross(n, g->tangent[0], g->tangent[1]);
 }
 
-void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth)
+void SbFrictionEnter(const Nodes *c, ContactNode *touch, PetscReal depth)
 {
   SbFrictionState *g = &touch->friction;
   PetscReal s[3];
@@ -99,24 +99,24 @@ void SbFrictionEnter(const Contact *c, Touch *touch, PetscReal depth)
   g->slides = (PetscBool)(length > most);
   if (!g->slides)
     return;
-  g->turning = touch->k * most / length;
+  g->turning = touch->spring.k * most / length;
   turn(touch, s);
 }
 
-void SbFrictionDirection(const Contact *c, const Touch *touch, PetscReal push[3])
+void SbFrictionDirection(const Nodes *c, const ContactNode *touch, PetscReal push[3])
 {
   const SbFrictionState *g = &touch->friction;
   PetscReal t[3], length, part;
 
   for (int k = 0; k < 3; k++)
     t[k] = g->tangent[0][k];
-  length = across(touch->plane.n, t);
+  length = across(touch->facets.plane.n, t);
   part = g->slides && !careful(g) && length > 0 ? coefficient(c, g) / length : 0;
   for (int k = 0; k < 3; k++)
-    push[k] = touch->plane.n[k] - part * t[k];
+    push[k] = touch->facets.plane.n[k] - part * t[k];
 }
 
-PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch)
+PetscErrorCode SbFrictionConstrain(const Nodes *c, SbSpace space, ContactNode *touch)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -128,13 +128,13 @@ PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch
     const PetscReal fixed[3] = {bits == 1, bits == 2, bits == 4};
     PetscReal v[3];
 
-    SbCross(touch->plane.n, fixed, v);
+    SbCross(touch->facets.plane.n, fixed, v);
     turn(touch, SbDot3(v, v) > 1e-12 ? v : g->tangent[0]);
   }
   for (int q = 0; q < 2; q++) {
     const PetscReal *t = g->tangent[q];
     SbConstraint row = {.node = touch->node,
-                        .value = SbDot3(t, touch->start) - SbDot3(t, g->stretch)};
+                        .value = SbDot3(t, touch->friction.start) - SbDot3(t, g->stretch)};
 
     for (int k = 0; k < 3; k++)
       row.n[k] = row.push[k] = t[k];
@@ -145,13 +145,13 @@ PetscErrorCode SbFrictionConstrain(const Contact *c, SbSpace space, Touch *touch
       g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
     }
     row.spring = PETSC_TRUE;
-    row.stiffness = !careful(g) && !g->slides ? touch->k : careful(g) || q ? g->turning : 0;
+    row.stiffness = !careful(g) && !g->slides ? touch->spring.k : careful(g) || q ? g->turning : 0;
     PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N)
+void SbFrictionRead(const Nodes *c, SbSpace space, ContactNode *touch, PetscReal N)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -168,20 +168,21 @@ void SbFrictionRead(const Contact *c, SbSpace space, Touch *touch, PetscReal N)
 
 /* The same by springs for a pair that alternates (SbFrictionUpdate()); N is the mean of both
    solves. */
-static PetscReal update_by_secant(const Contact *c, PetscReal before, Touch *touch)
+static PetscReal update_by_secant(const Nodes *c, PetscReal before, ContactNode *touch)
 {
   SbFrictionState *g = &touch->friction;
   const PetscReal mu = coefficient(c, g);
   const PetscReal most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
   const PetscReal length = slip(touch, s);
-  const PetscReal part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
+  const PetscReal part = length > 0 ? PetscMin(touch->spring.k, most / length) : touch->spring.k;
 
   for (int k = 0; k < 3; k++)
     wrong[k] = g->force[k] + part * s[k];
-  g->slides = (PetscBool)(touch->k * length > most);
+  g->slides = (PetscBool)(touch->spring.k * length > most);
   g->pressing = 0.5 * (before + g->pressing);
-  g->turning = length > 0 ? PetscMin(touch->k, mu * PetscMax(0, g->pressing) / length) : touch->k;
+  g->turning = length > 0 ? PetscMin(touch->spring.k, mu * PetscMax(0, g->pressing) / length)
+                          : touch->spring.k;
   if (g->slides)
     turn(touch, s);
   return PetscSqrtReal(SbDot3(wrong, wrong));
@@ -191,7 +192,7 @@ static PetscReal update_by_secant(const Contact *c, PetscReal before, Touch *tou
    the slip s and a stiffness k, the trial force is T + k s, or k s with springs. It slides where
    that is longer than mu N, with T = mu N along it; the derivative of that direction is the
    stiffness across it. */
-static PetscReal update(const Contact *c, Touch *touch)
+static PetscReal update(const Nodes *c, ContactNode *touch)
 {
   SbFrictionState *g = &touch->friction;
   const PetscReal most = coefficient(c, g) * PetscMax(0, g->pressing);
@@ -202,7 +203,7 @@ static PetscReal update(const Contact *c, Touch *touch)
 
   slip(touch, s);
   for (int k = 0; k < 3; k++)
-    trial[k] = touch->k * s[k] - (springs(c, g) ? 0 : g->force[k]);
+    trial[k] = touch->spring.k * s[k] - (springs(c, g) ? 0 : g->force[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
 
   /* slid backwards: sticks */
@@ -214,17 +215,17 @@ static PetscReal update(const Contact *c, Touch *touch)
       g->flips++;
     for (int k = 0; k < 3; k++)
       wrong[k] = g->force[k] + most / size * trial[k];
-    g->turning = touch->k * most / over;
+    g->turning = touch->spring.k * most / over;
     turn(touch, trial);
   } else if (slid) {
     g->flips++;
     for (int k = 0; k < 3; k++)
-      wrong[k] = touch->k * s[k];
+      wrong[k] = touch->spring.k * s[k];
   }
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N)
+PetscReal SbFrictionUpdate(const Nodes *c, ContactNode *touch, PetscReal N)
 {
   SbFrictionState *g = &touch->friction;
   const PetscReal before = g->pressing;
@@ -236,12 +237,12 @@ PetscReal SbFrictionUpdate(const Contact *c, Touch *touch, PetscReal N)
   error = careful(g) ? update_by_secant(c, before, touch) : update(c, touch);
   if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
     g->flips = 2 * FLIPS;
-    g->turning = touch->k;
+    g->turning = touch->spring.k;
   }
   return error;
 }
 
-void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
+void SbFrictionAccept(const Nodes *c, ContactNode *touch, PetscBool presses)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -253,5 +254,14 @@ void SbFrictionAccept(const Contact *c, Touch *touch, PetscBool presses)
   }
   g->slid = g->slides;
   for (int k = 0; k < 3; k++)
-    g->stretch[k] = springs(c, g) ? -g->force[k] / touch->k : 0;
+    g->stretch[k] = springs(c, g) ? -g->force[k] / touch->spring.k : 0;
+}
+
+void SbFrictionRotate(const SbPose *pose, SbFrictionState *g)
+{
+  const PetscReal *R = pose->R;
+  const PetscReal *s = g->stretch;
+
+  for (int k = 0; k < 3; k++)
+    g->kept[k] = R[k] * s[0] + R[3 + k] * s[1] + R[6 + k] * s[2];
 }

@@ -1,9 +1,9 @@
 /*
-  contact.c - the effect `contact`: its options, and which response a scene gets.
+  options.c - the effect `contact`: its options, and which response a scene gets.
 
   Without an obstacle: contact between the bodies of the sets, and self-contact on request, by
   `barrier`. With an obstacle: contact of the surfaces `on` with it, by `barrier` or by responses of
-  nodes (contact_node.c).
+  nodes (nodes.c).
 
   Response `auto` is the same for all effects of a scene, as Newton's method has one potential and
   one set of constraints: `barrier` with contact between bodies. `projected` is exact, and safe for
@@ -11,7 +11,8 @@
   penetrate edges and faces, or be passed within a step: there it is `barrier`, unless the scene
   needs an option that it lacks.
 */
-#include "barrier_impl.h"
+#include "barrier.h"
+#include "nodes.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
@@ -103,171 +104,146 @@ static const char *const names_of_responses[] = {"auto",      "projected", "mult
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
-static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
+/* What contact effects ask for, one or several of them. */
+typedef struct {
+  PetscBool bodies;    /* some is contact between bodies */
+  PetscBool facets;    /* some obstacle is neither a half-space nor a bowl */
+  PetscBool lacks;     /* some obstacle has an option that `barrier` lacks */
+  SbResponse response; /* the option of the last one that gives it; AUTO: none does */
+} Wishes;
+
+/* Adds what one effect of the scene asks for, nothing if it is of another type. */
+static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
 {
-  PetscBool bodies = PETSC_FALSE;  /* some effect is contact between bodies */
-  PetscBool vertices = PETSC_TRUE; /* all obstacles are half-spaces and bowls */
-  PetscBool lacks = PETSC_FALSE;   /* some obstacle has an option that `barrier` lacks */
-  PetscBool possible = PETSC_TRUE;
-  PetscInt n = 0;
-  int choice;
-  char(*names)[SB_NAME_MAX] = NULL, text[PETSC_MAX_PATH_LEN];
-  SbResponse other = AUTO; /* option of this effect, or of the last one that has it */
+  char text[PETSC_MAX_PATH_LEN];
+  int response;
   SbScope scope;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = -1; i < n; i++) { /* this effect first */
-    const char *name = i < 0 ? e->name : names[i];
-
-    SbScopeSet(&scope, "effect", "", name);
-    PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
-    if (strcmp(text[0] ? text : name, "contact"))
-      continue;
-    SbScopeSet(&scope, "effect", "contact", name);
-    PetscCall(SbOptionChoice(&scope, "response", &choice));
-    if (choice != AUTO)
-      other = (SbResponse)choice;
-    PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
-    bodies = (PetscBool)(bodies || !text[0]);
-    vertices = (PetscBool)(vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
-    for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-      PetscBool given;
-
-      PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
-      lacks = (PetscBool)(lacks || given);
-    }
-    if (i >= 0)
-      continue;
-    *response = other;
-    PetscCheck(!bodies || other == AUTO || other == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
-               "it out, or "
-               "give -effect_%s_obstacle",
-               e->name, names_of_responses[other], e->name);
-    if (other != AUTO)
-      PetscFunctionReturn(PETSC_SUCCESS);
-    if (SbOptionFind(&SbRunScope, "effects"))
-      PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+  SbScopeSet(&scope, "effect", "", name);
+  PetscCall(SbOptionString(&scope, "type", SB_NAME_MAX, text));
+  if (strcmp(text[0] ? text : name, "contact"))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  SbScopeSet(&scope, "effect", "contact", name);
+  PetscCall(SbOptionChoice(&scope, "response", &response));
+  if (response != AUTO)
+    wishes->response = (SbResponse)response;
+  PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
+  if (!text[0]) {
+    wishes->bodies = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscFree(names));
+  if (strncmp(text, "plane", 5) && strncmp(text, "bowl", 4))
+    wishes->facets = PETSC_TRUE;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+    PetscBool given;
 
-  /* the integrator, where the program has one */
+    PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
+    wishes->lacks = (PetscBool)(wishes->lacks || given);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
+static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
+{
+  PetscBool possible = PETSC_TRUE;
+  Wishes wishes = {0};
+
+  PetscFunctionBeginUser;
+
+  /* the effect's own option */
+  PetscCall(add_wishes(e->name, &wishes));
+  *response = wishes.response;
+  PetscCheck(!wishes.bodies || *response == AUTO || *response == BARRIER, PETSC_COMM_WORLD,
+             PETSC_ERR_USER_INPUT,
+             "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
+             "it out, or give -effect_%s_obstacle",
+             e->name, names_of_responses[*response], e->name);
+  if (*response != AUTO)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* what all effects of the scene ask for, and the integrator, where the program has them */
+  if (SbOptionFind(&SbRunScope, "effects")) {
+    PetscInt n;
+    char(*names)[SB_NAME_MAX];
+
+    PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
+    for (PetscInt i = 0; i < n; i++)
+      PetscCall(add_wishes(names[i], &wishes));
+    PetscCall(PetscFree(names));
+  }
   if (SbOptionFind(&SbRunScope, "time")) {
-    PetscCall(SbOptionChoice(&SbRunScope, "time", &choice));
-    possible = (PetscBool)(choice == 0 || choice == 6); /* euler_implicit, static */
+    int time;
+
+    PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
+    possible = (PetscBool)(time == 0 || time == 6); /* euler_implicit, static */
   }
 
-  *why = bodies          ? "bodies meet each other"
-         : other != AUTO ? "the same as another effect"
-         : !possible     ? "-time"
-         : lacks         ? "an option that barrier lacks"
-         : vertices      ? "half-spaces and bowls only"
-                         : "edges and corners may touch";
-  if (other == AUTO)
-    other = !possible || lacks || vertices ? PROJECTED : BARRIER;
-  *response = bodies || other == BARRIER ? BARRIER : PROJECTED;
+  /* the first rule that holds */
+  {
+    const struct {
+      PetscBool holds;
+      SbResponse response;
+      const char *why;
+    } rule[] = {
+      {wishes.bodies, BARRIER, "bodies meet each other"},
+      {(PetscBool)(wishes.response == BARRIER), BARRIER, "the same as another effect"},
+      {(PetscBool)(wishes.response != AUTO), PROJECTED, "the same as another effect"},
+      {(PetscBool)!possible, PROJECTED, "-time"},
+      {wishes.lacks, PROJECTED, "an option that barrier lacks"},
+      {(PetscBool)!wishes.facets, PROJECTED, "half-spaces and bowls only"},
+      {PETSC_TRUE, BARRIER, "edges and corners may touch"},
+    };
+    size_t k = 0;
+
+    while (!rule[k].holds)
+      k++;
+    *response = rule[k].response;
+    *why = rule[k].why;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
-  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
-                                        "torque_y", "torque_z", "contacts", "penetration"};
   Contact *c = (Contact *)e->data;
   const char *why = NULL;
-  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
   PetscBool given;
   PetscReal steps;
 
   PetscFunctionBeginUser;
-  e->ops = SbContactNodeOps;
+  e->contact = &c->base;
+  c->base.effect = e;
   PetscCall(choose(e, &c->response, &why));
   if (why)
     SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
 
-  /* the obstacle and its path; without one: options of contact between bodies */
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  if (text[0]) {
-    SbOptionName(scope, "obstacle", sizeof(option), option);
-    PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-    c->facets = (PetscBool)!strncmp(text, "mesh:", 5);
-    if (c->facets) {
-      PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
-      PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
-    }
-    PetscCall(SbPathRead(e, scope, PETSC_FALSE, &c->path));
-  } else {
-    for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-      PetscCall(SbOptionGiven(scope, exact_only[k], &given));
-      PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-                 "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
-                 "leave it out",
-                 e->name, exact_only[k]);
-    }
-    PetscCall(SbOptionBool(scope, "self", &c->self));
-    PetscCall(SbOptionBool(scope, "pairs", &c->pairs));
+  /* the obstacle and its path; contact between bodies has none of the options of obstacles */
+  PetscCall(SbPartnerRead(e, scope, &c->partner));
+  for (size_t k = 1; !c->partner.obstacle && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+    PetscCall(SbOptionGiven(scope, exact_only[k], &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
+               "leave it out",
+               e->name, exact_only[k]);
   }
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
   c->overlap.recovery = steps > 1 ? PetscExpReal(-1 / steps) : 0;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
-  e->euler = (PetscBool)(c->bounce.e > 0);
-  if (c->response == BARRIER) {
+  c->base.restitution = c->bounce.e;
+  if (c->response == BARRIER)
     PetscCall(SbBarrierCreate(e, scope));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
-  if (c->friction.mu_kinetic < 0)
-    c->friction.mu_kinetic = c->friction.mu;
-  PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
-             "start and stop in turn",
-             e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
-  PetscCall(SbOptionSecond(scope, "time_of_impact", &c->cut));
-  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
-  PetscCall(SbOptionReal(scope, "damping", &c->damping));
-  PetscCheck(
-    c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
-    e->name, (double)c->damping, e->name);
-  PetscCheck(!e->euler || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier",
-             e->name, (double)c->bounce.e, e->name);
-  PetscCheck(
-    !e->euler || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
-    "that ends at the impact has no rebound; leave one of them out",
-    e->name, (double)c->bounce.e, e->name);
-
-  e->nstate = SB_CONTACT_STATE;
-  e->by_node = PETSC_TRUE;
-  e->column = columns;
-  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
-  e->saddle = (PetscBool)(c->response == MULTIPLIER);
-  e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
-  if (!c->cut)
-    e->ops.time_of_impact = NULL;
-  if (!e->euler)
-    e->ops.restitution = NULL;
-  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
-  if (c->held) {
-    e->ops.force = NULL; /* forces come from the constraints */
-    e->ops.tangent = NULL;
-  } else {
-    e->ops.assemble_constraints = NULL;
-    e->linear = PETSC_FALSE;
-    if (c->response == PENALTY && !c->cut)
-      e->ops.update_active_set = NULL;
-  }
+  else
+    PetscCall(SbContactNodesCreate(e, scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
-  .size = sizeof(Barrier),
+  .size = PetscMax(sizeof(Barrier), sizeof(Nodes)),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

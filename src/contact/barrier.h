@@ -1,0 +1,263 @@
+/*
+  barrier.h - the response `barrier`.
+*/
+#pragma once
+#include "contact_impl.h"
+#include "pairs.h"
+
+/* A pair with a gap below the width, at the current positions. */
+typedef struct {
+  SbContactPair pair;
+  PetscReal gap; /* m */
+  SbDistance at;
+} Active;
+
+/* A pair with friction in this step. */
+typedef struct {
+  Active on;       /* when its normal force was taken */
+  PetscReal force; /* mu N, N */
+  PetscReal
+    rotation[3];     /* displacement of the obstacle's contact point by rotation, beyond that of its
+                              vertices, m; with the sign of its weights */
+  PetscReal slip[3]; /* at the last Hessian, m */
+  PetscBool turns, sticks; /* slip has reversed since: treated as sticking in the Hessian */
+} FrictionPair;
+typedef struct {
+  PetscInt n, size;
+  FrictionPair *pair; /* [n] */
+} FrictionPairs;
+
+/* A one-sided spring along a direction in this step: separates an overlap, or enforces
+   restitution. */
+typedef struct {
+  SbPenetration at;          /* of restitution: the point of the impact, without depth and area */
+  PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
+  PetscReal start;           /* that sum at the start of the step, m */
+  PetscBool held;            /* two-sided: it was active when its goal was changed */
+  PetscReal approach;        /* restitution: speed of approach, m/s */
+} Spring;
+
+typedef struct {
+  PetscReal width, pressure; /* m, Pa; 0: by body */
+  PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
+  PetscBool verify;
+  PetscInt friction_solves;     /* most lagged-friction iterations of a step; 0: by default */
+  PetscReal friction_tolerance; /* of the lag */
+} BarrierOptions;
+
+/* Positions of the surfaces' vertices within a step. */
+typedef struct {
+  PetscBool begun;  /* the run has begun */
+  PetscReal *x, *u; /* [nvertex][3] current ones, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start; /* [nvertex][3] at the start of the step, m */
+  PetscReal *from, *to; /* [obstacle's vertices][3] at the start and the end of the step, m */
+  PetscReal *other;     /* [nvertex][3] end of a motion, m */
+  PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */
+  PetscBool known;      /* x and the active pairs are up to date for u and progress */
+} BarrierMotion;
+
+/* By body, [nbody+1]; the obstacle's are infinite. */
+typedef struct {
+  PetscReal *w, *k, *mass; /* width, m; stiffness, Pa; mass, kg */
+  PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
+  PetscReal wider,
+    growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
+} BarrierWidths;
+
+typedef struct {
+  PetscInt n, size;
+  Active *pair; /* [n] ordered by number */
+} ActivePairs;
+
+typedef struct {
+  FrictionPairs pairs; /* in use */
+  FrictionPairs next;  /* with closest points and normal forces at the end of the step */
+  PetscReal slip;      /* sticking slip e, m */
+  PetscInt nlag;       /* lagged-friction iterations of this step */
+  PetscReal lag;       /* the last lag, relative to mu N of all pairs */
+  PetscReal least;     /* least lag of the solutions of this step */
+  PetscInt nstuck;     /* number of solutions since */
+  PetscBool said;      /* the warning that it does not settle was given */
+  PetscReal most;      /* largest lag of the run */
+  PetscReal loss;      /* since the start, this rank's, J */
+} PairFriction;
+
+/* Overlap of surfaces, and how it is separated. */
+typedef struct {
+  PetscBool overlapping; /* there is some */
+  PetscBool parted;      /* there was some at the start of this load step */
+  PetscBool searched;    /* it was searched for when the run began */
+  PetscBool announced;   /* the warning was given */
+  PetscReal stiffer; /* factor on the stiffness of springs, by their success in the last steps */
+  SbContactOverlap overlap;
+} Separation;
+
+typedef struct {
+  PetscInt n, size; /* those of overlap, the same on every rank, */
+  PetscInt nbounce; /* then those of restitution, of this rank's pairs */
+  Spring *spring;   /* [n] */
+} Springs;
+
+/* This rank's sums, J. */
+typedef struct {
+  PetscReal energy;         /* of the barrier at the start, then at the end of the step */
+  PetscReal obstacle_power; /* work along the obstacle's path in this step, forces of its start */
+  PetscReal work;           /* on the bodies since the start */
+} BarrierSums;
+
+/* Of the run, for the summary. */
+typedef struct {
+  PetscReal least, shortest; /* smallest gap, m; shortest safe part of an iteration */
+  PetscInt most;             /* largest number of active pairs */
+} BarrierRecord;
+
+/* History columns of pairs of bodies. */
+typedef struct {
+  PetscInt nsurface, *slot; /* bodies that take part; [nbody] number among them, -1: it does not */
+  PetscInt *place;          /* [nsurface][nsurface] first column of a pair, the lower body first */
+  const char **column;      /* [ncolumn] all of the effect; NULL: none of pairs */
+  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
+} PairColumns;
+
+typedef struct {
+  Contact contact; /* first */
+  BarrierOptions options;
+  SbContactSurface surface;
+  SbContactPairs pairs;
+  BarrierMotion motion;
+  BarrierWidths widths;
+  ActivePairs active;
+  PairFriction friction;
+  Separation separation;
+  Springs springs;
+  SbContactBlocks blocks; /* of a Hessian while it is summed up */
+  BarrierSums sums;
+  BarrierRecord record;
+  PairColumns columns;
+} Barrier;
+
+/* The value of a pair from those of its sides: width or pressure. */
+static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
+                                const SbContactPair *pair)
+{
+  const PetscInt *part = b->surface->part;
+
+  return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
+}
+
+/* Whether this rank counts the pair. */
+static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
+{
+  return (PetscBool)b->surface->own[pair->v[pair->v[0] < b->surface->nbody_vertex ? 0 : 1]];
+}
+
+/* Makes e, with its Contact, an effect of the response `barrier`. Not collective. */
+PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);
+/* Positions at the local displacements u; pairs with gaps below the width, ordered by number.
+   Collective. */
+PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
+/* Tangential slip u of a pair since the step began, m; its length. */
+static inline PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction,
+                                      PetscReal u[3])
+{
+  PetscReal normal = 0.;
+
+  for (int i = 0; i < 3; i++) {
+    u[i] = -b->contact.base.progress * friction->rotation[i];
+    for (int k = 0; k < 4; k++)
+      u[i] += friction->on.at.weight[k] * (b->motion.x[3 * friction->on.pair.v[k] + i] -
+                                           b->motion.start[3 * friction->on.pair.v[k] + i]);
+    normal += u[i] * friction->on.at.n[i];
+  }
+  for (int i = 0; i < 3; i++)
+    u[i] -= normal * friction->on.at.n[i];
+  return PetscSqrtReal(SbDot3(u, u));
+}
+/* f0'/y of the slip y, 1/m. */
+static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
+{
+  return y < b->friction.slip ? 2. / b->friction.slip - y / PetscSqr(b->friction.slip) : 1. / y;
+}
+/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
+PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,
+                               PetscReal gradient[12]);
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's
+   sum, J. */
+PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
+/* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of
+   e. */
+PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh);
+/* Into `next` normal forces and directions at the current positions, at the end of the step or its
+   start. */
+PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
+/* Swaps `next` and the friction in use. */
+void SbBarrierSwapFriction(Barrier *b);
+/* Computes `lag` (friction_pairs.c), and `next` at the end of the step. Collective. */
+PetscErrorCode SbBarrierLag(Barrier *b);
+/* Finds overlaps at the current positions, and the springs that separate them in a step of length
+   dt, s; `first` of a run: errors where they cannot. Collective. */
+PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
+/* normal . sum weight x of a spring at the current positions, m. */
+static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spring)
+{
+  PetscReal g = 0.;
+
+  for (PetscInt k = 0; k < spring->at.n; k++)
+    g += spring->at.weight[k] * SbDot3(spring->at.normal, b->motion.x + 3 * spring->at.v[k]);
+  return g;
+}
+/* Its force, N, and the gradient of its energy by its vertices, N. */
+static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring,
+                                        PetscReal gradient[15])
+{
+  const PetscReal all = spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring));
+  const PetscReal force = spring->held ? all : PetscMax(0., all);
+
+  for (int k = 0; k < 15; k++)
+    gradient[k] = -force * spring->at.weight[k / 3] * spring->at.normal[k % 3];
+  return force;
+}
+/* A term of the potential at the current positions: active pairs, then those with friction, then
+   springs. */
+typedef struct {
+  PetscInt n, nfirst; /* number of its vertices, and of those of the first side */
+  const PetscInt *v;
+  PetscBool counts;                 /* this rank counts it */
+  PetscReal energy, force;          /* J; normal force, 0 of friction, N */
+  PetscReal gradient[15];           /* of the energy by the vertices, N */
+  const PetscReal *weight, *normal; /* normal . sum weight x is the gap or its like */
+} Term;
+static inline PetscInt nterm(const Barrier *b)
+{
+  return b->motion.begun ? b->active.n + b->friction.pairs.n + b->springs.n : 0;
+}
+void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
+
+/* x[nvertex][3] = positions, m, at u and after the fraction `progress` of the obstacle's path.
+   Collective. */
+PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
+                              PetscReal x[]);
+
+/* Operations (sbcontact.h, sbeffect.h). */
+PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,
+                                            const PetscReal u0[], const PetscReal v0[]);
+PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work);
+PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal share);
+PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
+PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                         PetscReal *energy, PetscReal f[]);
+PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal f[], PetscReal *bound);
+PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);
+PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                               PetscBool solved, PetscBool *again);
+PetscErrorCode SbContactGap_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
+                                    PetscReal gap[], PetscReal normal[]);
+PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
+                                       SbContactPoints *list);
+PetscErrorCode SbContactNearest_Barrier(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
+                                        char text[]);
+PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
+                                       const PetscReal r[], PetscReal values[]);
+PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);

@@ -1,0 +1,325 @@
+/*
+  barrier_terms.c - the pairs of the response `barrier` at an iterate, their energy and its
+  derivatives, and those of friction, described in response_barrier.c.
+*/
+#include "barrier.h"
+
+PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
+                              PetscReal x[])
+{
+  const PetscInt first = 3 * b->surface->nbody_vertex;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactSurfaceGetPositions(b->surface, u, x));
+  for (PetscInt k = first; k < 3 * b->surface->nvertex; k++)
+    x[k] = progress == 1. ? b->motion.to[k - first]
+                          : b->motion.from[k - first] +
+                              progress * (b->motion.to[k - first] - b->motion.from[k - first]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_active(const void *x, const void *y, void *unused)
+{
+  const SbContactPair *p = &((const Active *)x)->pair;
+  const SbContactPair *q = &((const Active *)y)->pair;
+
+  (void)unused;
+  if (p->side != q->side)
+    return p->side ? 1 : -1;
+  if (p->kind != q->kind)
+    return p->kind < q->kind ? -1 : 1;
+  for (int k = 0; k < 4; k++)
+    if (p->v[k] != q->v[k])
+      return p->v[k] < q->v[k] ? -1 : 1;
+  return 0;
+}
+
+PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
+{
+  const PetscInt n = 3 * b->surface->space->nnode_owned;
+  PetscBool same;
+
+  PetscFunctionBeginUser;
+  if (!b->motion.begun)
+    PetscFunctionReturn(PETSC_SUCCESS); /* no pair is active */
+  PetscCall(PetscArraycmp(u, b->motion.u, b->motion.known ? n : 0, &same));
+  same = (PetscBool)(b->motion.known && same && b->motion.progress == b->contact.base.progress);
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->surface->space->comm));
+  if (same)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArraycpy(b->motion.u, u, n));
+  b->motion.progress = b->contact.base.progress;
+  b->motion.known = PETSC_TRUE;
+  PetscCall(SbBarrierPlace(b, u, b->contact.base.progress, b->motion.x));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  b->active.n = 0;
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    Active a;
+
+    if (SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
+      continue;
+    a.gap = SbContactPairGap(b->surface, pair, b->motion.x, &a.at);
+    if (a.gap >= of_pair(b, b->widths.w, pair))
+      continue;
+    a.pair = *pair;
+    PetscCall(
+      SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));
+    b->active.pair[b->active.n++] = a;
+  }
+  if (b->active.n > 1)
+    PetscCall(
+      PetscTimSort(b->active.n, b->active.pair, sizeof(*b->active.pair), compare_active, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbBarrierNormalForce(const Barrier *b, const Active *a, PetscReal *energy,
+                               PetscReal gradient[12])
+{
+  const SbContactPair *pair = &a->pair;
+  PetscReal force = 0.;
+  PetscReal w2 = 0.;
+
+  SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
+                of_pair(b, b->widths.k, pair), energy, gradient, PETSC_FALSE, NULL);
+  for (int k = 0; k < 4; k++) {
+    force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
+    w2 += PetscSqr(a->at.weight[k]);
+  }
+  return PetscMax(0., force / w2);
+}
+
+/* f += sign times the gradient of n vertices, distributed to their owned nodes, N. */
+static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
+                   const PetscReal gradient[], PetscReal f[])
+{
+  const SbContactSurface m = b->surface;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt v = vertex[k];
+
+    if (v >= m->nbody_vertex)
+      continue;
+    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned)
+        continue;
+      for (int i = 0; i < 3; i++)
+        f[3 * m->node[j] + i] += sign * m->weight[j] * gradient[3 * k + i];
+    }
+  }
+}
+
+/* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to
+   first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not
+   matter here. */
+PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal f[], PetscReal *bound)
+{
+  Barrier *b = (Barrier *)contact;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, u));
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
+    const SbContactPair *pair = &a->pair;
+    PetscReal d[3], energy, gradient[12];
+    const PetscReal force = SbBarrierNormalForce(b, a, &energy, gradient);
+
+    SbBarrier(a->gap, of_pair(b, b->widths.w, pair), of_pair(b, b->widths.k, pair), pair->area, d);
+    if (d[0] <= 0.)
+      continue;
+    if (counts(b, pair))
+      *bound += 0.5 * force * a->gap;
+    for (int k = 0; k < 12; k++)
+      gradient[k] = energy / d[0] * d[2] * a->gap * a->at.weight[k / 3] * a->at.n[k % 3];
+    spread(b, pair->side ? 1 : 4, pair->v, 1., gradient, f);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
+{
+  const PetscInt k = i - b->active.n;
+
+  if (k < b->friction.pairs.n) {
+    const Active *a = k < 0 ? &b->active.pair[i] : &b->friction.pairs.pair[k].on;
+
+    t->n = 4;
+    t->nfirst = SbContactPairSplit(&a->pair);
+    t->v = a->pair.v;
+    t->counts = counts(b, &a->pair);
+    t->weight = a->at.weight;
+    t->normal = a->at.n;
+    t->force = 0.;
+    if (k < 0)
+      t->force = SbBarrierNormalForce(b, a, &t->energy, t->gradient);
+    else {
+      PetscReal u[3];
+      const PetscReal y = SbBarrierSlip(b, &b->friction.pairs.pair[k], u);
+      const PetscReal w = b->friction.slip;
+      const PetscReal N = b->friction.pairs.pair[k].force;
+
+      for (int c = 0; c < 12; c++)
+        t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
+      t->energy = N * (y < w ? y * y / w - y * y * y / (3. * w * w) + w / 3. : y);
+    }
+  } else {
+    const Spring *spring = &b->springs.spring[k - b->friction.pairs.n];
+
+    t->n = spring->at.n;
+    for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++)
+      continue;
+    t->v = spring->at.v;
+    t->weight = spring->at.weight;
+    t->normal = spring->at.normal;
+    t->counts = (PetscBool)b->surface->own[spring->at.v[0]];
+    t->force = SbBarrierSpring(b, spring, t->gradient);
+    t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
+  }
+}
+
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's
+   sum, J. */
+PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[])
+{
+  PetscReal sum = 0.;
+
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    spread(b, t.n, t.v, sign, t.gradient, f);
+    if (t.counts)
+      sum += t.energy;
+  }
+  return sum;
+}
+
+PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, stage->u));
+  (void)SbBarrierAddGradient(b, -1., f);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                         PetscReal *energy, PetscReal f[])
+{
+  Barrier *b = (Barrier *)contact;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, u));
+  *energy += SbBarrierAddGradient(b, 1., f);
+
+  /* pairs whose slip has reversed since the Hessian was evaluated */
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    PetscReal slip[3];
+
+    (void)SbBarrierSlip(b, &b->friction.pairs.pair[i], slip);
+    if (SbDot3(slip, b->friction.pairs.pair[i].slip) < 0.)
+      b->friction.pairs.pair[i].turns = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the blocks of a Hessian by n vertices where one of both has nodes here; H[144], or with
+   `weight` H[9] with respect to the weighted sum of positions. */
+static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[],
+                                 const PetscReal weight[], const PetscReal H[])
+{
+  const SbContactSurface m = b->surface;
+
+  PetscFunctionBeginUser;
+  for (PetscInt p = 0; p < n; p++) {
+    for (PetscInt q = p; q < n; q++) {
+      const PetscInt v = vertex[p];
+      const PetscInt w = vertex[q];
+      PetscReal block[9];
+
+      if (v >= m->nbody_vertex || w >= m->nbody_vertex || !(m->mine[v] | m->mine[w]))
+        continue;
+      for (int k = 0; weight && k < 9; k++)
+        block[k] = weight[p] * weight[q] * H[k];
+      PetscCall(
+        SbContactBlocksAdd(&b->blocks, v, w, weight ? block : H + 36 * p + 3 * q, weight ? 3 : 12));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
+{
+  Barrier *b = (Barrier *)contact;
+  PetscReal energy, gradient[12], H[144];
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, u));
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
+    const SbContactPair *pair = &a->pair;
+
+    SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
+                  of_pair(b, b->widths.k, pair), &energy, gradient,
+                  (PetscBool)(kind != SB_HESSIAN_EXACT), H);
+    PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
+  }
+
+  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from
+     above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is
+     treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full
+     step leaves it beyond e, it slides. */
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    FrictionPair *friction = &b->friction.pairs.pair[i];
+    PetscReal T[9];
+    const PetscReal y = SbBarrierSlip(b, friction, friction->slip);
+    const PetscReal w = b->friction.slip;
+    PetscReal slope = SbBarrierSlope(b, y);
+    PetscReal curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
+
+    friction->sticks =
+      (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
+                  (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
+    friction->turns = PETSC_FALSE;
+    if (friction->sticks) {
+      PetscReal force[12];
+
+      for (int k = 0; k < 12; k++)
+        force[k] = friction->force * (1. / w - slope) * friction->on.at.weight[k / 3] *
+                   friction->slip[k % 3];
+      spread(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, 1., force, r);
+      slope = curve = 1. / w;
+    } else if (kind == SB_HESSIAN_MAJORIZED)
+      curve = slope;
+    for (int k = 0; k < 9; k++) {
+      T[k] = slope * ((k % 4 ? 0. : 1.) - friction->on.at.n[k / 3] * friction->on.at.n[k % 3]);
+      if (y > 0.)
+        T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
+      T[k] *= friction->force;
+    }
+    PetscCall(add_blocks(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v,
+                         friction->on.at.weight, T));
+  }
+
+  /* active springs */
+  for (PetscInt i = 0; i < b->springs.n; i++) {
+    const Spring *spring = &b->springs.spring[i];
+    PetscReal T[9];
+
+    if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal)
+      continue;
+    for (int k = 0; k < 9; k++)
+      T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];
+    PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
+  }
+  PetscCall(SbContactBlocksToNodes(b->surface, &b->blocks, blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,167 @@
+/*
+  initial_contacts.c - bodies that touch when a run begins are moved apart rigidly, before the first
+  step.
+*/
+#include "contact_impl.h"
+
+#define ROUNDS 20   /* most iterations of the separation of initial contacts */
+#define SWEEPS 1000 /* Gauss-Seidel sweeps over the contacts in each round */
+#define FAR 2.      /* largest displacement of a body per iteration, over the target gap */
+#define CLOSE 0.9   /* gap over the target gap below which there is contact */
+#define MISSED 1e-3 /* tolerance of the sweeps over the target gap */
+
+/* Order of initial contacts: bodies, direction, gap, target gap. */
+static int by_value(const void *a, const void *b)
+{
+  const SbInitialContact *p = a;
+  const SbInitialContact *q = b;
+  const PetscInt body =
+    p->body[0] != q->body[0] ? p->body[0] - q->body[0] : p->body[1] - q->body[1];
+  const PetscReal difference[6] = {
+    body, p->n[0] - q->n[0], p->n[1] - q->n[1], p->n[2] - q->n[2], p->gap - q->gap, p->to - q->to};
+
+  for (int i = 0; i < 6; i++)
+    if (difference[i] != 0.)
+      return difference[i] < 0. ? -1 : 1;
+  return 0;
+}
+
+/* Gap of a contact after the displacements `way` of its two bodies, m. */
+static PetscReal gap_after(const SbInitialContact *t, const PetscReal way[])
+{
+  return t->gap + SbDot3(t->n, way + 3 * t->body[0]) - SbDot3(t->n, way + 3 * t->body[1]);
+}
+
+/* Squared length of the part of a contact's normal along which its two bodies are not fixed. */
+static PetscReal free_part(const SbInitialContact *t, const uint8_t fixed[])
+{
+  PetscReal sum = 0.;
+
+  for (int k = 0; k < 6; k++)
+    if (!(fixed[t->body[k / 3]] >> (k % 3) & 1))
+      sum += PetscSqr(t->n[k % 3]);
+  return sum;
+}
+
+/* Gauss-Seidel: each contact moves its bodies along it, except fixed components; way[nbody + 1][3],
+   m. */
+static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt nbody,
+                          const uint8_t fixed[], PetscReal way[])
+{
+  PetscReal worst = 1.;
+
+  for (PetscInt k = 0; k < 3 * (nbody + 1); k++)
+    way[k] = 0.;
+  for (int sweep = 0; sweep < SWEEPS && worst > MISSED; sweep++) {
+    worst = 0.;
+    for (PetscInt i = 0; i < n; i++) {
+      const SbInitialContact *t = &touch[i];
+      const PetscReal missing = t->to - gap_after(t, way);
+      const PetscReal sum = free_part(t, fixed);
+
+      if (missing <= 0. || sum < MISSED)
+        continue;
+      worst = PetscMax(worst, missing / t->to);
+      for (int k = 0; k < 6; k++) {
+        const PetscInt b = t->body[k / 3];
+
+        if (!(fixed[b] >> (k % 3) & 1))
+          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * missing / sum * t->n[k % 3];
+      }
+    }
+  }
+}
+
+/* Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed
+   components allow. Bodies enclosed by others without enough space are fixed. Displacements are
+   limited to a few gaps, the distance within which contacts were searched. fixed[nbody + 1]: bit c,
+   component c is prescribed or was fixed here; way[nbody + 1][3], m. Returns whether some body
+   moves. */
+static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody,
+                           uint8_t fixed[], PetscReal way[])
+{
+  PetscReal longest = 0.;
+  PetscReal most = PETSC_MAX_REAL;
+  PetscBool again = PETSC_FALSE;
+
+  for (PetscInt i = 0; i < n; i++) {
+    const SbInitialContact *t = &touch[i];
+
+    again = (PetscBool)(again || (t->gap < CLOSE * t->to && free_part(t, fixed) >= MISSED));
+    most = PetscMin(most, FAR * t->to);
+  }
+  if (!again)
+    return PETSC_FALSE;
+
+  /* fix the bodies of contacts whose gap would decrease */
+  while (again) {
+    again = PETSC_FALSE;
+    sweep_touches(n, touch, nbody, fixed, way);
+    for (PetscInt i = 0; i < n; i++) {
+      const SbInitialContact *t = &touch[i];
+
+      if (gap_after(t, way) >= PetscMin(t->gap, t->to) - MISSED * t->to)
+        continue;
+      for (int k = 0; k < 2; k++) {
+        const PetscInt b = t->body[k];
+
+        again = (PetscBool)(again || fixed[b] != 7);
+        fixed[b] = 7;
+      }
+    }
+  }
+
+  /* limit the displacement */
+  for (PetscInt b = 0; b <= nbody; b++)
+    longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
+  for (PetscInt k = 0; longest > most && k < 3 * (nbody + 1); k++)
+    way[k] *= most / longest;
+  return (PetscBool)(longest > MISSED * most);
+}
+
+/* Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is
+   inactive. Effects move the vertices of remaining contacts. */
+PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U)
+{
+  const SbSpace s = contacts->space;
+  const PetscInt nbody = s->mesh->nbody;
+  uint8_t *fixed;
+  PetscReal *way, *u;
+  PetscBool go_on = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  if (!contacts->npotential)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalWrite(s, U, &u));
+  PetscCall(SbSpaceUpdateGhosts(s, u));
+  PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    fixed[s->node_body[i]] |= s->fixed[i];
+  fixed[nbody] = 7;
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, s->comm));
+  for (int round = 0; go_on && round < ROUNDS; round++) {
+    SbInitialContacts list = {0};
+    SbInitialContact *touch;
+    PetscInt n;
+
+    go_on = PETSC_FALSE;
+    for (PetscInt k = 0; k < contacts->n; k++)
+      PHASE_CALL(contacts->contact[k], initial_contacts, s, t, dt, u, &go_on, &list);
+    if (!go_on)
+      break;
+    PetscCall(SbAllgatherv(s->comm, MPI_BYTE, list.n * (PetscInt)sizeof(*touch), list.touch, &n,
+                           &touch, NULL));
+    n /= (PetscInt)sizeof(*touch);
+    if (n)
+      qsort(touch, (size_t)n, sizeof(*touch), by_value);
+    PetscCall(PetscFree(list.touch));
+    go_on = find_ways(n, touch, nbody, fixed, way);
+    PetscCall(PetscFree(touch));
+    for (PetscInt i = 0; go_on && i < 3 * s->nnode; i++)
+      u[i] += way[3 * s->node_body[i / 3] + i % 3];
+  }
+  PetscCall(PetscFree2(fixed, way));
+  PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

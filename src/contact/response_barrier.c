@@ -1,0 +1,585 @@
+/*
+  response_barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass
+  through each other.
+
+  Below the width w pairs of features repel each other by the barrier of pair_energy.c, an
+  energy that is infinite at contact. It is part of the potential that Newton's method minimises
+  (src/time/newton.c), and every iteration is limited by continuous collision detection
+  (pairs.c). So an accepted state can be reached from the one before it without
+  surfaces passing through each other.
+
+  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the
+  fraction that is completed. Newton's method raises it to one as fast as the surfaces allow.
+
+  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of
+  the step (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, section 4): the energy
+  mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt
+  times a small speed:
+
+    f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
+
+  In a static run, or with friction_solves, the step is solved again with the normal forces and
+  closest points of the last solution until friction changes by less than a tolerance
+  (friction_pairs.c), and reported.
+
+  Initial contact. Bodies that touch when a run begins are moved apart rigidly
+  (initial_contacts.c), by the width or, in a static run, half of it; where that fails, by their
+  vertices. Bodies that intersect are separated by penalty springs (separation.c).
+*/
+#include "barrier.h"
+
+#define WIDTH 1e-3      /* default w over the size of the smallest body */
+#define WIDTH_CUBE 3e-3 /* largest default w over the cube root of its volume */
+#define PRESSURE 0.1    /* of Young's modulus of the softer side */
+#define SLIP 1e-4       /* sticking speed over the speed of a step (SbModelStepSpeed()) */
+#define SLIP_LEAST \
+  1e-7 /* least sticking slip e of a time step over the size of the smallest body */
+#define SLIP_STATIC 1e-5 /* the same of a static load step */
+#define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
+#define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
+#define PASSES 200 /* sweeps over all pairs for that */
+#define WIDTH_LEAST \
+  1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
+
+static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
+{
+  Barrier *b = (Barrier *)e->data;
+  const PetscInt nbody = s->mesh->nbody;
+  PetscReal cube = PETSC_MAX_REAL;
+  SbFacet *facet;
+  PetscInt n, nmove, nobstacle;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPartnerSetUp(e, s->comm, &b->contact.partner));
+  PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
+  PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.partner.obstacle, &b->surface));
+  PetscCall(PetscFree(facet));
+  nmove = 3 * b->surface->nvertex;
+  nobstacle = nmove - 3 * b->surface->nbody_vertex;
+  s->coupled = PETSC_TRUE;
+  if (!b->contact.partner.obstacle)
+    PetscCall(SbBarrierFindBodies(e, s->mesh));
+
+  /* width and pressure of each body */
+  for (PetscInt i = 0; i < nbody; i++)
+    cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
+  PetscCall(PetscMalloc7(3 * nbody + 3, &b->widths.w, nmove, &b->motion.x, nmove, &b->motion.start,
+                         nmove, &b->motion.other, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+                         &b->motion.from, nobstacle, &b->motion.to));
+  b->widths.k = b->widths.w + nbody + 1;
+  b->widths.mass = b->widths.k + nbody + 1;
+  b->widths.w[nbody] = b->widths.k[nbody] = b->widths.mass[nbody] = b->contact.base.width =
+    PETSC_MAX_REAL;
+  for (PetscInt i = 0; i < nbody; i++) {
+    b->widths.w[i] = b->options.width > 0.
+                       ? b->options.width
+                       : PetscMin(PetscMin(WIDTH * b->surface->size, WIDTH_CUBE * cube),
+                                  0.5 * b->surface->shortest);
+    b->contact.base.width = PetscMin(b->contact.base.width, b->widths.w[i]);
+    b->widths.mass[i] = s->material[i]->density * s->mesh->body[i].volume;
+    b->widths.k[i] = b->options.pressure > 0. ? b->options.pressure
+                                              : PRESSURE * SbMaterialYoungModulus(s->material[i]);
+  }
+  PetscCheck(
+    b->widths.w[0] <= b->surface->shortest, s->comm, PETSC_ERR_USER_INPUT,
+    "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
+    "most half of that",
+    e->name, (double)b->options.width, (double)b->surface->shortest);
+  b->surface->self = b->options.self;
+  PetscCall(SbContactPairsCreate(b->surface, b->widths.w[0], &b->pairs));
+  b->record.least = PETSC_MAX_REAL;
+  b->record.shortest = b->separation.stiffer = b->widths.scale = 1.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
+static void find_path(Barrier *b, PetscReal t, PetscReal dt)
+{
+  const SbContactSurface m = b->surface;
+
+  if (!b->contact.partner.obstacle)
+    return;
+  SbPartnerBeginStep(t, dt, &b->contact.partner);
+  for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
+    SbPoseApply(&b->contact.partner.pose[0], m->X + 3 * v,
+                b->motion.from + 3 * (v - m->nbody_vertex));
+    SbPoseApply(&b->contact.partner.pose[1], m->X + 3 * v,
+                b->motion.to + 3 * (v - m->nbody_vertex));
+  }
+}
+
+/* The separation direction of a pair at distance zero: the normal of the triangle, or of both
+   edges, where surfaces face each other. n: from the second side to the first; false: none. */
+static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[],
+                        PetscReal n[3])
+{
+  const PetscReal *x[4];
+  PetscReal p[3], q[3], length;
+  PetscReal outward[2] = {0., 0.};
+  const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
+
+  for (int k = 0; k < 4; k++)
+    x[k] = b->motion.x + 3 * pair->v[k];
+  SbSubtract(x[edges ? 1 : 2], x[edges ? 0 : 1], p);
+  SbSubtract(x[3], x[edges ? 2 : 1], q);
+  SbCross(p, q, n);
+  length = PetscSqrtReal(SbDot3(n, n));
+  if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q)))
+    return PETSC_FALSE;
+  for (int k = 0; k < 4; k++)
+    outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]);
+  if (edges && outward[1] < 0.)
+    length = -length;
+  for (int i = 0; i < 3; i++)
+    n[i] /= length;
+  return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
+}
+
+static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, PetscReal t,
+                                               PetscReal dt, const PetscReal u[], PetscBool *first,
+                                               SbInitialContacts *list)
+{
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
+  const SbContactSurface m = b->surface;
+  const PetscReal tiny = 1e-9 * m->size;
+  PetscReal *normal;
+
+  PetscFunctionBeginUser;
+  if (b->motion.begun || t != 0.)
+    PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
+  *first = PETSC_TRUE;
+  find_path(b, t, dt);
+  PetscCall(SbContactSurfaceMarkDriven(m));
+  PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
+  PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
+  b->separation.searched = PETSC_TRUE;
+  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
+  SbContactSurfaceNormals(m, b->motion.x, normal);
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    SbInitialContact touch = {.body = {one, two},
+                              .to = (e->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair)};
+    SbDistance d;
+
+    if (one == two || !counts(b, pair))
+      continue;
+    if (SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, NEARBY * touch.to))
+      continue;
+    touch.gap = SbContactPairGap(m, pair, b->motion.x, &d);
+    if (touch.gap > NEARBY * touch.to)
+      continue;
+    for (int k = 0; k < 3; k++)
+      touch.n[k] = d.n[k];
+    if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n))
+      continue;
+    PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
+    list->touch[list->n++] = touch;
+  }
+  PetscCall(PetscFree(normal));
+  b->motion.known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u:
+   local displacements, changed. Every rank treats its own pairs; displacements of vertices are
+   summed over all. */
+static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactSurface m = b->surface;
+  const PetscReal tiny = 1e-9 * m->size;
+  PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
+
+  PetscFunctionBeginUser;
+  *moved = PETSC_FALSE;
+  PetscCall(PetscMalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
+  for (int pass = 0; pass < PASSES; pass++) {
+    PetscInt n = 0;
+
+    PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
+    SbContactSurfaceNormals(m, b->motion.x, normal);
+    PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+    PetscCall(PetscArrayzero(push, 4 * m->nvertex));
+    for (PetscInt i = 0; i < b->pairs->n; i++) {
+      const SbContactPair *pair = &b->pairs->pair[i];
+      const PetscReal goal = APART * of_pair(b, b->widths.w, pair);
+      PetscReal gap;
+      PetscReal sum = 0.;
+      SbDistance d;
+
+      if (!counts(b, pair))
+        continue;
+      gap = SbContactPairGap(m, pair, b->motion.x, &d);
+      if (gap >= 0.9 * goal)
+        continue;
+      if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
+        for (int k = 0; k < 3; k++) {
+          d.n[k] = 0.;
+          for (int v = SbContactPairSplit(pair); v < 4; v++)
+            d.n[k] += normal[3 * pair->v[v] + k];
+        }
+        if (SbNormalise(d.n) <= 0.)
+          continue;
+      }
+      for (int k = 0; k < 4; k++)
+        if (!m->driven[pair->v[k]])
+          sum += PetscSqr(d.weight[k]);
+      if (sum <= 0.)
+        continue;
+      n++;
+      for (int k = 0; k < 4; k++) {
+        const PetscInt v = pair->v[k];
+
+        if (m->driven[v] || d.weight[k] == 0.)
+          continue;
+        for (int j = 0; j < 3; j++)
+          push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
+        push[4 * v + 3]++;
+      }
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
+    if (!n)
+      break;
+    *moved = PETSC_TRUE;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL,
+                               MPI_SUM, s->comm));
+    for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
+        for (int i = 0; i < 3 && m->node[j] >= 0; i++)
+          if (!(m->fixed[j] >> i & 1))
+            u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
+    }
+  }
+  PetscCall(PetscFree2(push, normal));
+  b->motion.known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Energy of the barrier at the current positions, J, and the work of its forces there on the
+   obstacle along the path of this step, J; this rank's. They rotate with the obstacle: moment times
+   angle. */
+static PetscReal gap_energy(const Barrier *b, PetscReal *along)
+{
+  PetscReal sum = 0.;
+
+  *along = 0.;
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    if (!t.counts)
+      continue;
+    sum += t.energy;
+    for (int k = 0; b->contact.partner.obstacle && k < 4; k++) {
+      PetscReal way[3];
+
+      if (t.v[k] < b->surface->nbody_vertex)
+        continue;
+      SbPoseWay(&b->contact.partner.pose[0], &b->contact.partner.pose[1],
+                &b->contact.partner.pose[b->motion.progress > 0.], b->motion.x + 3 * t.v[k], way);
+      *along += SbDot3(t.gradient + 3 * k, way);
+    }
+  }
+  return sum;
+}
+
+/* w = scale times its default. */
+static void set_scale(SbEffect e, PetscReal scale)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  for (PetscInt i = 0; i < b->surface->space->mesh->nbody; i++)
+    b->widths.w[i] *= scale / b->widths.scale;
+  b->contact.base.width *= scale / b->widths.scale;
+  b->widths.scale = scale;
+  b->motion.known = PETSC_FALSE;
+}
+
+static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, PetscReal growth,
+                                          PetscBool *changed)
+{
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
+  PetscReal far = b->surface->size;
+  PetscReal least;
+
+  PetscFunctionBeginUser;
+  if (b->options.width > 0. || b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  b->widths.wider = factor > 1. ? factor : 0.;
+  b->widths.growth = growth;
+  if (factor > 1.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < 3 * b->surface->nbody_vertex; k++)
+    far = PetscMax(far, PetscAbsReal(b->surface->X[k]));
+  least = WIDTH_LEAST * far / b->contact.base.width;
+  if (least >= 1.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  set_scale(e, PetscMax(factor, least) * b->widths.scale);
+  *changed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
+                                         PetscReal speed, PetscReal u0[])
+{
+  Barrier *b = (Barrier *)contact;
+  const SbEffect e = contact->effect;
+  const SbContactSurface m = b->surface;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscReal energy[2], unused;
+  PetscBool moved;
+
+  PetscFunctionBeginUser;
+  find_path(b, t, dt);
+  b->contact.base.progress = 0.;
+  b->friction.pairs.n = b->springs.n = b->springs.nbounce = 0;
+  if (!b->motion.begun)
+    PetscCall(SbContactSurfaceMarkDriven(m));
+  if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
+    PetscCall(SbBarrierPlace(b, u0, 0., b->motion.x));
+    PetscCall(SbBarrierSeparate(
+      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.)));
+  }
+  if (!b->motion.begun && t == 0.) { /* not when it goes on from a checkpoint */
+    PetscCall(part_touching(e, s, u0, &moved));
+    if (moved)
+      PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
+  }
+  b->motion.begun = PETSC_TRUE;
+  PetscCall(SbBarrierUpdate(b, u0));
+  if (b->widths.wider >
+      0.) { /* widens the barrier as far as its energy grows by at most `growth` */
+    const PetscReal old = b->widths.scale;
+
+    energy[0] = gap_energy(b, &unused);
+    set_scale(e, PetscMin(1., b->widths.wider * old));
+    PetscCall(SbBarrierUpdate(b, u0));
+    energy[1] = gap_energy(b, &unused);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
+    if (energy[1] - energy[0] > b->widths.growth)
+      set_scale(e, old);
+    b->widths.wider = 0.;
+    PetscCall(SbBarrierUpdate(b, u0));
+  }
+  PetscCall(PetscArraycpy(b->motion.start, b->motion.x, 3 * m->nvertex));
+  for (PetscInt i = 0; i < b->active.n; i++)
+    least = PetscMin(least, b->active.pair[i].gap);
+  PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
+  b->sums.energy = gap_energy(b, &b->sums.obstacle_power);
+
+  /* friction with the normal forces at the start */
+  b->friction.slip =
+    e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
+  b->friction.nlag = b->friction.nstuck = 0;
+  b->friction.lag = 0.;
+  b->friction.least = PETSC_INFINITY;
+  PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
+  SbBarrierSwapFriction(b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode max_step_barrier(SbContact contact, SbSpace s, const PetscReal u0[],
+                                       const PetscReal u1[], PetscReal *part, PetscInt *nactive)
+{
+  Barrier *b = (Barrier *)contact;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbBarrierUpdate(b, u0));
+  *nactive = b->active.n;
+  PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other, part));
+  b->record.shortest = PetscMin(b->record.shortest, *part);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactSurface m = b->surface;
+  PetscReal power;
+  PetscReal gained = 0.;
+  PetscReal asked = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBarrierUpdate(b, stage->u));
+
+  /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
+  b->contact.base.work = b->sums.energy + 0.5 * b->sums.obstacle_power;
+  b->sums.energy = gap_energy(b, &power);
+  b->contact.base.work += 0.5 * power - b->sums.energy;
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    const FrictionPair *pair = &b->friction.pairs.pair[i];
+    PetscReal u[3];
+    const PetscReal slip = SbBarrierSlip(b, pair, u);
+    const PetscReal force = pair->force * SbBarrierSlope(b, slip);
+
+    if (!counts(b, &pair->on.pair))
+      continue;
+    b->friction.loss += force * PetscSqr(slip);
+    for (int k = 0; k < 12; k++) {
+      const PetscInt v = pair->on.pair.v[k / 3];
+      const PetscInt c = 3 * v + k % 3;
+
+      if (v < m->nbody_vertex)
+        b->contact.base.work -=
+          force * u[k % 3] * pair->on.at.weight[k / 3] * (b->motion.x[c] - b->motion.start[c]);
+    }
+  }
+  for (PetscInt i = 0; i < b->springs.n; i++) {
+    const Spring *spring = &b->springs.spring[i];
+    const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
+    PetscReal push[15];
+
+    if (m->own[spring->at.v[0]])
+      b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
+    if (i >= b->springs.n - b->springs.nbounce)
+      continue;
+    gained += PetscMin(way, spring->goal - spring->start);
+    asked += spring->goal - spring->start;
+  }
+  b->sums.work += b->contact.base.work;
+  b->separation.parted = PETSC_FALSE;
+  if (asked > 0.)
+    b->separation.stiffer = gained < HALF * asked ? 2. * b->separation.stiffer
+                                                  : PetscMax(1., 0.5 * b->separation.stiffer);
+
+  if (b->contact.friction.mu > 0.)
+    PetscCall(SbBarrierLag(b));
+  b->friction.most = PetscMax(b->friction.most, b->friction.lag);
+
+  for (PetscInt i = 0; i < b->active.n; i++)
+    b->record.least = PetscMin(b->record.least, b->active.pair[i].gap);
+  b->record.most = PetscMax(b->record.most, b->active.n);
+  if (!b->options.verify || b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactOverlapFind(b->surface, b->motion.x, PETSC_FALSE, &b->separation.overlap));
+  PetscCheck(!b->separation.overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
+             "The effect %s: at t = %g s %" PetscInt_FMT
+             " edges go through triangles, one at (%g, %g, %g) m",
+             e->name, (double)stage->t, b->separation.overlap.ncrossing,
+             (double)b->separation.overlap.place[0], (double)b->separation.overlap.place[1],
+             (double)b->separation.overlap.place[2]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces follow from the positions: only accumulated sums are saved. */
+static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
+{
+  const Barrier *b = (const Barrier *)e->data;
+  const PetscReal state[4] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
+                              s->rank ? 0. : b->widths.scale};
+
+  PetscFunctionBeginUser;
+  *n = 1;
+  PetscCall(PetscMalloc1(4, records));
+  PetscCall(PetscArraycpy(*records, state, 4));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[],
+                                   PetscInt n, const PetscReal records[])
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscReal sum[4] = {0.};
+
+  PetscFunctionBeginUser;
+  (void)t;
+  (void)u;
+  for (PetscInt k = 0; k < 4 * n; k++)
+    sum[k % 4] += records[k];
+  b->sums.work = s->rank ? 0. : sum[0];
+  b->friction.loss = s->rank ? 0. : sum[1];
+  b->separation.stiffer = sum[2];
+  if (sum[3] > 0. && b->options.width == 0.)
+    set_scale(e, sum[3]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_barrier(SbEffect e)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactSurfaceDestroy(&b->surface));
+  PetscCall(SbContactPairsDestroy(&b->pairs));
+  PetscCall(PetscFree7(b->widths.w, b->motion.x, b->motion.start, b->motion.other, b->motion.u,
+                       b->motion.from, b->motion.to));
+  PetscCall(PetscFree(b->columns.slot));
+  PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
+  PetscCall(PetscFree(b->active.pair));
+  PetscCall(PetscFree(b->friction.pairs.pair));
+  PetscCall(PetscFree(b->friction.next.pair));
+  PetscCall(PetscFree(b->blocks.block));
+  PetscCall(PetscFree(b->blocks.slot));
+  PetscCall(PetscFree(b->springs.spring));
+  PetscCall(PetscFree(b->separation.overlap.point));
+  PetscCall(PetscFree(b->separation.overlap.near));
+  PetscCall(SbPartnerDestroy(&b->contact.partner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const SbContactOps barrier_ops = {
+  .initial_contacts = initial_contacts_barrier,
+  .begin_step = begin_step_barrier,
+  .find_impacts = SbContactFindImpacts_Barrier,
+  .gradient = SbContactGradient_Barrier,
+  .hessian = SbContactHessian_Barrier,
+  .max_step = max_step_barrier,
+  .update_friction = SbContactUpdateFriction_Barrier,
+  .impact_work = SbContactImpactWork_Barrier,
+  .scale_restitution = SbContactScaleRestitution_Barrier,
+  .gap = SbContactGap_Barrier,
+  .points = SbContactPoints_Barrier,
+  .nearest = SbContactNearest_Barrier,
+  .gap_forces = SbContactGapForces_Barrier,
+  .scale_width = scale_width_barrier,
+};
+static const SbEffectOps barrier_effect = {
+  .setup = setup_barrier,
+  .force = SbEffectForce_Barrier,
+  .accept = accept_barrier,
+  .save = save_barrier,
+  .load = load_barrier,
+  .history = SbEffectHistory_Barrier,
+  .summary = SbEffectSummary_Barrier,
+  .destroy = destroy_barrier,
+};
+
+PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
+{
+  static const char *const obstacle[] = {
+    "force_x",     "force_y", "force_z", "torque_x",      "torque_y",     "torque_z", "contacts",
+    "penetration", "gap",     "energy",  "friction_loss", "friction_lag", "unguarded"};
+  static const char *const bodies[] = {
+    "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
+    "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
+  PetscCall(SbOptionReal(scope, "barrier_pressure", &b->options.pressure));
+  PetscCall(SbOptionBool(scope, "verify", &b->options.verify));
+  if (!b->contact.partner.obstacle) {
+    PetscCall(SbOptionBool(scope, "self", &b->options.self));
+    PetscCall(SbOptionBool(scope, "pairs", &b->options.pairs));
+  }
+  PetscCall(SbOptionInt(scope, "friction_solves", &b->options.friction_solves));
+  PetscCall(SbOptionReal(scope, "friction_tolerance", &b->options.friction_tolerance));
+  e->ops = barrier_effect;
+  b->contact.base.ops = &barrier_ops;
+  b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
+  e->linear = PETSC_FALSE;
+  e->nstate = 4;
+  e->column = b->contact.partner.obstacle ? obstacle : bodies;
+  e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
+                                           : PETSC_STATIC_ARRAY_LENGTH(bodies);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

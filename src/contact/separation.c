@@ -1,0 +1,145 @@
+/*
+  separation.c - one-sided springs along fixed directions, which separate overlaps; impacts.c has
+  those of restitution.
+
+  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below a goal; each step has
+  new ones.
+
+  Overlap. Each penetrating point (overlap.c) is moved out by a part of its depth in
+  each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width of the
+  barrier at least, and in a static run at once. Springs that reach less than half of that get
+  stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is
+  none left.
+*/
+#include "barrier.h"
+
+#define STIFF 10.     /* static run: stiffness over that of the barrier */
+#define SAME 1e-5     /* of the bodies' size: positions this close coincide */
+#define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
+
+/* Whether two bodies coincide: then no separation direction exists. */
+static PetscBool same_place(const Barrier *b, const PetscInt body[2])
+{
+  const SbContactSurface m = b->surface;
+  PetscReal box[2][6];
+  PetscReal most = 0.;
+
+  for (int k = 0; k < 2; k++) {
+    SbBoxClear(box[k]);
+    for (PetscInt v = 0; v < m->nbody_vertex; v++)
+      if (m->part[v] == body[k])
+        SbBoxAdd(box[k], b->motion.x + 3 * v);
+  }
+  for (int i = 0; i < 6; i++)
+    most = PetscMax(most, PetscAbsReal(box[0][i] - box[1][i]));
+  return (PetscBool)(most < SAME * m->size);
+}
+
+PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactSurface m = b->surface;
+  SbContactOverlap *o = &b->separation.overlap;
+  PetscBool inside = PETSC_FALSE;
+  PetscInt body[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  b->springs.n = 0;
+  if (first && !b->contact.partner.obstacle)
+    PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
+  PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
+  PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s: body %s is inside body %s when the run begins, or in the same place; "
+             "move one of them by "
+             "-body_%s_translate",
+             e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name,
+             s->mesh->body[body[0]].name);
+  b->separation.overlapping =
+    (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * m->size));
+
+  /* a body wholly inside the obstacle has no separation direction */
+  if (first && b->contact.partner.obstacle && !b->separation.overlapping) {
+    SbPose pose;
+
+    SbPartnerPose(&b->contact.partner, 0., &pose);
+    for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+      const char *name = s->mesh->body[m->part[v]].name;
+      const PetscReal *x = b->motion.x + 3 * v;
+      PetscReal X[3], n[3];
+
+      SbPoseInvert(&pose, x, X);
+      PetscCheck(m->driven[v] ||
+                   SbObstacleDistance(b->contact.partner.obstacle, X, n) > -SAME * m->size,
+                 s->comm, PETSC_ERR_USER_INPUT,
+                 "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; "
+                 "move it by "
+                 "-body_%s_translate",
+                 e->name, name, (double)x[0], (double)x[1], (double)x[2], name);
+    }
+  }
+  if (b->pairs->near || b->separation.overlapping)
+    b->pairs->known = PETSC_FALSE;
+  b->pairs->near = b->separation.overlapping ? o->near : NULL;
+  b->motion.known = PETSC_FALSE;
+  if (!b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* excludes pairs of gap zero, too, as of a vertex in a triangle */
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    SbDistance d;
+
+    if (SbContactPairGap(m, pair, b->motion.x, &d) > SAME * m->size)
+      continue;
+    for (int k = 0; k < 4; k++)
+      o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, s->comm));
+  b->pairs->known = PETSC_FALSE;
+
+  /* warns once, naming what overlaps */
+  if (!b->separation.announced) {
+    const char *name[2];
+
+    for (int k = 0; k < 2; k++)
+      name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
+    PetscCheck(
+      o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
+      "The effect %s: %s and %s overlap at (%g, %g, %g) m, and no separation direction was found: "
+      "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
+      e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
+      o->ncrossing);
+    PetscCall(SbWarning(
+      s->comm,
+      "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
+      " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); "
+      "until then "
+      "they may pass through each other there",
+      e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
+      o->n, (double)o->deepest, e->name));
+  }
+  b->separation.announced = PETSC_TRUE;
+
+  if (e->dynamic)
+    SbOverlapBegin(&b->contact.overlap, dt);
+  for (PetscInt i = 0; i < o->n; i++) {
+    const SbPenetration *p = &o->point[i];
+    const PetscInt one = m->part[p->v[0]];
+    const PetscInt two = m->part[p->v[p->n - 1]];
+    const PetscReal w = PetscMin(b->widths.w[one], b->widths.w[two]);
+    const PetscReal k = PetscMin(b->widths.k[one], b->widths.k[two]);
+    const PetscReal all = p->depth + 0.5 * w;
+    Spring spring = {
+      .at = *p, .stiffness = b->separation.stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
+
+    spring.start = SbBarrierSpringPlace(b, &spring);
+    spring.goal =
+      spring.start +
+      (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact.overlap.left))) : all);
+    PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
+    b->springs.spring[b->springs.n++] = spring;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
