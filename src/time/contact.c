@@ -29,14 +29,14 @@ typedef struct {
 static PetscErrorCode set_aim(SbRun run, const Aim *aim, PetscReal size, PetscReal least,
                               PetscBool rough)
 {
-  const PetscReal rtol = run->single ? aim->linear_rtol : aim->rtol;
+  const PetscReal rtol = run->solve.single ? aim->linear_rtol : aim->rtol;
   const PetscReal part = rough ? PetscMax(rtol, PetscMin(ROUGH, LOOSER * rtol)) : rtol;
   const PetscReal atol = PetscMax(PetscMax(aim->atol, least), (rough ? part : aim->rtol) * size);
-  const PetscReal linear = (run->single ? 1 : 0.1) * PetscMax(least, part * size);
+  const PetscReal linear = (run->solve.single ? 1 : 0.1) * PetscMax(least, part * size);
 
   PetscFunctionBeginUser;
-  PetscCall(
-    SNESSetTolerances(run->snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(SNESSetTolerances(run->solve.snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT,
+                              PETSC_DEFAULT));
   PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear),
                              PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -48,19 +48,19 @@ static PetscErrorCode solve(SbRun run, Vec U, SNESConvergedReason *reason)
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESSolve(run->snes, NULL, U));
-  PetscCall(SNESGetConvergedReason(run->snes, reason));
-  PetscCall(SNESGetIterationNumber(run->snes, &newton));
-  PetscCall(SNESGetLinearSolveIterations(run->snes, &linear));
-  run->newton_step += newton;
-  run->linear_step += linear;
+  PetscCall(SNESSolve(run->solve.snes, NULL, U));
+  PetscCall(SNESGetConvergedReason(run->solve.snes, reason));
+  PetscCall(SNESGetIterationNumber(run->solve.snes, &newton));
+  PetscCall(SNESGetLinearSolveIterations(run->solve.snes, &linear));
+  run->counters.newton_step += newton;
+  run->counters.linear_step += linear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
-  const SNES snes = run->snes;
+  const SNES snes = run->solve.snes;
   const SbSolvedStep *step = &attempt->step;
   const Vec U = step->U;
   const PetscBool projected =
@@ -76,8 +76,8 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     PetscCall(solve(run, U, reason));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!run->R)
-    PetscCall(VecDuplicate(U, &run->R));
+  if (!run->solve.R)
+    PetscCall(VecDuplicate(U, &run->solve.R));
 
   /* tolerances as set by the user */
   PetscCall(SNESGetKSP(snes, &aim.ksp));
@@ -85,24 +85,24 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, NULL, NULL));
 
   /* the initial active set */
-  PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->V, U));
+  PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->state.V, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
 
   /* the matrix has the old constraints */
   if (projected || !m->dynamic)
-    run->tangent_known = PETSC_FALSE;
+    run->solve.tangent_known = PETSC_FALSE;
   if (constrained) {
     /* scale of rounding: contact and support forces, as a body at rest has a residual of rounding
        only */
-    PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
-    PetscCall(VecNorm(run->R, NORM_2, &least));
+    PetscCall((*attempt->residual)(attempt->ctx, U, run->solve.R));
+    PetscCall(VecNorm(run->solve.R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
 
   /* the tolerance of all solves of this step: that of the first one */
-  PetscCall(SNESComputeFunction(snes, U, run->R));
-  PetscCall(VecNorm(run->R, NORM_2, &size));
+  PetscCall(SNESComputeFunction(snes, U, run->solve.R));
+  PetscCall(VecNorm(run->solve.R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size))
     size = 0;
 
@@ -115,19 +115,19 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     PetscCall(solve(run, U, reason));
     if (*reason <= 0)
       break;
-    run->contact_round = round;
-    PetscCall((*attempt->residual)(attempt->ctx, U, run->R));
+    run->counters.contact_rounds = round;
+    PetscCall((*attempt->residual)(attempt->ctx, U, run->solve.R));
     m->space->rough = rough;
-    PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->R, &again));
-    if (round == 1 && run->may_end_at_impact) {
+    PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->solve.R, &again));
+    if (round == 1 && run->clock.may_end_at_impact) {
       /* the first time of impact, if the step may end there */
       for (PetscInt e = 0; e < m->ntime_of_impact; e++)
-        SbEffectCall(m->time_of_impact[e], time_of_impact, &run->time_of_impact);
+        SbEffectCall(m->time_of_impact[e], time_of_impact, &run->clock.time_of_impact);
       PetscCallMPI(
-        MPI_Allreduce(MPI_IN_PLACE, &run->time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
-      if (run->time_of_impact < APART || run->time_of_impact > 1. - APART)
-        run->time_of_impact = 1.;
-      if (run->time_of_impact < 1.)
+        MPI_Allreduce(MPI_IN_PLACE, &run->clock.time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
+      if (run->clock.time_of_impact < APART || run->clock.time_of_impact > 1. - APART)
+        run->clock.time_of_impact = 1.;
+      if (run->clock.time_of_impact < 1.)
         *reason = SNES_CONVERGED_ITERATING;
     }
     if ((!again && !rough) || !*reason)
@@ -135,9 +135,9 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     if (!again || round == ROUGH_ROUNDS)
       rough = PETSC_FALSE;
     if (projected || !m->dynamic)
-      run->tangent_known = PETSC_FALSE;
-    PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
-    if (run->stopped || round == ROUNDS) {
+      run->solve.tangent_known = PETSC_FALSE;
+    PetscCall(SbRunStopAsked(run, run->clock.step, run->clock.t, PETSC_TRUE));
+    if (run->clock.stopped || round == ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }

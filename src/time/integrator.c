@@ -25,7 +25,7 @@ void SbRunIntegrator(SbRun run, size_t size, char name[])
 {
   const char *word = SbIntegrators;
 
-  for (int i = 0; i < (int)run->preset; i++)
+  for (int i = 0; i < (int)run->solve.preset; i++)
     word = strchr(word, '|') + 1;
   SbFormat(size, name, "%.*s", (int)strcspn(word, "|"), word);
 }
@@ -125,10 +125,10 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
-  r->barrier_weight = 1.;
+  r->solve.barrier_weight = 1.;
   r->model = model;
-  PetscCall(SbOptionChoice(&SbRunScope, "time", &r->preset));
-  model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
+  PetscCall(SbOptionChoice(&SbRunScope, "time", &r->solve.preset));
+  model->dynamic = (PetscBool)(r->solve.preset != SB_TIME_STATIC);
   if (model->dynamic) {
     char text[64];
     PetscBool given, given_new;
@@ -138,21 +138,21 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
     if (given_new && !given)
       PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
-    PetscCall(SbOptionReal(&SbRunScope, "ts_dt", &r->dt));
-    PetscCall(SbOptionGiven(&SbRunScope, "ts_dt", &r->dt_given));
-    PetscCall(SbOptionReal(&SbRunScope, "ts_max_time", &r->t_end));
-    PetscCall(SbOptionSecond(&SbRunScope, "time_predictor", &r->velocity_predictor));
+    PetscCall(SbOptionReal(&SbRunScope, "ts_dt", &r->clock.dt));
+    PetscCall(SbOptionGiven(&SbRunScope, "ts_dt", &r->clock.dt_given));
+    PetscCall(SbOptionReal(&SbRunScope, "ts_max_time", &r->clock.t_end));
+    PetscCall(SbOptionSecond(&SbRunScope, "time_predictor", &r->solve.velocity_predictor));
   } else {
-    PetscCall(SbOptionInt(&SbRunScope, "static_steps", &r->static_steps));
-    PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->min_increment));
-    PetscCall(SbOptionSecond(&SbRunScope, "static_control", &r->arc.on));
-    r->t_end = 1.;
-    r->dt = 1. / (PetscReal)r->static_steps;
+    PetscCall(SbOptionInt(&SbRunScope, "static_steps", &r->clock.static_steps));
+    PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->clock.min_increment));
+    PetscCall(SbOptionSecond(&SbRunScope, "static_control", &r->clock.arc.on));
+    r->clock.t_end = 1.;
+    r->clock.dt = 1. / (PetscReal)r->clock.static_steps;
   }
-  if (r->arc.on) {
-    PetscCall(SbOptionInt(&SbRunScope, "static_max_steps", &r->arc.steps));
-    PetscCall(SbOptionReal(&SbRunScope, "static_max_displacement", &r->arc.displacement));
-    PetscCall(SbOptionReal(&SbRunScope, "static_longest_step", &r->arc.longest));
+  if (r->clock.arc.on) {
+    PetscCall(SbOptionInt(&SbRunScope, "static_max_steps", &r->clock.arc.steps));
+    PetscCall(SbOptionReal(&SbRunScope, "static_max_displacement", &r->clock.arc.displacement));
+    PetscCall(SbOptionReal(&SbRunScope, "static_longest_step", &r->clock.arc.longest));
 
     /* the arc-length method needs exact tangents: `auto` becomes exact */
     for (PetscInt k = 0; k < model->nmaterial; k++) {
@@ -171,30 +171,32 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
       model->material[k]->adaptive = PETSC_FALSE;
     }
   }
-  if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2)
-    PetscCall(SbOptionReal(&SbRunScope, "time_spectral_radius", &r->spectral_radius));
-  if (r->preset == SB_TIME_NEWMARK) {
-    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_beta", &r->newmark[0]));
-    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_gamma", &r->newmark[1]));
+  if (r->solve.preset == SB_TIME_GENALPHA || r->solve.preset == SB_TIME_ALPHA2)
+    PetscCall(SbOptionReal(&SbRunScope, "time_spectral_radius", &r->solve.spectral_radius));
+  if (r->solve.preset == SB_TIME_NEWMARK) {
+    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_beta", &r->solve.newmark[0]));
+    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_gamma", &r->solve.newmark[1]));
   }
   PetscCall(SbRunReadStop(r));
-  PetscCall(SbOptionInt(&SbRunScope, "time_max_halvings", &r->max_halvings));
+  PetscCall(SbOptionInt(&SbRunScope, "time_max_halvings", &r->clock.max_halvings));
   PetscCall(SbOptionChoice(&SbRunScope, "time_inverted", &inverted));
-  r->reject_inverted = (PetscBool)(inverted == 2);
-  for (PetscInt k = 0; k < model->nmaterial && !inverted && !model->dynamic && !r->arc.on; k++)
-    r->reject_inverted = (PetscBool)(r->reject_inverted || model->material[k]->softens);
-  PetscCheck(!r->reject_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
+  r->solve.reject_inverted = (PetscBool)(inverted == 2);
+  for (PetscInt k = 0; k < model->nmaterial && !inverted && !model->dynamic && !r->clock.arc.on;
+       k++)
+    r->solve.reject_inverted = (PetscBool)(r->solve.reject_inverted || model->material[k]->softens);
+  PetscCheck(!r->solve.reject_inverted || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
+             PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
              "same method");
   for (PetscInt e = 0; e < model->neffect; e++) {
-    r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
+    r->solve.saddle = (PetscBool)(r->solve.saddle || model->effect[e]->saddle);
     barrier = (PetscBool)(barrier || model->effect[e]->ops.hessian);
   }
-  if (r->saddle)
-    PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->saddle_choice));
+  if (r->solve.saddle)
+    PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->solve.saddle_choice));
   if (barrier)
-    PetscCall(SbOptionChoice(&SbRunScope, "contact_solver", &r->contact_choice));
-  PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
+    PetscCall(SbOptionChoice(&SbRunScope, "contact_solver", &r->solve.contact_choice));
+  PetscCall(SbSolverSetFromOptions(r->solve.solver_choice, sizeof(r->solve.solver_choice)));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -202,17 +204,17 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 /* The parameters of a preset's method. */
 static SbMethodSettings method_settings(SbRun run)
 {
-  const PetscReal r = run->spectral_radius;
+  const PetscReal r = run->solve.spectral_radius;
   const PetscReal m = (2. - r) / (1. + r);
   const PetscReal f = 1. / (1. + r);
-  const PetscReal *n = run->newmark;
+  const PetscReal *n = run->solve.newmark;
   const PetscBool impulses = (PetscBool)(run->model->nbegin_step > 0);
   const PetscBool separate = (PetscBool)(run->model->npotential > 0);
   SbMethodSettings set = {.method = SB_METHOD_EULER_IMPLICIT, .alpha_m = 1., .alpha_f = 1.};
 
-  if (run->preset == SB_TIME_NEWMARK)
+  if (run->solve.preset == SB_TIME_NEWMARK)
     set = (SbMethodSettings){SB_METHOD_GENERALIZED_ALPHA, 1., 1., n[0], n[1], impulses, separate};
-  if (run->preset == SB_TIME_GENALPHA)
+  if (run->solve.preset == SB_TIME_GENALPHA)
     set = (SbMethodSettings){SB_METHOD_GENERALIZED_ALPHA,
                              m,
                              f,
@@ -220,9 +222,9 @@ static SbMethodSettings method_settings(SbRun run)
                              0.5 + m - f,
                              PETSC_FALSE,
                              PETSC_FALSE};
-  if (run->preset == SB_TIME_EULER_EXPLICIT)
+  if (run->solve.preset == SB_TIME_EULER_EXPLICIT)
     set.method = SB_METHOD_EULER_EXPLICIT;
-  if (run->preset == SB_TIME_EULER_SYMPLECTIC)
+  if (run->solve.preset == SB_TIME_EULER_SYMPLECTIC)
     set.method = SB_METHOD_EULER_SYMPLECTIC;
   return set;
 }
@@ -270,7 +272,7 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 static PetscErrorCode set_up_snes(SbRun run)
 {
   const SbModel m = run->model;
-  const SNES snes = run->snes;
+  const SNES snes = run->solve.snes;
   const PetscReal most = !m->dynamic && m->nnonsymmetric ? FORCING_BESIDE : FORCING;
   PetscReal force = 0.;
   PetscBool asked, newton, rtol;
@@ -288,20 +290,20 @@ static PetscErrorCode set_up_snes(SbRun run)
 
   /* PETSc's line searches need PETSc's Newton loop, and TSALPHA2 has its own stages */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
-  PetscCall(SNESSetType(snes, m->linear                                ? SNESKSPONLY
-                              : asked || run->preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
-                                                                       : SB_SNES_NEWTON));
+  PetscCall(SNESSetType(snes, m->linear                                      ? SNESKSPONLY
+                              : asked || run->solve.preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
+                                                                             : SB_SNES_NEWTON));
   PetscCall(SNESSetDivergenceTolerance(snes, SB_UNLIMITED_REAL));
   PetscCall(SNESSetTolerances(snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0.,
                               SB_NEWTON_ITERATIONS, SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(snes, PETSC_FALSE));
-  PetscCall(SbSolverSetUp(snes, m->space, run->solver_used));
-  if (run->ts)
-    PetscCall(TSSetFromOptions(run->ts));
+  PetscCall(SbSolverSetUp(snes, m->space, run->solve.solver_used));
+  if (run->solve.ts)
+    PetscCall(TSSetFromOptions(run->solve.ts));
   else
     PetscCall(SNESSetFromOptions(snes));
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &run->single));
-  PetscCall(SbSolverFinish(snes, m->space, run->solver_used, run->J));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &run->solve.single));
+  PetscCall(SbSolverFinish(snes, m->space, run->solve.solver_used, run->solve.J));
   PetscCall(SbNewtonSetRun(snes, run));
 
   /* forcing terms */
@@ -334,11 +336,11 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscCall(TSGetKSPIterations(ts, &linear));
   PetscCall(TSGetPrevTime(ts, &previous));
   PetscCall(TSGetConvergedReason(ts, &reason));
-  run->newton_step = newton + run->newton_before - run->newton_total;
-  run->linear_step = linear + run->linear_before - run->linear_total;
-  PetscCall(
-    SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous,
-                      (PetscBool)((reason > 0 && !run->paused) || t >= run->t_end * (1. - 1e-12))));
+  run->counters.newton_step = newton + run->counters.newton_before - run->counters.newton;
+  run->counters.linear_step = linear + run->counters.linear_before - run->counters.linear;
+  PetscCall(SbRunStepAccepted(
+    run, step, t, step == run->clock.step0 ? 0. : t - previous,
+    (PetscBool)((reason > 0 && !run->clock.paused) || t >= run->clock.t_end * (1. - 1e-12))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -354,15 +356,16 @@ static PetscErrorCode after_step(TS ts)
   PetscCall(TSGetApplicationContext(ts, &run));
   PetscCall(TSGetConvergedReason(ts, &reason));
   PetscCall(TSGetTime(ts, &t));
-  if (reason || t >= run->t_end * (1. - 1e-12))
+  if (reason || t >= run->clock.t_end * (1. - 1e-12))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TSGetStepNumber(ts, &step));
   PetscCall(TSGetPrevTime(ts, &before));
-  run->after.dt = t - before;
-  if (run->after.fn)
-    PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
+  run->monitors.post_step.dt = t - before;
+  if (run->monitors.post_step.fn)
+    PetscCall((*run->monitors.post_step.fn)(run, step, t, t - before, run->monitors.post_step.ctx,
+                                            &run->clock.paused));
   PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
-  if (run->paused || run->stopped)
+  if (run->clock.paused || run->clock.stopped)
     PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -382,29 +385,29 @@ static PetscErrorCode set_up_ts(SbRun run)
     PetscReal stable;
 
     PetscCall(SbSpaceStableStep(s, &stable));
-    if (!run->dt_given)
-      run->dt = 0.9 * stable;
-    else if (run->dt > stable)
+    if (!run->clock.dt_given)
+      run->clock.dt = 0.9 * stable;
+    else if (run->clock.dt > stable)
       PetscCall(SbWarning(
         m->comm,
         "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the "
         "solution to blow up",
-        (double)run->dt, (double)stable));
+        (double)run->clock.dt, (double)stable));
   }
 
   /* the equation of motion and its integrator */
   PetscCall(SbSpaceCreateVec(s, &F));
-  PetscCall(TSCreate(m->comm, &run->ts));
-  PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
-  PetscCall(TS2SetSolution(run->ts, run->U, run->V));
-  PetscCall(TSSetI2Function(run->ts, F, SbFormI2Function, run));
-  PetscCall(TSSetI2Jacobian(run->ts, run->operator, run->J, SbFormI2Jacobian, run));
+  PetscCall(TSCreate(m->comm, &run->solve.ts));
+  PetscCall(TSSetProblemType(run->solve.ts, TS_NONLINEAR));
+  PetscCall(TS2SetSolution(run->solve.ts, run->state.U, run->state.V));
+  PetscCall(TSSetI2Function(run->solve.ts, F, SbFormI2Function, run));
+  PetscCall(TSSetI2Jacobian(run->solve.ts, run->solve.system, run->solve.J, SbFormI2Jacobian, run));
   PetscCall(VecDestroy(&F));
-  if (run->preset == SB_TIME_ALPHA2) {
-    PetscCall(TSSetType(run->ts, TSALPHA2));
-    PetscCall(TSAlpha2SetRadius(run->ts, run->spectral_radius));
+  if (run->solve.preset == SB_TIME_ALPHA2) {
+    PetscCall(TSSetType(run->solve.ts, TSALPHA2));
+    PetscCall(TSAlpha2SetRadius(run->solve.ts, run->solve.spectral_radius));
   } else
-    PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
+    PetscCall(TSSetType(run->solve.ts, SB_TS_SECOND_ORDER));
 
   /* allowed displacement error per step of adaptive runs, over the size of the largest body, twice
      the largest distance of a node from the centre of its body: independent of units and
@@ -419,31 +422,31 @@ static PetscErrorCode set_up_ts(SbRun run)
   }
   PetscCall(PetscFree(middle));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &size, 1, MPIU_REAL, MPI_MAX, m->comm));
-  PetscCall(TSSetTolerances(run->ts, 2e-4 * PetscSqrtReal(size), NULL, 0., NULL));
-  PetscCall(TSGetAdapt(run->ts, &adapt));
+  PetscCall(TSSetTolerances(run->solve.ts, 2e-4 * PetscSqrtReal(size), NULL, 0., NULL));
+  PetscCall(TSGetAdapt(run->solve.ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
-  PetscCall(TSSetMaxSteps(run->ts, PETSC_MAX_INT));
-  PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));
-  PetscCall(TSSetErrorIfStepFails(run->ts, PETSC_FALSE));
+  PetscCall(TSSetMaxSteps(run->solve.ts, PETSC_MAX_INT));
+  PetscCall(TSSetExactFinalTime(run->solve.ts, TS_EXACTFINALTIME_MATCHSTEP));
+  PetscCall(TSSetErrorIfStepFails(run->solve.ts, PETSC_FALSE));
 
   /* solvers; -ts_dt has been read, and is set below */
   if (SB_TS_DT_RENAMED)
     PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
-  PetscCall(TSGetSNES(run->ts, &run->snes));
+  PetscCall(TSGetSNES(run->solve.ts, &run->solve.snes));
   PetscCall(set_up_snes(run));
 
   /* end time and step length; monitors */
-  PetscCall(TSSetMaxTime(run->ts, run->t_end));
-  PetscCall(TSSetTimeStep(run->ts, run->dt));
-  PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
-  PetscCall(TSSetApplicationContext(run->ts, run));
-  PetscCall(TSSetPostStep(run->ts, after_step));
-  PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
-  m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
+  PetscCall(TSSetMaxTime(run->solve.ts, run->clock.t_end));
+  PetscCall(TSSetTimeStep(run->solve.ts, run->clock.dt));
+  PetscCall(TSMonitorSet(run->solve.ts, step_accepted, run, NULL));
+  PetscCall(TSSetApplicationContext(run->solve.ts, run));
+  PetscCall(TSSetPostStep(run->solve.ts, after_step));
+  PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->clock.fixed));
+  m->barrier_apart = (PetscBool)(m->npotential && run->solve.preset != SB_TIME_EULER_IMPLICIT);
   if (m->barrier_apart)
-    run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
-  if (run->preset != SB_TIME_ALPHA2)
-    SbSecondOrderSet(run->ts, run, &settings);
+    run->solve.barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
+  if (run->solve.preset != SB_TIME_ALPHA2)
+    SbSecondOrderSet(run->solve.ts, run, &settings);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -452,15 +455,16 @@ static PetscErrorCode set_up_ts(SbRun run)
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
   const SbModel m = run->model;
-  const PetscBool implicit = (PetscBool)(!explicit && run->preset != SB_TIME_ALPHA2);
+  const PetscBool implicit = (PetscBool)(!explicit && run->solve.preset != SB_TIME_ALPHA2);
   const PetscBool matrix =
-    (PetscBool)(!run->solver_used->matrix_free && strcmp(run->solver, "pressure"));
+    (PetscBool)(!run->solve.solver_used->matrix_free && strcmp(run->solve.solver, "pressure"));
   const char *name;
 
   PetscFunctionBeginUser;
   for (PetscInt e = 0; e < m->neffect; e++)
     PetscCheck(
-      !m->effect[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
+      !m->effect[e]->euler || run->solve.preset == SB_TIME_EULER_IMPLICIT, m->comm,
+      PETSC_ERR_USER_INPUT,
       "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
       m->effect[e]->name);
   if (m->npotential) {
@@ -468,10 +472,10 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     PetscCheck(
       implicit, m->comm, PETSC_ERR_USER_INPUT,
       "-effect_%s_response barrier needs -time euler_implicit, newmark, genalpha or static", name);
-    PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || !m->dynamic || !m->space->consistent_mass,
-               m->comm, PETSC_ERR_USER_INPUT,
-               "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped",
-               name);
+    PetscCheck(
+      run->solve.preset == SB_TIME_EULER_IMPLICIT || !m->dynamic || !m->space->consistent_mass,
+      m->comm, PETSC_ERR_USER_INPUT,
+      "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
     PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_response barrier and -effect_%s_response of another kind do not go "
                "together: give "
@@ -481,7 +485,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
       matrix, m->comm, PETSC_ERR_USER_INPUT,
       "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
       "cg_two_level",
-      run->solver, name);
+      run->solve.solver, name);
   }
   if (!m->nbegin_step)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -490,14 +494,14 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
              "The effect %s needs several solves in a step: use -time euler_implicit, newmark, "
              "genalpha or static",
              name);
-  if (run->preset == SB_TIME_NEWMARK) {
+  if (run->solve.preset == SB_TIME_NEWMARK) {
     /* its contact needs the trapezoidal rule, the lumped mass, and forces on constrained nodes
        only */
     PetscCheck(
-      run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
+      run->solve.newmark[0] == 0.25 && run->solve.newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
       "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
       "not %g and %g: else impacts may gain energy",
-      name, (double)run->newmark[0], (double)run->newmark[1]);
+      name, (double)run->solve.newmark[0], (double)run->solve.newmark[1]);
     PetscCheck(
       !m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
       "-time newmark with the effect %s needs -mass lumped: velocities of contact are corrected "
@@ -515,17 +519,18 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
     "leave it out",
     m->ntime_of_impact ? m->time_of_impact[0]->name : "");
-  PetscCheck(run->preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(run->solve.preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm,
+             PETSC_ERR_USER_INPUT,
              "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the "
              "acceleration of a "
              "short step, in which nodes are stopped, into a long one; use euler_implicit",
              m->ntime_of_impact ? m->time_of_impact[0]->name : "");
   PetscCheck(
-    matrix || (!run->solver_used->matrix_free && !m->nassemble_constraints), m->comm,
+    matrix || (!run->solve.solver_used->matrix_free && !m->nassemble_constraints), m->comm,
     PETSC_ERR_USER_INPUT,
     "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use -solver "
     "rotated or cg_two_level",
-    run->solver, name);
+    run->solve.solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -541,92 +546,100 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++)
     if (s->alpha[b] != 0. || s->beta[b] != 0.)
-      run->damped = m->dynamic;
-  PetscCall(SbSpaceCreateVec(s, &run->mass));
-  PetscCall(VecGetArrayWrite(run->mass, &mass));
+      run->solve.damped = m->dynamic;
+  PetscCall(SbSpaceCreateVec(s, &run->state.mass));
+  PetscCall(VecGetArrayWrite(run->state.mass, &mass));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     mass[i] = s->node_mass[i / 3];
-  PetscCall(VecRestoreArrayWrite(run->mass, &mass));
-  PetscCall(SbSpaceCreateVec(s, &run->U));
+  PetscCall(VecRestoreArrayWrite(run->state.mass, &mass));
+  PetscCall(SbSpaceCreateVec(s, &run->state.U));
   if (m->dynamic) {
-    PetscCall(SbSpaceCreateVec(s, &run->V));
-    if (run->preset != SB_TIME_ALPHA2)
-      PetscCall(SbSpaceCreateVec(s, &run->A));
+    PetscCall(SbSpaceCreateVec(s, &run->state.V));
+    if (run->solve.preset != SB_TIME_ALPHA2)
+      PetscCall(SbSpaceCreateVec(s, &run->state.A));
   }
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
              "-effect_<name>_... live: interactive values need a time, and -time static has "
              "none: choose -time euler_implicit, newmark or genalpha");
   if (!m->dynamic)
-    m->load = run->t0; /* a static run starts with load factor t0 */
-  PetscCall(SbModelInitialState(m, run->U, run->V));
-  if (run->arc.on) {
-    PetscCall(SbSpaceCreateVec(s, &run->path));
-    PetscCall(SbSolverChooseIndefinite(m->comm, sizeof(run->solver_choice), run->solver_choice));
+    m->load = run->clock.t0; /* a static run starts with load factor t0 */
+  PetscCall(SbModelInitialState(m, run->state.U, run->state.V));
+  if (run->clock.arc.on) {
+    PetscCall(SbSpaceCreateVec(s, &run->state.path));
+    PetscCall(SbSolverChooseIndefinite(m->comm, sizeof(run->solve.solver_choice),
+                                       run->solve.solver_choice));
   }
-  PetscCall(SbSolverChoose(s, m->dynamic, m->linear, explicit, run->solver_choice,
-                           &run->solver_used, run->solver_reason, sizeof(run->solver_reason)));
-  PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
+  PetscCall(SbSolverChoose(s, m->dynamic, m->linear, explicit, run->solve.solver_choice,
+                           &run->solve.solver_used, run->solve.solver_reason,
+                           sizeof(run->solve.solver_reason)));
+  PetscCall(
+    PetscStrncpy(run->solve.solver, run->solve.solver_used->name, sizeof(run->solve.solver)));
   PetscCall(check_contact(run, explicit));
 
   /* the solver for barrier contact, for the log's header */
   if (m->npotential) {
-    PetscCall(SbContactSystemDescribe(run->contact_choice, reason, sizeof(reason)));
-    SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
+    PetscCall(SbContactSystemDescribe(run->solve.contact_choice, reason, sizeof(reason)));
+    SbAppend(sizeof(run->solve.solver_reason), run->solve.solver_reason, "; %s", reason);
   }
-  if (run->saddle) {
-    PetscCall(
-      SbSaddleChoose(s, m->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
-    SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
+  if (run->solve.saddle) {
+    PetscCall(SbSaddleChoose(s, m->dynamic, run->solve.saddle_choice, &run->solve.saddle_used,
+                             reason, sizeof(reason)));
+    SbAppend(sizeof(run->solve.solver_reason), run->solve.solver_reason, "; %s", reason);
   }
 
   /* the matrix, and the operator for constraints outside of it */
   if (!explicit) {
-    PetscCall(SbSolverCreateOperator(s, run->solver_used, &run->J));
+    PetscCall(SbSolverCreateOperator(s, run->solve.solver_used, &run->solve.J));
     if (m->nnonsymmetric)
       PetscCall(SbFormCreateOperator(run));
     else {
-      PetscCall(PetscObjectReference((PetscObject)run->J));
-      run->operator= run->J;
+      PetscCall(PetscObjectReference((PetscObject)run->solve.J));
+      run->solve.system = run->solve.J;
     }
     if (SbConstraintsSeparate(s)) {
-      run->whole = run->operator;
-      PetscCall(SbConstraintsCreateOperator(s, run->J, run->whole, (PetscBool)!m->dynamic,
-                                            run->saddle_used, &run->operator));
+      run->solve.unprojected = run->solve.system;
+      PetscCall(SbConstraintsCreateOperator(s, run->solve.J, run->solve.unprojected,
+                                            (PetscBool)!m->dynamic, run->solve.saddle_used,
+                                            &run->solve.system));
     }
   }
-  PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
+  PetscCheck(!run->solve.solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
              "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
-             run->solver, m->tangent[0]->name);
+             run->solve.solver, m->tangent[0]->name);
   if (m->dynamic)
     PetscCall(set_up_ts(run));
   else {
     Vec F;
 
-    run->fixed_step = (PetscBool)!run->arc.on;
+    run->clock.fixed = (PetscBool)!run->clock.arc.on;
     PetscCall(SbSpaceCreateVec(s, &F));
-    PetscCall(SNESCreate(m->comm, &run->snes));
-    PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
-    PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, SbFormStaticJacobian, run));
+    PetscCall(SNESCreate(m->comm, &run->solve.snes));
+    PetscCall(SNESSetFunction(run->solve.snes, F, SbFormStaticFunction, run));
+    PetscCall(
+      SNESSetJacobian(run->solve.snes, run->solve.system, run->solve.J, SbFormStaticJacobian, run));
     PetscCall(VecDestroy(&F));
     PetscCall(set_up_snes(run));
-    if (run->arc.on)
+    if (run->clock.arc.on)
       PetscCall(SbArcLengthCheck(run));
   }
   PetscCall(SbSolverListCreate(run));
 
   /* PETSc's options may have changed the preset */
   if (!explicit) {
-    PetscCall(SbSolverDescribe(run->snes, s, sizeof(run->solver_parts), run->solver_parts));
-    if (run->solver_used->by_type ||
-        (run->solver_used->direct && !strstr(run->solver_parts, run->solver_used->package)))
-      PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
+    PetscCall(SbSolverDescribe(run->solve.snes, s, sizeof(run->solve.solver_parts),
+                               run->solve.solver_parts));
+    if (run->solve.solver_used->by_type ||
+        (run->solve.solver_used->direct &&
+         !strstr(run->solve.solver_parts, run->solve.solver_used->package)))
+      PetscCall(
+        PetscStrncpy(run->solve.solver, run->solve.solver_parts, sizeof(run->solve.solver)));
   }
 
   /* one solve per step, with a tangent maybe too soft: no bound on the energy
      (docs/reference/theory.md) */
   for (PetscInt k = 0; k < m->nmaterial; k++)
     warped = (PetscBool)(warped || m->material[k]->tangent == SB_TANGENT_WARPED);
-  if (run->velocity_predictor && !m->linear && run->single && warped)
+  if (run->solve.velocity_predictor && !m->linear && run->solve.single && warped)
     PetscCall(SbWarning(
       s->comm,
       "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
@@ -637,10 +650,11 @@ PetscErrorCode SbRunSetUp(SbRun run)
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
 {
   PetscFunctionBeginUser;
-  PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF,
-             PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
-  run->monitor[run->nmonitor].fn = fn;
-  run->monitor[run->nmonitor++].ctx = ctx;
+  PetscCheck(run->monitors.n < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitors.list),
+             PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d monitors",
+             (int)PETSC_STATIC_ARRAY_LENGTH(run->monitors.list));
+  run->monitors.list[run->monitors.n].fn = fn;
+  run->monitors.list[run->monitors.n++].ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -652,70 +666,79 @@ PetscErrorCode SbRunSolve(SbRun run)
   PetscFunctionBeginUser;
 
   /* effects that act only before or after the run */
-  for (PetscInt k = 0; k < m->neffect && !run->arc.on && run->wall_start == 0.; k++) {
+  for (PetscInt k = 0; k < m->neffect && !run->clock.arc.on && run->clock.wall_start == 0.; k++) {
     const SbEffect e = m->effect[k];
     const PetscBool before = (PetscBool)(e->until <= 0.);
 
-    if (before || e->from >= run->t_end)
+    if (before || e->from >= run->clock.t_end)
       PetscCall(SbWarning(
         m->comm, "the effect %s never acts: -effect_%s_%s %g%s, and the run goes from 0 to %g%s",
         e->name, e->name, before ? "until" : "from", (double)(before ? e->until : e->from), unit,
-        (double)run->t_end, unit));
+        (double)run->clock.t_end, unit));
   }
-  if (run->wall_start == 0.)
-    run->wall_start = MPI_Wtime();
-  run->paused = PETSC_FALSE;
-  run->seen.U = NULL;
+  if (run->clock.wall_start == 0.)
+    run->clock.wall_start = MPI_Wtime();
+  run->clock.paused = PETSC_FALSE;
+  run->monitors.last.U = NULL;
   if (m->npotential)
-    PetscCall(SbModelPotentialStart(m, run->t0, run->dt, run->U));
-  if (run->ts) {
+    PetscCall(SbModelPotentialStart(m, run->clock.t0, run->clock.dt, run->state.U));
+  if (run->solve.ts) {
     TSConvergedReason reason;
     PetscInt step;
     PetscReal t, dt;
 
-    PetscCall(TSSetStepNumber(run->ts, run->step0));
-    PetscCall(TSSetTime(run->ts, run->t0));
-    PetscCall(TSSolve(run->ts, run->U));
+    PetscCall(TSSetStepNumber(run->solve.ts, run->clock.step0));
+    PetscCall(TSSetTime(run->solve.ts, run->clock.t0));
+    PetscCall(TSSolve(run->solve.ts, run->state.U));
 
     /* PETSc's own integrators give no reason of a failure */
-    PetscCall(TSGetConvergedReason(run->ts, &reason));
-    PetscCall(TSGetStepNumber(run->ts, &step));
-    PetscCall(TSGetTime(run->ts, &t));
-    PetscCall(TSGetTimeStep(run->ts, &dt));
-    if (reason < 0 && !run->stop_reason[0] && !run->stopped)
+    PetscCall(TSGetConvergedReason(run->solve.ts, &reason));
+    PetscCall(TSGetStepNumber(run->solve.ts, &step));
+    PetscCall(TSGetTime(run->solve.ts, &t));
+    PetscCall(TSGetTimeStep(run->solve.ts, &dt));
+    if (reason < 0 && !run->clock.stop_reason[0] && !run->clock.stopped)
       PetscCall(SbRunFail(
         run,
         "step %" PetscInt_FMT
         " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, which "
         "tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
         step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
-  } else if (run->arc.on)
+  } else if (run->clock.arc.on)
     PetscCall(SbArcLengthSolve(run));
   else
     PetscCall(SbStaticSolve(run));
-  run->seconds_solve = MPI_Wtime() - run->wall_start;
+  run->counters.seconds_solve = MPI_Wtime() - run->clock.wall_start;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
-  Vec *const vectors[] = {
-    &r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,    &r->V,
-    &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path, &r->mass};
+  Vec *const vectors[] = {&r->solve.R,
+                          &r->solve.nonsymmetric.U,
+                          &r->solve.nonsymmetric.x,
+                          &r->solve.nonsymmetric.y,
+                          &r->state.U,
+                          &r->state.V,
+                          &r->state.A,
+                          &r->state.loads,
+                          &r->state.reaction,
+                          &r->state.previous,
+                          &r->state.path,
+                          &r->state.mass};
 
   PetscFunctionBeginUser;
   if (!r)
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (r->output_destroy)
-    PetscCall(r->output_destroy(r));
-  PetscCall(PetscFree(r->solver_list));
-  if (!r->ts)
-    PetscCall(SNESDestroy(&r->snes));
-  PetscCall(TSDestroy(&r->ts));
-  PetscCall(MatDestroy(&r->operator));
-  PetscCall(MatDestroy(&r->whole));
-  PetscCall(MatDestroy(&r->J));
+  if (r->monitors.output_destroy)
+    PetscCall(r->monitors.output_destroy(r));
+  PetscCall(PetscFree(r->solve.fallbacks));
+  if (!r->solve.ts)
+    PetscCall(SNESDestroy(&r->solve.snes));
+  PetscCall(TSDestroy(&r->solve.ts));
+  PetscCall(MatDestroy(&r->solve.system));
+  PetscCall(MatDestroy(&r->solve.unprojected));
+  PetscCall(MatDestroy(&r->solve.J));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(vectors); k++)
     PetscCall(VecDestroy(vectors[k]));
   PetscCall(PetscFree(*run));

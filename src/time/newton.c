@@ -138,7 +138,7 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
 {
   const SbRun run = n->run;
   const SbModel m = run->model;
-  const PetscReal part = run->stage ? run->stage_part : 1.;
+  const PetscReal part = run->solve.stage ? run->solve.stage_part : 1.;
   PetscReal energy;
 
   PetscFunctionBeginUser;
@@ -150,18 +150,18 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
 
   /* forces are those of a stage between the start of the step and x, divided by its fraction of the
      step */
-  if (run->stage)
-    PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, at->x));
-  PetscCall(
-    SbModelStrainEnergy(m, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
+  if (run->solve.stage)
+    PetscCall(VecAXPBYPCZ(run->solve.stage, 1. - part, part, 0., run->solve.stage_start, at->x));
+  PetscCall(SbModelStrainEnergy(m, run->solve.stage ? run->solve.stage : at->x, at->elastic,
+                                &at->psi, &at->ninverted));
   at->psi /= PetscSqr(part);
 
   /* contact is evaluated at x */
   if (m->npotential) {
     PetscCall(VecZeroEntries(at->contact));
-    PetscCall(
-      SbModelPotentialGradient(m, at->x, run->barrier_weight, PETSC_TRUE, &energy, at->contact));
-    at->gaps = run->barrier_weight * energy;
+    PetscCall(SbModelPotentialGradient(m, at->x, run->solve.barrier_weight, PETSC_TRUE, &energy,
+                                       at->contact));
+    at->gaps = run->solve.barrier_weight * energy;
     at->psi += at->gaps;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,7 +170,7 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
 /* Slopes at an iterate along -Y. */
 static PetscErrorCode find_slopes(Newton *n, Vec Y, Iterate *at)
 {
-  const PetscReal part = n->run->stage ? n->run->stage_part : 1.;
+  const PetscReal part = n->run->solve.stage ? n->run->solve.stage_part : 1.;
   const Vec forces[3] = {at->r, at->elastic, at->contact};
   PetscScalar along[3] = {0., 0., 0.};
 
@@ -193,15 +193,15 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
     PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
-    PetscCall(VecAYPX(n->rhs, n->run->barrier_weight, snes->vec_func));
+    PetscCall(VecAYPX(n->rhs, n->run->solve.barrier_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++)
       for (int i = 0; i < 9; i++)
-        n->blocks.block[k].H[i] *= n->run->barrier_weight;
+        n->blocks.block[k].H[i] *= n->run->solve.barrier_weight;
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
     if (!n->system)
-      PetscCall(SbContactSystemCreate(m->space, n->run->contact_choice, &n->system));
+      PetscCall(SbContactSystemCreate(m->space, n->run->solve.contact_choice, &n->system));
     PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, n->rhs,
                                    snes->vec_sol_update, reason, &iterations));
   } else {
@@ -228,13 +228,13 @@ static PetscErrorCode add_shift(SNES snes, PetscBool first, PetscReal *least, Pe
     PetscCall(VecSum(n->to.r, &stiff));
     *least = SHIFT_STIFF * PetscRealPart(stiff) / (3. * m->mass);
     if (m->dynamic)
-      *least = PetscMax(*least, SHIFT / PetscSqr(n->run->barrier_dt));
+      *least = PetscMax(*least, SHIFT / PetscSqr(n->run->solve.barrier_dt));
   }
   if (*shift < *least)
     *shift = first ? 0. : *least;
   if (*shift == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecAXPBY(n->to.r, *shift, 0., n->run->mass));
+  PetscCall(VecAXPBY(n->to.r, *shift, 0., n->run->state.mass));
   PetscCall(MatDiagonalSet(snes->jacobian_pre, n->to.r, ADD_VALUES));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,8 +248,8 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  const PetscBool keep =
-    (PetscBool)(n->run->nonsymmetric.U && n->whole && snes->norm < n->initial && !m->npotential);
+  const PetscBool keep = (PetscBool)(n->run->solve.nonsymmetric.U && n->whole &&
+                                     snes->norm < n->initial && !m->npotential);
   PetscReal shift = n->shift / SHIFT_MORE;
   PetscReal least = 0.;
   PetscReal modelled = 0.;
@@ -295,7 +295,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     negative = -1;
     if (reason > 0 && *slope < 0. && !n->nblock)
       PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
-    if (n->run->nonsymmetric.U && !m->dynamic && !snes->iter)
+    if (n->run->solve.nonsymmetric.U && !m->dynamic && !snes->iter)
       n->branch = PetscMax(negative, 0);
     if (reason > 0 && *slope < 0. && negative <= n->branch)
       break;
@@ -371,7 +371,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 
   /* forces without a potential: ascent steps may be provisional, too */
   const PetscBool circulatory =
-    (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
+    (PetscBool)(n->run->solve.nonsymmetric.U && !m->dynamic && !m->npotential);
   PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, barrier,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* no provisional step into a barrier */
@@ -544,7 +544,7 @@ static PetscErrorCode approach(SNES snes)
   const Vec X = snes->vec_sol;
   const Vec F = snes->vec_func;
   const Vec Y = snes->vec_sol_update;
-  const Vec start = n->run->barrier_start;
+  const Vec start = n->run->solve.barrier_start;
   const Vec D = n->step;
   PetscReal part;
   PetscReal progress = 0.;
@@ -642,7 +642,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
       snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  enough = m->dynamic ? SETTLED * m->barrier_speed * run->barrier_dt : SETTLED_STATIC * size;
+  enough = m->dynamic ? SETTLED * m->barrier_speed * run->solve.barrier_dt : SETTLED_STATIC * size;
   for (PetscInt e = 0; e < m->npotential; e++) {
     springs = (PetscBool)(springs || m->potential[e]->springs);
     width = PetscMin(width, m->potential[e]->width);
@@ -650,7 +650,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   if (springs)
     enough *= STICKING;
   if (m->dynamic)
-    enough = PetscMax(enough, SETTLED_LEAST * size * run->barrier_dt / run->dt);
+    enough = PetscMax(enough, SETTLED_LEAST * size * run->solve.barrier_dt / run->clock.dt);
   enough = PetscMin(enough, SETTLED_GAP * width);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   PetscCall(PetscInfo(
@@ -697,14 +697,14 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->initial = snes->norm;
   PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
   PetscCall(SbSNESConverged(snes, 0, 0., 0., snes->norm));
-  n->tolerance = snes->ttol = PetscMax(snes->ttol, n->run->goes_on ? n->tolerance : 0.);
+  n->tolerance = snes->ttol = PetscMax(snes->ttol, n->run->solve.warm_start ? n->tolerance : 0.);
   PetscCall(SNESMonitor(snes, 0, snes->norm));
 
   while (!snes->reason) {
     const PetscInt linear = snes->linear_its;
 
-    PetscCall(SbRunStopAsked(n->run, n->run->step_now, n->run->t_now, PETSC_TRUE));
-    if (n->run->stopped) {
+    PetscCall(SbRunStopAsked(n->run, n->run->clock.step, n->run->clock.t, PETSC_TRUE));
+    if (n->run->clock.stopped) {
       snes->reason = SNES_DIVERGED_MAX_IT;
       break;
     }
@@ -771,13 +771,13 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
   KSPConvergedReason reason;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SB_SNES_NEWTON, solved));
-  n = (Newton *)run->snes->data;
+  PetscCall(PetscObjectTypeCompare((PetscObject)run->solve.snes, SB_SNES_NEWTON, solved));
+  n = (Newton *)run->solve.snes->data;
   *solved = (PetscBool)(*solved && n->nblock > 0);
   if (!*solved)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactSystemSolve(n->system, run->snes->jacobian_pre, &n->blocks, PETSC_FALSE, B, X,
-                                 &reason, iterations));
+  PetscCall(SbContactSystemSolve(n->system, run->solve.snes->jacobian_pre, &n->blocks, PETSC_FALSE,
+                                 B, X, &reason, iterations));
   if (reason < 0)
     PetscCall(VecZeroEntries(X));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -16,20 +16,20 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
-  if (!run->J || run->preset == SB_TIME_ALPHA2)
+  if (!run->solve.J || run->solve.preset == SB_TIME_ALPHA2)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceFollowJumps(m->space, run->U,
-                               !m->dynamic                      ? SB_STEPS_OF_LOAD
-                               : run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED
-                                                                : SB_STEPS_IN_TIME,
+  PetscCall(SbSpaceFollowJumps(m->space, run->state.U,
+                               !m->dynamic                            ? SB_STEPS_OF_LOAD
+                               : run->solve.preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED
+                                                                      : SB_STEPS_IN_TIME,
                                changed));
   if (!m->dynamic || !*changed)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the acceleration follows from the changed forces */
   PetscCall(SbRunRestartAcceleration(run));
-  if (run->reaction)
-    PetscCall(SbRunReactions(run, run->t_now, run->reaction));
+  if (run->state.reaction)
+    PetscCall(SbRunReactions(run, run->clock.t, run->state.reaction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,17 +42,17 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscFunctionBeginUser;
   if (!run->model->dynamic)
     PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
-  run->goes_on = PETSC_FALSE;
+  run->solve.warm_start = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     /* begin the step in barrier contact */
     if (run->model->npotential) {
-      PetscCall(SbModelPotentialBegin(run->model, step->t, step->dt, step->U0, run->V));
-      run->barrier_start = step->U0;
-      run->barrier_dt = step->dt;
+      PetscCall(SbModelPotentialBegin(run->model, step->t, step->dt, step->U0, run->state.V));
+      run->solve.barrier_start = step->U0;
+      run->solve.barrier_dt = step->dt;
     }
 
     /* the predictor, and the solution from there; with contact by active-set iterations */
-    if (!run->goes_on)
+    if (!run->solve.warm_start)
       PetscCall((*a->predict)(a->ctx));
     if (!SbRunIsExplicit(run))
       PetscCall(SbRunSolveStep(run, a, &reason));
@@ -62,17 +62,18 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
-    if (*ok && !run->model->dynamic && !run->goes_on) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &run->goes_on));
-      if (run->goes_on)
+    if (*ok && !run->model->dynamic && !run->solve.warm_start) {
+      PetscCall(
+        SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &run->solve.warm_start));
+      if (run->solve.warm_start)
         continue;
     }
-    run->goes_on = PETSC_FALSE;
+    run->solve.warm_start = PETSC_FALSE;
 
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
-    if (*ok && run->post_solve.fn && solves < SB_LOOKS)
-      PetscCall((*run->post_solve.fn)(run, step, run->post_solve.ctx, &again));
+    if (*ok && run->monitors.post_solve.fn && solves < SB_MAX_RESOLVES)
+      PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, &again));
   }
 
   /* -time_inverted reject */
@@ -83,14 +84,14 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
   /* warn of much shorter steps, once until they have the requested length again */
-  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened &&
-      step->dt <= SHORT * run->dt) {
-    run->shortened = PETSC_TRUE;
+  if (!*ok && run->clock.stop_reason[0] && !run->clock.stopped && !run->monitors.warned_short &&
+      step->dt <= SHORT * run->clock.dt) {
+    run->monitors.warned_short = PETSC_TRUE;
     PetscCall(SbWarning(
       run->model->comm,
       "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
       "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
-      (double)(step->dt / run->dt), run->stop_reason,
+      (double)(step->dt / run->clock.dt), run->clock.stop_reason,
       run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,78 +100,85 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last)
 {
-  const PetscBool first = (PetscBool)(step == run->step0);
+  const PetscBool first = (PetscBool)(step == run->clock.step0);
   const PetscReal begun = MPI_Wtime();
   const SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
   PetscBool jumps;
-  SbStep now = {
-    .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
+  SbStep now = {.step = step,
+                .t = t,
+                .dt = dt,
+                .t_end = run->clock.t_end,
+                .U = run->state.U,
+                .V = run->state.V,
+                .A = run->state.A};
 
   PetscFunctionBeginUser;
-  run->t_now = t;
+  run->clock.t = t;
   if (first)
     PetscCall(SbRunFollowJumps(run, &jumps));
 
   /* monitors have seen this step already, before it was known to be the last one */
-  if (run->seen.U && run->seen.step == step) {
-    if (!run->stopped || first)
+  if (run->monitors.last.U && run->monitors.last.step == step) {
+    if (!run->clock.stopped || first)
       PetscFunctionReturn(PETSC_SUCCESS);
-    now = run->seen;
+    now = run->monitors.last;
     now.last = now.again = PETSC_TRUE;
-    for (PetscInt k = 0; k < run->nmonitor; k++)
-      PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
+    for (PetscInt k = 0; k < run->monitors.n; k++)
+      PetscCall(run->monitors.list[k].fn(run, &now, run->monitors.list[k].ctx));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  now.last = (PetscBool)(last || run->stopped);
+  now.last = (PetscBool)(last || run->clock.stopped);
   if (!first)
-    run->stop.longest_step =
-      PetscMax(FORGET * run->stop.longest_step, begun - run->stop.step_begun);
-  if (dt > 0.9 * run->dt)
-    run->shortened = PETSC_FALSE;
+    run->clock.stop.longest_step =
+      PetscMax(FORGET * run->clock.stop.longest_step, begun - run->clock.stop.step_begun);
+  if (dt > 0.9 * run->clock.dt)
+    run->monitors.warned_short = PETSC_FALSE;
 
   /* effects save their history */
-  run->step_now = step;
+  run->clock.step = step;
   if (!first && m->naccept) {
-    PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-    if (run->V)
-      PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
+    PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
+    if (run->state.V)
+      PetscCall(SbSpaceGetLocalRead(m->space, run->state.V, &stage.v));
     for (PetscInt e = 0; e < m->naccept; e++)
       SbEffectCall(m->accept[e], accept, m->space, &stage);
-    if (run->V)
-      PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
-    PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+    if (run->state.V)
+      PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.V, &stage.v));
+    PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
   }
 
   /* energy balance */
-  if (run->want_energies)
+  if (run->monitors.want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
-  else if (run->want_residual) {
-    if (!run->reaction)
-      PetscCall(VecDuplicate(run->U, &run->reaction));
-    PetscCall(SbRunReactions(run, t, run->reaction));
+  else if (run->monitors.want_residual) {
+    if (!run->state.reaction)
+      PetscCall(VecDuplicate(run->state.U, &run->state.reaction));
+    PetscCall(SbRunReactions(run, t, run->state.reaction));
   }
 
   /* call monitors */
-  now.R = run->reaction;
-  now.energies = run->energies;
-  now.step_end =
-    run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;
-  now.newton = run->newton_step;
-  now.linear = run->linear_step;
-  now.rejected = run->rejected_total - run->rejected_seen;
-  now.wall = MPI_Wtime() - run->wall_start;
-  run->newton_total += now.newton;
-  run->linear_total += now.linear;
-  run->steps_total += !first;
-  run->rejected_seen = run->rejected_total;
-  run->newton_step = run->linear_step = 0;
-  for (PetscInt k = 0; k < run->nmonitor; k++)
-    PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
-  run->seen = now;
+  now.R = run->state.reaction;
+  now.energies = run->state.energies;
+  now.step_end = run->clock.fixed
+                   ? step + (PetscInt)PetscCeilReal((run->clock.t_end - t) / run->clock.dt - 1e-6)
+                   : -1;
+  now.newton = run->counters.newton_step;
+  now.linear = run->counters.linear_step;
+  now.rejected = run->counters.rejected - run->counters.rejected_seen;
+  now.wall = MPI_Wtime() - run->clock.wall_start;
+  run->counters.newton += now.newton;
+  run->counters.linear += now.linear;
+  run->counters.steps += !first;
+  run->counters.rejected_seen = run->counters.rejected;
+  run->counters.newton_step = run->counters.linear_step = 0;
+  for (PetscInt k = 0; k < run->monitors.n; k++)
+    PetscCall(run->monitors.list[k].fn(run, &now, run->monitors.list[k].ctx));
+  run->monitors.last = now;
   if (SbLiveCount())
     PetscCall(SbLiveAdvance(m->comm, t));
-  run->stop.step_begun = MPI_Wtime();
-  run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
+  run->clock.stop.step_begun = MPI_Wtime();
+  run->clock.stop.longest_output =
+    PetscMax(run->clock.stop.longest_output, run->clock.stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
