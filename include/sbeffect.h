@@ -10,15 +10,6 @@
 
 typedef struct _p_SbEffect *SbEffect;
 
-/* Hessian of the contact energy in Newton's method: exact; each pair projected to positive
-   semi-definite; the same with friction majorized by quadratics, as its energy has a kink where
-   slip reverses. */
-typedef enum {
-  SB_HESSIAN_EXACT,
-  SB_HESSIAN_PROJECTED,
-  SB_HESSIAN_MAJORIZED
-} SbContactHessian;
-
 /* An active contact point of a body. */
 typedef struct {
   PetscInt id[3];      /* identify it within its effect, the same for any partition */
@@ -106,7 +97,7 @@ typedef struct {
 
   /*
     Barrier contact (-effect_NAME_response barrier), whose energy is part of the potential that
-    Newton's method minimises (src/time/newton.c).
+    Newton's method minimises (src/newton/newton.c).
 
     touching      - at the start t of a run, first step dt: adds pairs whose gap at u is too small,
     or little

@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "sbmodel.h"
+#include "sbnewton.h"
 
 typedef enum {
   SB_TIME_EULER_IMPLICIT,
@@ -152,15 +153,14 @@ typedef struct {
   } nonsymmetric;
 
   /* the solve of an attempt */
-  Vec R;                    /* residual for contact, N; owned; NULL without */
-  Vec barrier_start;        /* barrier contact: displacement at the start of the step; borrowed */
-  PetscReal barrier_dt;     /* its length, s */
-  PetscReal barrier_weight; /* weight of its end-of-step forces in the residual of the solve */
-  Vec stage, stage_start;   /* forces are those at stage_start + stage_part (X - stage_start);
-                               borrowed; NULL: at X */
-  PetscReal stage_part;
-  PetscBool single;     /* one linear solve per step instead of Newton's method */
-  PetscBool warm_start; /* it starts from the last one's solution, with its tolerance */
+  Vec R; /* residual for contact, N; owned; NULL without */
+  struct {
+    Vec U;     /* forces are those at U = start + part (X - start), m; NULL: at X */
+    Vec start; /* displacement at the start of the step, m; both borrowed */
+    PetscReal part;
+  } stage;
+  PetscReal barrier_weight; /* of barrier contact's forces, those at X, in the residual */
+  PetscBool single;         /* one linear solve per step instead of Newton's method */
 
   /* attempts that are not accepted */
   PetscBool reject_inverted;   /* -time_inverted reject */
@@ -176,6 +176,7 @@ typedef struct {
   char solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "": no linear
                                      systems */
   char solver_reason[256];
+  struct _p_SbPotential *potential;  /* that Newton's method minimises; owned */
   struct _p_SbSolverList *fallbacks; /* solver_list.c; owned; NULL without linear systems */
   PetscBool saddle;                  /* some effect asks for multipliers as unknowns */
   int saddle_choice;                 /* -saddle_solver: 0 by size, 1 direct, 2 iterative */

@@ -304,7 +304,7 @@ static PetscErrorCode set_up_snes(SbRun run)
     PetscCall(SNESSetFromOptions(snes));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &run->solve.single));
   PetscCall(SbSolverFinish(snes, m->space, run->solve.solver_used, run->solve.J));
-  PetscCall(SbNewtonSetRun(snes, run));
+  PetscCall(SbPotentialCreate(run));
 
   /* forcing terms */
   PetscCall(
@@ -733,6 +733,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   if (r->monitors.output_destroy)
     PetscCall(r->monitors.output_destroy(r));
   PetscCall(PetscFree(r->solve.fallbacks));
+  PetscCall(SbPotentialDestroy(&r->solve.potential));
   if (!r->solve.ts)
     PetscCall(SNESDestroy(&r->solve.snes));
   PetscCall(TSDestroy(&r->solve.ts));

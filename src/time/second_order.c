@@ -313,9 +313,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   /* copy the initial state, to which a rejected step returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
-  run->solve.stage = so->Xa;
-  run->solve.stage_start = so->X0;
-  run->solve.stage_part = so->set.alpha_f;
+  run->solve.stage.U = so->Xa;
+  run->solve.stage.start = so->X0;
+  run->solve.stage.part = so->set.alpha_f;
   for (;;) {
     const SbAttempt attempt = {solved_step(ts), predict, contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE;

@@ -9,7 +9,7 @@
 
   Not replaced: solvers chosen by -ksp_type or -pc_type; factorisations of the saddle-point system
   of contact; solves along an arc length; static systems with a free rigid motion (rigid_modes.c),
-  which are singular; exact tangents that Newton's method will project (newton.c).
+  which are singular; exact tangents that Newton's method will project (src/newton).
 
   petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not
   public.

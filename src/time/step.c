@@ -38,21 +38,17 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   const SbSolvedStep *step = &a->step;
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
+  PetscBool warm = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!run->model->dynamic)
     PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
-  run->solve.warm_start = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
-    /* begin the step in barrier contact */
-    if (run->model->npotential) {
-      PetscCall(SbModelPotentialBegin(run->model, step->t, step->dt, step->U0, run->state.V));
-      run->solve.barrier_start = step->U0;
-      run->solve.barrier_dt = step->dt;
-    }
+    /* begin the solve */
+    PetscCall(SbPotentialBegin(run->solve.potential, step, warm));
 
     /* the predictor, and the solution from there; with contact by active-set iterations */
-    if (!run->solve.warm_start)
+    if (!warm)
       PetscCall((*a->predict)(a->ctx));
     if (!SbRunIsExplicit(run))
       PetscCall(SbRunSolveStep(run, a, &reason));
@@ -62,13 +58,12 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
-    if (*ok && !run->model->dynamic && !run->solve.warm_start) {
-      PetscCall(
-        SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &run->solve.warm_start));
-      if (run->solve.warm_start)
+    if (*ok && !run->model->dynamic && !warm) {
+      PetscCall(SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &warm));
+      if (warm)
         continue;
     }
-    run->solve.warm_start = PETSC_FALSE;
+    warm = PETSC_FALSE;
 
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;

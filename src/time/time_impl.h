@@ -52,14 +52,15 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode
 SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                   PetscBool last); /* saves history, calls monitors; also at the start */
-#define SB_NEWTON_ITERATIONS 100
-/* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is
-   borrowed. */
-#define SB_SNES_NEWTON "newton"
-PetscErrorCode SbNewtonCreate(SNES snes);
-PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
-/* Whether a tangent of the last solve was indefinite; false for another SNESType or tangent. */
-PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
+
+/* incremental_potential.c: what Newton's method minimises, for run->solve.snes. Create: after the
+   type of the SNES is known. Collective. */
+typedef struct _p_SbPotential *SbPotential;
+PetscErrorCode SbPotentialCreate(SbRun run);
+PetscErrorCode SbPotentialDestroy(SbPotential *potential);
+/* Before a solve of the step; warm: it starts from the last one's solution, with its tolerance.
+   Collective. */
+PetscErrorCode SbPotentialBegin(SbPotential potential, const SbSolvedStep *step, PetscBool warm);
 
 /* stop.c: early end of runs. */
 /* Options -wall_time and -stop_grace. */
