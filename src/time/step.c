@@ -1,28 +1,33 @@
 /*
   One step, dynamic or static, from its start to its acceptance; see second_order.c, static.c.
 
-    attempt: predictor, Newton's method in the active-set iteration of contact, post-solve callback,
-    rejection accepted: effects save their history, the energy balance is updated
-    (energy_balance.c), monitors called
+    begin   effects move, surfaces are updated, candidates of contact are found; a guess
+    repeat  solves: gradient and Hessian of the incremental potential, linear solve, largest safe
+            length, line search (src/newton); contact set (solve.c); post-solve callback
+    accept  state, history of effects, energies (energy_balance.c), monitors; the next length
+    follows
+            in second_order.c and static.c
 */
 #include "time_impl.h"
 
 #define SHORT 0.13 /* step over the requested one, below which a warning follows: three halvings */
 #define FORGET 0.9 /* decay per step of the recorded longest step */
+#define FULL 0.9   /* step over the requested one, from which on it counts as that */
 
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 {
   const SbModel m = run->model;
+  SbStepsOf steps = SB_STEPS_IN_TIME;
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
   if (!run->solve.J || run->solve.preset == SB_TIME_ALPHA2)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceFollowJumps(m->space, run->state.U,
-                               !m->dynamic                            ? SB_STEPS_OF_LOAD
-                               : run->solve.preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED
-                                                                      : SB_STEPS_IN_TIME,
-                               changed));
+  if (run->solve.preset == SB_TIME_NEWMARK)
+    steps = SB_STEPS_UNDAMPED;
+  if (!m->dynamic)
+    steps = SB_STEPS_OF_LOAD;
+  PetscCall(SbSpaceFollowJumps(m->space, run->state.U, steps, changed));
   if (!m->dynamic || !*changed)
     PetscFunctionReturn(PETSC_SUCCESS);
 
@@ -33,23 +38,41 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Warns of much shorter steps, once until they have the requested length again. */
+static PetscErrorCode warn_short(SbRun run, PetscReal dt)
+{
+  const PetscBool dynamic = run->model->dynamic;
+
+  PetscFunctionBeginUser;
+  if (!run->clock.stop_reason[0] || run->clock.stopped || run->monitors.warned_short ||
+      dt > SHORT * run->clock.dt)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  run->monitors.warned_short = PETSC_TRUE;
+  PetscCall(SbWarning(
+    run->model->comm,
+    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
+    "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
+    (double)(dt / run->clock.dt), run->clock.stop_reason,
+    dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
+  const SbModel m = run->model;
   const SbSolvedStep *step = &a->step;
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
   PetscBool warm = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  if (!run->model->dynamic)
-    PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
+  if (!m->dynamic)
+    PetscCall(SbSpaceFollowJumps(m->space, step->U0, SB_STEPS_OF_LOAD, NULL));
   for (int solves = 0; again; solves++) {
-    /* begin the solve */
-    PetscCall(SbPotentialBegin(run->solve.potential, step, warm));
+    /* begin: effects move, surfaces are updated, candidates of contact are found; a guess */
+    PetscCall(SbRunBeginSolve(run, a, warm));
 
-    /* the predictor, and the solution from there; with contact by active-set iterations */
-    if (!warm)
-      PetscCall((*a->predict)(a->ctx));
+    /* the solution from there; explicit: the guess */
     if (!SbRunIsExplicit(run))
       PetscCall(SbRunSolveStep(run, a, &reason));
 
@@ -58,8 +81,8 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
-    if (*ok && !run->model->dynamic && !warm) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &warm));
+    if (*ok && !m->dynamic && !warm) {
+      PetscCall(SbSpaceFollowJumps(m->space, step->U, SB_STEPS_OF_LOAD, &warm));
       if (warm)
         continue;
     }
@@ -73,77 +96,102 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
   /* -time_inverted reject */
   PetscCall(SbRunRejectInverted(run, step->t, step->dt, (Vec[2]){step->U0, step->U}, ok));
+  if (*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* restore prescribed motions to the start of the step, in case the run ends there */
-  if (!*ok && run->model->npotential)
-    PetscCall(SbModelPotentialAdvance(run->model, 0.));
-
-  /* warn of much shorter steps, once until they have the requested length again */
-  if (!*ok && run->clock.stop_reason[0] && !run->clock.stopped && !run->monitors.warned_short &&
-      step->dt <= SHORT * run->clock.dt) {
-    run->monitors.warned_short = PETSC_TRUE;
-    PetscCall(SbWarning(
-      run->model->comm,
-      "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
-      "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
-      (double)(step->dt / run->clock.dt), run->clock.stop_reason,
-      run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
-  }
+  if (m->npotential)
+    PetscCall(SbModelPotentialAdvance(m, 0.));
+  PetscCall(warn_short(run, step->dt));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Effects save their history of the step. */
+static PetscErrorCode save_history(SbRun run, PetscInt step, PetscReal t, PetscReal dt)
+{
+  const SbModel m = run->model;
+  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
+
+  PetscFunctionBeginUser;
+  if (!m->naccept)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
+  if (run->state.V)
+    PetscCall(SbSpaceGetLocalRead(m->space, run->state.V, &stage.v));
+  for (PetscInt e = 0; e < m->naccept; e++)
+    SbEffectCall(m->accept[e], accept, m->space, &stage);
+  if (run->state.V)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.V, &stage.v));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode call_monitors(SbRun run, const SbStep *step)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < run->monitors.n; k++)
+    PetscCall(run->monitors.list[k].fn(run, step, run->monitors.list[k].ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the iterations and rejections of the step to the totals. */
+static void count(SbRunCounters *c, PetscBool first, SbStep *now)
+{
+  now->newton = c->newton_step;
+  now->linear = c->linear_step;
+  now->rejected = c->rejected - c->rejected_seen;
+  c->newton += now->newton;
+  c->linear += now->linear;
+  c->steps += !first;
+  c->rejected_seen = c->rejected;
+  c->newton_step = c->linear_step = 0;
 }
 
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last)
 {
-  const PetscBool first = (PetscBool)(step == run->clock.step0);
+  SbRunClock *clock = &run->clock;
+  const PetscBool first = (PetscBool)(step == clock->step0);
   const PetscReal begun = MPI_Wtime();
-  const SbModel m = run->model;
-  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
-  PetscBool jumps;
   SbStep now = {.step = step,
                 .t = t,
                 .dt = dt,
-                .t_end = run->clock.t_end,
+                .t_end = clock->t_end,
+                .step_end = -1,
                 .U = run->state.U,
                 .V = run->state.V,
                 .A = run->state.A};
+  PetscBool jumps;
 
   PetscFunctionBeginUser;
-  run->clock.t = t;
+  clock->t = t;
   if (first)
     PetscCall(SbRunFollowJumps(run, &jumps));
 
   /* monitors have seen this step already, before it was known to be the last one */
   if (run->monitors.last.U && run->monitors.last.step == step) {
-    if (!run->clock.stopped || first)
+    if (!clock->stopped || first)
       PetscFunctionReturn(PETSC_SUCCESS);
     now = run->monitors.last;
     now.last = now.again = PETSC_TRUE;
-    for (PetscInt k = 0; k < run->monitors.n; k++)
-      PetscCall(run->monitors.list[k].fn(run, &now, run->monitors.list[k].ctx));
+    PetscCall(call_monitors(run, &now));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  now.last = (PetscBool)(last || run->clock.stopped);
+
+  /* the clock */
+  clock->step = step;
+  now.last = (PetscBool)(last || clock->stopped);
   if (!first)
-    run->clock.stop.longest_step =
-      PetscMax(FORGET * run->clock.stop.longest_step, begun - run->clock.stop.step_begun);
-  if (dt > 0.9 * run->clock.dt)
+    clock->stop.longest_step =
+      PetscMax(FORGET * clock->stop.longest_step, begun - clock->stop.step_begun);
+  if (dt > FULL * clock->dt)
     run->monitors.warned_short = PETSC_FALSE;
+  if (clock->fixed)
+    now.step_end = step + (PetscInt)PetscCeilReal((clock->t_end - t) / clock->dt - 1e-6);
 
-  /* effects save their history */
-  run->clock.step = step;
-  if (!first && m->naccept) {
-    PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
-    if (run->state.V)
-      PetscCall(SbSpaceGetLocalRead(m->space, run->state.V, &stage.v));
-    for (PetscInt e = 0; e < m->naccept; e++)
-      SbEffectCall(m->accept[e], accept, m->space, &stage);
-    if (run->state.V)
-      PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.V, &stage.v));
-    PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
-  }
-
-  /* energy balance */
+  /* history of effects, energies, reactions */
+  if (!first)
+    PetscCall(save_history(run, step, t, dt));
   if (run->monitors.want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
   else if (run->monitors.want_residual) {
@@ -151,29 +199,19 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
       PetscCall(VecDuplicate(run->state.U, &run->state.reaction));
     PetscCall(SbRunReactions(run, t, run->state.reaction));
   }
-
-  /* call monitors */
   now.R = run->state.reaction;
   now.energies = run->state.energies;
-  now.step_end = run->clock.fixed
-                   ? step + (PetscInt)PetscCeilReal((run->clock.t_end - t) / run->clock.dt - 1e-6)
-                   : -1;
-  now.newton = run->counters.newton_step;
-  now.linear = run->counters.linear_step;
-  now.rejected = run->counters.rejected - run->counters.rejected_seen;
-  now.wall = MPI_Wtime() - run->clock.wall_start;
-  run->counters.newton += now.newton;
-  run->counters.linear += now.linear;
-  run->counters.steps += !first;
-  run->counters.rejected_seen = run->counters.rejected;
-  run->counters.newton_step = run->counters.linear_step = 0;
-  for (PetscInt k = 0; k < run->monitors.n; k++)
-    PetscCall(run->monitors.list[k].fn(run, &now, run->monitors.list[k].ctx));
+
+  /* monitors */
+  count(&run->counters, first, &now);
+  now.wall = MPI_Wtime() - clock->wall_start;
+  PetscCall(call_monitors(run, &now));
   run->monitors.last = now;
+
+  /* interactive values of the next step */
   if (SbLiveCount())
-    PetscCall(SbLiveAdvance(m->comm, t));
-  run->clock.stop.step_begun = MPI_Wtime();
-  run->clock.stop.longest_output =
-    PetscMax(run->clock.stop.longest_output, run->clock.stop.step_begun - begun);
+    PetscCall(SbLiveAdvance(run->model->comm, t));
+  clock->stop.step_begun = MPI_Wtime();
+  clock->stop.longest_output = PetscMax(clock->stop.longest_output, clock->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -121,10 +121,22 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
    Collective. */
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
-/* SbRunSolveStep - solves a step by run->solve.snes, with contact until the active set does not
-   change; U: initial guess, then solution. Collective. reason: of the last solve;
-   SNES_DIVERGED_MAX_IT if the active set does not converge. With run->clock.may_end_at_impact, if
-   nodes come into contact within the step, it ends after the first solve with
-   SNES_CONVERGED_ITERATING: to be repeated with the fraction run->clock.time_of_impact of its
-   length. */
+/* integrator.c. Set-up: the TS, with its SNES. Integrate: the time loop, its failure in
+   run->clock.stop_reason. Collective. */
+PetscErrorCode SbRunSetUpIntegrator(SbRun run);
+PetscErrorCode SbRunIntegrate(SbRun run);
+/* contact_check.c: errors unless integrator and solver go with the contact of the scene. */
+PetscErrorCode SbRunCheckContact(SbRun run);
+
+/* solve.c. */
+/* Type, tolerances and options of run->solve.snes, and of the TS. Collective. */
+PetscErrorCode SbRunSetUpSolver(SbRun run);
+/* Before each solve of an attempt: effects move, surfaces are updated, candidates of contact are
+   found; warm: U is the last solution, else the predictor's guess. Collective. */
+PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool warm);
+/* Solves a step by run->solve.snes, with contact until the active set does not change; U: initial
+   guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active
+   set does not converge. With run->clock.may_end_at_impact, if nodes come into contact within the
+   step, it ends after the first solve with SNES_CONVERGED_ITERATING: to be repeated with the
+   fraction run->clock.time_of_impact of its length. */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
