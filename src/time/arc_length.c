@@ -252,13 +252,15 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->nbegin_step  ? m->begin_step[0]->name
-                     : m->npotential ? m->potential[0]->name
-                                     : "";
+  const char *name = "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
+  if (m->npotential)
+    name = m->potential[0]->name;
+  if (m->nbegin_step)
+    name = m->begin_step[0]->name;
   PetscCheck(
     !m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
     "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
@@ -281,7 +283,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   PetscReal sign = 1.;
   PetscReal l, length;
   PetscInt step = run->clock.step0;
-  PetscInt cuts = 0;
+  PetscInt halvings = 0;
   PetscInt its;
   PetscBool last = (PetscBool)(factor == 1.);
   PetscBool known = PETSC_FALSE;
@@ -348,7 +350,8 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
         break;
       }
       l *= 0.5;
-      if (++cuts <= run->clock.max_halvings && l >= run->clock.min_increment * run->clock.arc.first)
+      if (++halvings <= run->clock.max_halvings &&
+          l >= run->clock.min_increment * run->clock.arc.first)
         continue;
       break;
     }
@@ -356,7 +359,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     /* the new equilibrium, and the length of the next step */
     run->clock.stop_reason[0] = 0;
     known = PETSC_FALSE;
-    cuts = 0;
+    halvings = 0;
     PetscCall(VecWAXPY(run->state.path, -1., run->state.U, p.X));
     PetscCall(product(&p, run->state.path, run->state.path, &length));
     l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));

@@ -22,7 +22,7 @@
   the decrease of B, as B is convex: contact only dissipates.
 
   The acceleration is part of the state (run->state.A), so a restart continues exactly. A step may
-  be repeated once, up to the first time of impact; the remainder is the next step (contact.c). A
+  be repeated once, up to the first time of impact; the remainder is the next step (solve.c). A
   step whose solve fails is halved and repeated; after four good steps its length doubles, up to the
   nominal one. The local error for TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991),
   for implicit Euler h^2/2 a1.
@@ -68,17 +68,19 @@ typedef struct {
     struct {
       Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
       Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
-      Vec own0,
-        own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
+
+      /* Newmark with contact: accelerations without contact at start and end; else NULL */
+      Vec free0, free1;
       Vec work; /* NULL with explicit methods */
     };
     Vec all[11]; /* the same vectors */
   };
-  Vec U, V, A;    /* where the equation is evaluated; borrowed */
-  PetscReal rest; /* length of the remainder of a step after a time of impact, s; 0: none */
-  PetscReal
-    whole; /* length of the step before its division, s: the remainder ends at the original time */
-  PetscBool started; /* run->state.A holds the acceleration of the current state */
+  Vec U, V, A; /* where the equation is evaluated; borrowed */
+
+  /* a step that was divided at a time of impact, s; 0: none. The remainder ends at the original
+     time */
+  PetscReal remainder, undivided; /* length of its second part, and of both */
+  PetscBool started;              /* run->state.A holds the acceleration of the current state */
 } SecondOrder;
 
 /* Computes v1 and a1 from the end displacement X. */
@@ -88,7 +90,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
   const PetscReal h = ts->time_step;
   const PetscReal beta = so->set.beta;
   const PetscReal gamma = so->set.gamma;
-  const Vec A0 = so->own0 ? so->own0 : so->run->state.A;
+  const Vec A0 = so->free0 ? so->free0 : so->run->state.A;
 
   PetscFunctionBeginUser;
   if (so->set.method == SB_METHOD_EULER_IMPLICIT) {
@@ -260,9 +262,9 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     if (SbSpaceIsConstrained(run->model->space))
       PetscCall(SbModelContactVelocity(run->model, ts->ptime + h, h, so->X1, so->V1));
     PetscCall(VecAYPX(so->work, -1., so->V1));
-    PetscCall(VecCopy(so->A1, so->own1));
-    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->own1));
-    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->own1));
+    PetscCall(VecCopy(so->A1, so->free1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->free1));
+    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->free1));
     PetscCall(VecAXPY(so->A1, 1. / h, so->work));
   }
   if (!*ok && !ts->usessnes)
@@ -286,12 +288,12 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TSStep_SecondOrder(TS ts)
+/* The acceleration and the penalty on jumps at the start of a step, and a copy of its state, to
+   which a rejected attempt returns. */
+static PetscErrorCode begin_step(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscBool explicit = (PetscBool)!ts->usessnes;
   const SbRun run = so->run;
-  PetscInt cuts = 0;
   PetscBool jumps;
 
   PetscFunctionBeginUser;
@@ -304,88 +306,150 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
   /* the penalty on jumps of CR and DG for this step */
   PetscCall(SbRunFollowJumps(run, &jumps));
-  if (so->own0 && (!so->started || jumps)) {
-    PetscCall(VecCopy(run->state.A, so->own0));
-    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->own0));
+  if (so->free0 && (!so->started || jumps)) {
+    PetscCall(VecCopy(run->state.A, so->free0));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->free0));
   }
   so->started = PETSC_TRUE;
 
-  /* copy the initial state, to which a rejected step returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
   run->solve.stage.U = so->Xa;
   run->solve.stage.start = so->X0;
   run->solve.stage.part = so->set.alpha_f;
-  for (;;) {
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the error of a solved attempt lets it be accepted, and the length of the next one, s. */
+static PetscErrorCode choose_length(TS ts, PetscReal *next, PetscBool *accept)
+{
+  const SecondOrder *so = (const SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  PetscReal h = ts->time_step;
+  PetscBool fixed;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
+  if (fixed) {
+    /* return to the nominal length: double it after four steps without halving */
+    if (run->clock.good_steps >= 3)
+      h = PetscMin(2. * ts->time_step, run->clock.dt);
+
+    /* the remainder of a step after a time of impact, and the length from before it */
+    if (so->undivided > 0.)
+      h = so->remainder > 0. ? so->remainder : so->undivided;
+  }
+  PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, next, accept));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of the attempt becomes the state; next: length of the next step, s. */
+static PetscErrorCode accept_step(TS ts, PetscReal next)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  SbRunClock *clock = &so->run->clock;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->A1, so->run->state.A));
+  if (so->free0)
+    PetscCall(VecCopy(so->free1, so->free0));
+  ts->ptime += ts->time_step;
+  clock->good_steps = next > ts->time_step ? 0 : clock->good_steps + 1;
+  clock->stop_reason[0] = 0;
+  ts->time_step = next;
+
+  /* a step up to an impact, or its remainder */
+  if (so->remainder > 0.)
+    so->remainder = 0.;
+  else
+    so->undivided = 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The length after a failed attempt, s: half of it; or up to the time of impact, which is no
+   failure and whose remainder is the next step. */
+static PetscReal shorter_length(TS ts, PetscInt *halvings)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal impact = so->run->clock.time_of_impact;
+  PetscReal next = 0.5 * ts->time_step;
+
+  so->undivided = so->remainder = 0.;
+  if (!so->run->solve.rejected_inverted && impact < 1.) {
+    next = impact * ts->time_step;
+    so->undivided = ts->time_step;
+    so->remainder = ts->time_step - next;
+    (*halvings)--;
+  }
+  return next;
+}
+
+/* Back to the start of the step, to repeat it with the length `next`, s; *again: that may help. */
+static PetscErrorCode reject_attempt(TS ts, PetscReal next, PetscInt *halvings, PetscBool *again)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  SbRunClock *clock = &run->clock;
+  const PetscBool hopeless = (PetscBool)(!ts->usessnes || clock->stopped);
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->X0, ts->vec_sol));
+  PetscCall(VecCopy(so->V0, ts->vec_dot));
+  ts->reject++;
+  run->counters.rejected++;
+  clock->good_steps = 0;
+
+  /* bounds the number of halvings, also when steps in between succeed */
+  *again = (PetscBool)(!hopeless && ++*halvings <= clock->max_halvings &&
+                       next >= SHORTEST * clock->dt && !SbRunTooShort(run, next));
+  if (*again) {
+    ts->time_step = next;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  ts->reason = TS_DIVERGED_STEP_REJECTED;
+  if (!hopeless && clock->stop_reason[0])
+    SbAppend(sizeof(clock->stop_reason), clock->stop_reason,
+             "; try a shorter -ts_dt, or loads and motions that begin gently "
+             "(docs/guides/when_it_fails.md, R1)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSStep_SecondOrder(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  PetscInt halvings = 0;
+  PetscBool again = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_step(ts));
+  while (again) {
     const SbAttempt attempt = {solved_step(ts), predict, contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE;
     PetscBool accept = PETSC_FALSE;
-    PetscBool fixed;
-    PetscReal next, h;
+    PetscReal next;
 
     /* one attempt */
     run->clock.may_end_at_impact =
-      (PetscBool)(run->model->ntime_of_impact && !cuts && so->whole == 0.);
+      (PetscBool)(run->model->ntime_of_impact && !halvings && so->undivided == 0.);
     run->clock.time_of_impact = 1.;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
     ts->snes_its = run->counters.newton - run->counters.newton_before + run->counters.newton_step;
     ts->ksp_its = run->counters.linear - run->counters.linear_before + run->counters.linear_step;
+
+    /* its error, and the next length */
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
+      PetscCall(choose_length(ts, &next, &accept));
+    } else
+      next = shorter_length(ts, &halvings);
 
-      /* return to the nominal length: double it after four steps without halving */
-      PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-      h = fixed && run->clock.good_steps >= 3 ? PetscMin(2. * ts->time_step, run->clock.dt)
-                                              : ts->time_step;
-      if (fixed && so->whole > 0.)
-        h = so->rest > 0. ? so->rest : so->whole;
-      PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
-      if (accept) {
-        PetscCall(VecCopy(so->A1, run->state.A));
-        if (so->own0)
-          PetscCall(VecCopy(so->own1, so->own0));
-        ts->ptime += ts->time_step;
-        run->clock.good_steps = next > ts->time_step ? 0 : run->clock.good_steps + 1;
-        ts->time_step = next;
-        run->clock.stop_reason[0] = 0;
-
-        /* a step up to an impact, or its remainder, was accepted */
-        if (so->rest > 0.)
-          so->rest = 0.;
-        else
-          so->whole = 0.;
-        break;
-      }
-    } else if (!run->solve.rejected_inverted && run->clock.time_of_impact < 1.) {
-      /* repeat the step up to the time of impact; the next one is the remainder */
-      next = run->clock.time_of_impact * ts->time_step;
-      so->whole = ts->time_step;
-      so->rest = ts->time_step - next;
-      cuts--;
-    } else {
-      so->whole = so->rest = 0.;
-      next = 0.5 * ts->time_step;
-    }
-
-    /* rejected: restore the initial state, and repeat the step with another length */
-    PetscCall(VecCopy(so->X0, ts->vec_sol));
-    PetscCall(VecCopy(so->V0, ts->vec_dot));
-    ts->reject++;
-    run->counters.rejected++;
-    run->clock.good_steps = 0;
-
-    // bounds the number of halvings, also when steps in between succeed
-    if (explicit || run->clock.stopped || ++cuts > run->clock.max_halvings ||
-        next < SHORTEST * run->clock.dt || SbRunTooShort(run, next)) {
-      ts->reason = TS_DIVERGED_STEP_REJECTED;
-      if (!explicit && !run->clock.stopped && run->clock.stop_reason[0])
-        SbAppend(sizeof(run->clock.stop_reason), run->clock.stop_reason,
-                 "; try a shorter -ts_dt, or loads and motions that begin gently "
-                 "(docs/guides/when_it_fails.md, R1)");
+    if (accept) {
+      PetscCall(accept_step(ts, next));
       break;
     }
-    ts->time_step = next;
+    PetscCall(reject_attempt(ts, next, &halvings, &again));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -439,9 +503,20 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
   const PetscBool staged = (PetscBool)(so->set.alpha_f != 1. || so->set.alpha_m != 1.);
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 11; k++)
-    if (k < 5 || (k < 8 ? staged : k < 10 ? so->set.impulses : ts->usessnes))
+
+  /* in the order of the vectors: both ends, stage, accelerations without contact, work */
+  for (int k = 0; k < 11; k++) {
+    PetscBool needed = PETSC_TRUE;
+
+    if (k >= 5)
+      needed = staged;
+    if (k >= 8)
+      needed = so->set.impulses;
+    if (k >= 10)
+      needed = ts->usessnes;
+    if (needed)
       PetscCall(VecDuplicate(ts->vec_sol, &so->all[k]));
+  }
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -171,6 +171,37 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No equilibrium was found at the shortest increment `length`: says which load was reached, and the
+   likely cause. */
+static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal length,
+                                      PetscBool contact)
+{
+  char why[sizeof(run->clock.stop_reason)];
+  PetscBool unstable;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+  PetscCall(SbNewtonUnstable(run->solve.snes, &unstable));
+  if (run->solve.softening > LIMIT)
+    PetscCall(
+      SbRunFail(run,
+                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                "on: a limit load is likely, as displacements grow %.0f times as fast with the "
+                "load as before; -static_control arc_length goes past it",
+                (double)factor, (double)length, (double)run->solve.softening));
+  else if (factor > 0. && unstable && !contact)
+    PetscCall(
+      SbRunFail(run,
+                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                "on, where the tangent is not positive definite: a limit load is likely, or a "
+                "bifurcation; -static_control arc_length goes past it%s%s",
+                (double)factor, (double)length, run->solve.rejected_inverted ? "; " : "",
+                run->solve.rejected_inverted ? why : ""));
+  else if (factor > 0.)
+    PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStaticSolve(SbRun run)
 {
   const PetscReal nominal = 1. / (PetscReal)run->clock.static_steps;
@@ -180,7 +211,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
   PetscReal rate;
   PetscReal slowest = 0.;
   PetscInt step = run->clock.step0;
-  PetscInt cuts = 0;
+  PetscInt halvings = 0;
   const PetscBool contact = (PetscBool)(run->model->nbegin_step || run->model->npotential);
   Vec X;
 
@@ -205,9 +236,6 @@ PetscErrorCode SbStaticSolve(SbRun run)
 
     /* halve a failed step, if that may help */
     if (!ok) {
-      char why[sizeof(run->clock.stop_reason)];
-      PetscBool unstable;
-
       run->counters.rejected++;
       length *= 0.5;
       run->solve.tangent_known = PETSC_FALSE;
@@ -218,30 +246,11 @@ PetscErrorCode SbStaticSolve(SbRun run)
 
       /* halving does not help in a linear problem, unless contact is active */
       if (run->model->linear && !contact)
-        cuts = run->clock.max_halvings;
-      if (++cuts <= run->clock.max_halvings && length >= least && !SbRunTooShort(run, length))
+        halvings = run->clock.max_halvings;
+      if (++halvings <= run->clock.max_halvings && length >= least && !SbRunTooShort(run, length))
         continue;
 
-      /* steps are too short: report the load reached, and the likely cause */
-      PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
-      PetscCall(SbNewtonUnstable(run->solve.snes, &unstable));
-      if (run->solve.softening > LIMIT)
-        PetscCall(
-          SbRunFail(run,
-                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                    "on: a limit load is likely, as displacements grow %.0f times as fast with the "
-                    "load as before; -static_control arc_length goes past it",
-                    (double)factor, (double)(2. * length), (double)run->solve.softening));
-      else if (factor > 0. && unstable && !contact)
-        PetscCall(
-          SbRunFail(run,
-                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                    "on, where the tangent is not positive definite: a limit load is likely, or a "
-                    "bifurcation; -static_control arc_length goes past it%s%s",
-                    (double)factor, (double)(2. * length), run->solve.rejected_inverted ? "; " : "",
-                    run->solve.rejected_inverted ? why : ""));
-      else if (factor > 0.)
-        PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+      PetscCall(report_shortest(run, factor, 2. * length, contact));
       break;
     }
     run->clock.stop_reason[0] = 0;
@@ -265,7 +274,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (next < 1.)
       PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
     if (run->counters.newton_step)
-      cuts = 0;
+      halvings = 0;
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     if (run->clock.paused || run->clock.stopped)
       break;

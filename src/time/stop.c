@@ -125,6 +125,7 @@ PetscErrorCode SbRunReadStop(SbRun run)
 
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
 {
+  const char *why = "SIGUSR1";
   PetscMPIInt rank;
   int reason;
 
@@ -153,16 +154,18 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
              "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a "
              "coarser mesh",
              (double)run->clock.stop.wall_time);
+  if (reason == WALL_TIME)
+    why = "the end of -wall_time is near";
+  if (reason == SIGTERM)
+    why = "SIGTERM";
+  if (reason == SIGINT)
+    why = "SIGINT";
   run->clock.stopped = PETSC_TRUE;
   run->clock.paused = PETSC_FALSE;
   run->clock.stop_reason[0] = 0;
   PetscCall(
     SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
-              reason == WALL_TIME ? "the end of -wall_time is near"
-              : reason == SIGTERM ? "SIGTERM"
-              : reason == SIGINT  ? "SIGINT"
-                                  : "SIGUSR1",
-              within ? ", and the next step is given up" : "", step,
+              why, within ? ", and the next step is given up" : "", step,
               run->model->dynamic ? "t =" : "load factor", (double)t,
               run->model->dynamic ? " s" : "", step > run->clock.step0 ? "latest" : "auto"));
   PetscFunctionReturn(PETSC_SUCCESS);
