@@ -109,7 +109,7 @@ PetscErrorCode SbNewtonFindDirection(SNES snes, PetscReal *slope)
 
   /* forces without a potential, near the solution: an indefinite tangent is kept */
   const PetscBool keep =
-    (PetscBool)(p->nonsymmetric && n->whole && snes->norm < n->initial && !p->barrier);
+    (PetscBool)(p->nonsymmetric && n->full && snes->norm < n->initial && !p->barrier);
 
   PetscFunctionBeginUser;
   n->shift = 0.;

@@ -18,9 +18,9 @@
 */
 #include "newton_impl.h"
 
-#define CREEP 0.05  /* fraction of a step that counts as stagnation */
-#define CREEPS 5    /* such steps in a row after which a load step is halved */
-#define PATIENCE 50 /* barriers: iterations between checks of progress */
+#define STAGNANT 0.05    /* fraction of a step that counts as stagnation */
+#define STAGNANT_STEPS 5 /* such steps in a row after which a load step is halved */
+#define PATIENCE 50      /* barriers: iterations between checks of progress */
 #define WORTH \
   0.01           /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
 #define EARLY 10 /* iterations in which friction is not lagged: normal forces are updated in each */
@@ -33,8 +33,8 @@ static PetscErrorCode begin(SNES snes)
 
   PetscFunctionBeginUser;
   snes->reason = SNES_CONVERGED_ITERATING;
-  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->creeps = 0;
-  n->known = n->whole = n->unstable = n->filtered = PETSC_FALSE;
+  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = 0;
+  n->known = n->full = n->unstable = n->filtered = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = n->fall = n->fall_checked = 0.;
   if (p->barrier)
@@ -99,8 +99,8 @@ static void check_progress(SNES snes, PetscReal s)
 
   /* very short load steps */
   if (!p->barrier && p->dt == 0. && !n->provisional.n)
-    n->creeps = s < CREEP ? n->creeps + 1 : 0;
-  if (!snes->reason && n->creeps == CREEPS)
+    n->stagnant = s < STAGNANT ? n->stagnant + 1 : 0;
+  if (!snes->reason && n->stagnant == STAGNANT_STEPS)
     snes->reason = SNES_DIVERGED_LINE_SEARCH;
 }
 
@@ -160,8 +160,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       break;
 
     /* a full step: the next tangent is exact */
-    n->whole = (PetscBool)(s >= 1.);
-    n->filtered = (PetscBool)(n->filtered && !n->whole);
+    n->full = (PetscBool)(s >= 1.);
+    n->filtered = (PetscBool)(n->filtered && !n->full);
     n->kind = s < 1. ? SB_HESSIAN_PROJECTED : SB_HESSIAN_EXACT;
 
     /* convergence */

@@ -53,13 +53,13 @@ typedef struct {
   PetscReal shift;       /* factor on the mass matrix added to the last tangent, 1/s^2 */
 
   /* the loop */
-  PetscBool whole;              /* the last step was a full one */
+  PetscBool full;               /* the last step was a full one */
   PetscReal initial;            /* norm of the first residual, N */
   PetscReal tolerance;          /* absolute tolerance of the last solve, N */
   PetscBool patient;            /* barriers, without -snes_max_it: may exceed its default */
   PetscReal fall, fall_checked; /* of E in this solve, and until the last check of progress, J */
   PetscInt first;               /* iteration at which friction's lag was updated last */
-  PetscInt creeps;              /* very short steps in a row */
+  PetscInt stagnant;            /* very short steps in a row */
 } Newton;
 
 /* direction.c: solves for Y, X - Y being the next iterate, and for the slope of E along -Y, J. Sets
