@@ -237,13 +237,12 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
     negative = -1; /* the matrix lacks a part of K: its inertia is unknown */
   if (negative >= 0 && p->negative >= 0 &&
       PetscAbsInt(negative - p->negative) != (*sign != p->turned) && !run->counters.bifurcations++)
-    PetscCall(SbWarning(
-      run->model->comm,
-      "load factor %g: the tangent has %" PetscInt_FMT
-      " negative eigenvalues, a step before %" PetscInt_FMT
-      ", and the load does not turn: a bifurcation was passed, and other equilibria may be "
-      "reached by a small imperfection",
-      (double)p->factor, negative, p->negative));
+    PetscCall(SbWarning(run->model->comm,
+                        "load factor %g: the tangent has %" PetscInt_FMT
+                        " negative eigenvalues, a step before %" PetscInt_FMT
+                        ", and the load does not turn: a bifurcation was passed, and other "
+                        "equilibria may be reached by a small imperfection",
+                        (double)p->factor, negative, p->negative));
   p->negative = negative;
   p->turned = *sign;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -261,19 +260,17 @@ PetscErrorCode SbArcLengthCheck(SbRun run)
     name = m->potential[0]->name;
   if (m->nbegin_step)
     name = m->begin_step[0]->name;
-  PetscCheck(
-    !m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
-    "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
-    "dynamic run with damping",
-    name);
+  PetscCheck(!m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length does not know contact (effect %s): use -static_control "
+             "load, or a dynamic run with damping",
+             name);
   PetscCall(SNESGetKSP(run->solve.snes, &ksp));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
   PetscCall(PetscStrcmp(run->solve.solver, "cholmod", &cholmod));
-  PetscCheck(
-    !cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
-    "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave "
-    "-solver to auto, or give mumps or umfpack",
-    run->solve.solver);
+  PetscCheck(!cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length meets indefinite matrices, which -solver %s does not "
+             "take: leave -solver to auto, or give mumps or umfpack",
+             run->solve.solver);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -404,11 +401,10 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
         SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
                   (double)factor, m->body[body].name, motion));
     else
-      PetscCall(
-        SbRunFail(run,
-                  "the path reached the load factor %.7g, and no step of %.1e of the first one's "
-                  "length was found to go on: %s",
-                  (double)factor, (double)(2. * l / run->clock.arc.first), why));
+      PetscCall(SbRunFail(run,
+                          "the path reached the load factor %.7g, and no step of %.1e of the first "
+                          "one's length was found to go on: %s",
+                          (double)factor, (double)(2. * l / run->clock.arc.first), why));
   }
   for (int k = 0; k < 9; k++)
     PetscCall(VecDestroy(&p.all[k]));

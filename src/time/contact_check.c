@@ -23,14 +23,12 @@ static PetscErrorCode check_barrier(SbRun run, PetscBool implicit, PetscBool mat
              "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
   PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier and -effect_%s_response of another kind do not go "
-             "together: give "
-             "both the same",
+             "together: give both the same",
              name, m->begin_step[0]->name);
-  PetscCheck(
-    matrix, m->comm, PETSC_ERR_USER_INPUT,
-    "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
-    "cg_two_level",
-    run->solve.solver, name);
+  PetscCheck(matrix, m->comm, PETSC_ERR_USER_INPUT,
+             "-solver %s has no complete matrix, to which the effect %s could add: use -solver "
+             "auto or cg_two_level",
+             run->solve.solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -48,40 +46,36 @@ static PetscErrorCode check_active_set(SbRun run, PetscBool implicit, PetscBool 
   if (run->solve.preset == SB_TIME_NEWMARK) {
     /* its contact needs the trapezoidal rule, the lumped mass, and forces on constrained nodes
        only */
-    PetscCheck(
-      run->solve.newmark[0] == 0.25 && run->solve.newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
-      "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
-      "not %g and %g: else impacts may gain energy",
-      name, (double)run->solve.newmark[0], (double)run->solve.newmark[1]);
-    PetscCheck(
-      !m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
-      "-time newmark with the effect %s needs -mass lumped: velocities of contact are corrected "
-      "node by node",
-      name);
+    PetscCheck(run->solve.newmark[0] == 0.25 && run->solve.newmark[1] == 0.5, m->comm,
+               PETSC_ERR_USER_INPUT,
+               "-time newmark with the effect %s needs -time_newmark_beta 0.25 and "
+               "-time_newmark_gamma 0.5, not %g and %g: else impacts may gain energy",
+               name, (double)run->solve.newmark[0], (double)run->solve.newmark[1]);
+    PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
+               "-time newmark with the effect %s needs -mass lumped: velocities of contact are "
+               "corrected node by node",
+               name);
     for (PetscInt e = 0; e < m->nbegin_step; e++)
       PetscCheck(!m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
                  "-time newmark gains energy by springs and friction of the effect %s: give "
-                 "-effect_%s_response "
-                 "projected or multiplier and no friction, or use euler_implicit or genalpha",
+                 "-effect_%s_response projected or multiplier and no friction, or use "
+                 "euler_implicit or genalpha",
                  m->begin_step[e]->name, m->begin_step[e]->name);
   }
-  PetscCheck(
-    m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
-    "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
-    "leave it out",
-    early);
-  PetscCheck(run->solve.preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm,
-             PETSC_ERR_USER_INPUT,
-             "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the "
-             "acceleration of a "
-             "short step, in which nodes are stopped, into a long one; use euler_implicit",
+  PetscCheck(m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_time_of_impact yes is about the length of time steps, and -time static "
+             "has none: leave it out",
              early);
   PetscCheck(
-    matrix || (!run->solve.solver_used->matrix_free && !m->nassemble_constraints), m->comm,
-    PETSC_ERR_USER_INPUT,
-    "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use -solver "
-    "rotated or cg_two_level",
-    run->solve.solver, name);
+    run->solve.preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+    "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the acceleration of "
+    "a short step, in which nodes are stopped, into a long one; use euler_implicit",
+    early);
+  PetscCheck(matrix || (!run->solve.solver_used->matrix_free && !m->nassemble_constraints), m->comm,
+             PETSC_ERR_USER_INPUT,
+             "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use "
+             "-solver rotated or cg_two_level",
+             run->solve.solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

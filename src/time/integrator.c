@@ -43,77 +43,62 @@ const SbOption SbTimeRows[] = {
    "time integrator, or static equilibrium"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",
    "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 "
-   "of the "
-   "stable step unless given"},
+   "of the stable step unless given"},
   {"ts_max_time", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "end of the simulated time"},
   {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]",
    "genalpha: spectral radius at infinite frequency, the amplitude of the highest frequencies that "
-   "is left "
-   "after a step; 1: no damping, 0: they vanish in one step"},
+   "is left after a step; 1: no damping, 0: they vanish in one step"},
   {"time_newmark_beta", SB_OPTION_REAL, 1, "", "0.25", "(0, 0.5]", "newmark: beta"},
   {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]",
    "newmark: gamma; more than 1/2 damps and is first order"},
   {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity",
    "first guess of Newton's method in a step: the old displacement, or u + dt v. With one linear "
-   "solve per "
-   "step (-snes_type ksponly) velocity is far more accurate, but may be unstable unless the "
-   "tangent is "
-   "exact_spd"},
+   "solve per step (-snes_type ksponly) velocity is far more accurate, but may be unstable unless "
+   "the tangent is exact_spd"},
   {"time_max_halvings", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved and repeated before the run stops"},
   {"time_inverted", SB_OPTION_CHOICE, 1, "", "auto", "auto|accept|reject",
    "a step that inverts tets (det F <= 0): accept, and count them; or reject, halve it and try "
-   "again, and "
-   "stop when that does not help; auto: reject in load steps of a static run with stvk, whose "
-   "stress has a "
-   "maximum in compression, else accept"},
+   "again, and stop when that does not help; auto: reject in load steps of a static run with stvk, "
+   "whose stress has a maximum in compression, else accept"},
   {"live_speed", SB_OPTION_REAL, 1, "m/s", "0.2", "(0, inf)",
    "-effect_<name>_displacement live (interactive): largest speed at which the effect moves to the "
-   "position "
-   "that the file live.txt in output_dir names (lines `NAME x y z`, m)"},
+   "position that the file live.txt in output_dir names (lines `NAME x y z`, m)"},
   {"live_angular_speed", SB_OPTION_REAL, 1, "degrees/s", "90", "(0, inf)",
    "-effect_<name>_angle live (interactive): largest angular speed; other live options take their "
-   "new value "
-   "in the next step"},
+   "new value in the next step"},
   {"live_pace", SB_OPTION_REAL, 1, "", "1", "[0, inf)",
    "interactive runs: largest ratio of simulated time to real time; a faster run waits; 0: no "
    "limit"},
   {"wall_time", SB_OPTION_STRING, 1, "", "", "",
    "wall time limit of the program, h:mm:ss or d-hh:mm:ss: the run stops in time to write a "
-   "checkpoint, with "
-   "exit code 75, and -restart latest resumes it; empty: no limit"},
+   "checkpoint, with exit code 75, and -restart latest resumes it; empty: no limit"},
   {"stop_grace", SB_OPTION_REAL, 1, "s", "10", "[0, inf)",
    "after a signal to stop (SIGTERM, SIGINT, SIGUSR1): time in which the current step may be "
-   "finished; then "
-   "it is abandoned, and the run ends with the step before"},
+   "finished; then it is abandoned, and the run ends with the step before"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "contact with response multiplier: how the saddle-point system of displacements and Lagrange "
-   "multipliers "
-   "is solved: by a factorisation with the multipliers condensed, or by projected iterations in "
-   "the null "
-   "space of the constraints; auto goes by size"},
+   "multipliers is solved: by a factorisation with the multipliers condensed, or by projected "
+   "iterations in the null space of the constraints; auto goes by size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "contact with response barrier: how linear systems are solved: by a factorisation, or by CG "
-   "whose coarse "
-   "space contains the unknowns in contact; auto takes iterations while they are less work"},
+   "whose coarse space contains the unknowns in contact; auto takes iterations while they are less "
+   "work"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
    "static: smallest load increment, as a fraction of a load step; below it the run stops, and "
-   "says whether "
-   "a limit load is likely"},
+   "says whether a limit load is likely"},
   {"static_control", SB_OPTION_CHOICE, 1, "", "load", "load|arc_length",
    "static: load control, or arc-length control along the equilibrium path, which continues past "
-   "limit "
-   "points; both end where the load factor reaches 1"},
+   "limit points; both end where the load factor reaches 1"},
   {"static_max_steps", SB_OPTION_INT, 1, "", "1000", "[1, inf)",
    "arc_length: largest number of steps; the run ends there"},
   {"static_max_displacement", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
    "arc_length: the run ends when the displacement of any node exceeds this; 0: no limit"},
   {"static_longest_step", SB_OPTION_REAL, 1, "", "10", "(0, inf)",
    "arc_length: largest increment of arc length, as a multiple of the first one, whose load "
-   "increment is "
-   "1/-static_steps"},
+   "increment is 1/-static_steps"},
   {0},
 };
 
@@ -255,11 +240,10 @@ static PetscErrorCode choose_stable_step(SbRun run)
   if (!run->clock.dt_given)
     run->clock.dt = STABLE * stable;
   else if (run->clock.dt > stable)
-    PetscCall(
-      SbWarning(m->comm,
-                "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the "
-                "solution to blow up",
-                (double)run->clock.dt, (double)stable));
+    PetscCall(SbWarning(m->comm,
+                        "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: "
+                        "expect the solution to blow up",
+                        (double)run->clock.dt, (double)stable));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,11 +342,11 @@ PetscErrorCode SbRunIntegrate(SbRun run)
   PetscCall(TSGetTime(run->solve.ts, &t));
   PetscCall(TSGetTimeStep(run->solve.ts, &dt));
   if (reason < 0 && !run->clock.stop_reason[0] && !run->clock.stopped)
-    PetscCall(SbRunFail(
-      run,
-      "step %" PetscInt_FMT
-      " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, which "
-      "tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
-      step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
+    PetscCall(
+      SbRunFail(run,
+                "step %" PetscInt_FMT
+                " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, "
+                "which tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
+                step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

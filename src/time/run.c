@@ -224,8 +224,8 @@ PetscErrorCode SbRunSetUp(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_<name>_... live: interactive values need a time, and -time static has "
-             "none: choose -time euler_implicit, newmark or genalpha");
+             "-effect_<name>_... live: interactive values need a time, and -time static has none: "
+             "choose -time euler_implicit, newmark or genalpha");
   for (PetscInt b = 0; b < m->nbody; b++)
     if (s->alpha[b] != 0. || s->beta[b] != 0.)
       solve->damped = m->dynamic;

@@ -143,8 +143,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   if (other)
     PetscCall(SbRunFail(l->run,
                         "load factor %g: contact was found at another equilibrium, with more "
-                        "strain energy than the loads "
-                        "have done work; use more -static_steps",
+                        "strain energy than the loads have done work; use more -static_steps",
                         (double)l->factor));
 
   /* find the cause of a failed solve */
@@ -183,20 +182,18 @@ static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal len
   PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
   PetscCall(SbNewtonUnstable(run->solve.snes, &unstable));
   if (run->solve.softening > LIMIT)
-    PetscCall(
-      SbRunFail(run,
-                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                "on: a limit load is likely, as displacements grow %.0f times as fast with the "
-                "load as before; -static_control arc_length goes past it",
-                (double)factor, (double)length, (double)run->solve.softening));
+    PetscCall(SbRunFail(run,
+                        "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
+                        "further on: a limit load is likely, as displacements grow %.0f times as "
+                        "fast with the load as before; -static_control arc_length goes past it",
+                        (double)factor, (double)length, (double)run->solve.softening));
   else if (factor > 0. && unstable && !contact)
-    PetscCall(
-      SbRunFail(run,
-                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                "on, where the tangent is not positive definite: a limit load is likely, or a "
-                "bifurcation; -static_control arc_length goes past it%s%s",
-                (double)factor, (double)length, run->solve.rejected_inverted ? "; " : "",
-                run->solve.rejected_inverted ? why : ""));
+    PetscCall(SbRunFail(run,
+                        "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
+                        "further on, where the tangent is not positive definite: a limit load is "
+                        "likely, or a bifurcation; -static_control arc_length goes past it%s%s",
+                        (double)factor, (double)length, run->solve.rejected_inverted ? "; " : "",
+                        run->solve.rejected_inverted ? why : ""));
   else if (factor > 0.)
     PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -50,8 +50,8 @@ static PetscErrorCode warn_short(SbRun run, PetscReal dt)
   run->monitors.warned_short = PETSC_TRUE;
   PetscCall(SbWarning(
     run->model->comm,
-    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
-    "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
+    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, "
+    "try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
     (double)(dt / run->clock.dt), run->clock.stop_reason,
     dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   PetscFunctionReturn(PETSC_SUCCESS);
