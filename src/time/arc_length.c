@@ -274,38 +274,131 @@ PetscErrorCode SbArcLengthCheck(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Vectors and weights at the start of the path, at the load factor `factor`. */
+static PetscErrorCode begin_path(Path *p, PetscReal factor)
+{
+  const SbRun run = p->run;
+  const SbModel m = run->model;
+  PetscReal most;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 9; k++)
+    PetscCall(VecDuplicate(run->state.U, &p->all[k]));
+  PetscCall(VecAXPBY(p->weight, 1. / m->mass, 0., run->state.mass));
+
+  /* whether R is linear in lambda */
+  PetscCall(VecZeroEntries(p->X));
+  PetscCall(put_at(p, 1.));
+  PetscCall(VecNorm(p->X, NORM_INFINITY, &most));
+  p->delta = most > 0. ? FINE : 1.;
+  for (PetscInt e = 0; e < m->nforce; e++)
+    p->delta = m->force[e]->steady ? p->delta : FINE;
+  for (PetscInt e = 0; e < m->nprescribe; e++)
+    p->delta = m->prescribe[e]->steady ? p->delta : FINE;
+  PetscCall(VecCopy(run->state.U, p->X));
+  PetscCall(put_at(p, factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Length of the first step, m: by the load increment 1 / static_steps or, after a load path, its
+   displacement per load. */
+static PetscErrorCode first_length(Path *p, PetscReal factor, PetscReal *length)
+{
+  const SbRun run = p->run;
+  PetscReal rate, uu;
+
+  PetscFunctionBeginUser;
+  PetscCall(product(p, p->begin, p->begin, &rate));
+  PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length: no effect loads or moves the bodies more with the "
+             "load factor");
+  rate = PetscSqrtReal(rate);
+  if (factor > 0.) {
+    PetscCall(product(p, run->state.U, run->state.U, &uu));
+    rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
+  }
+  *length = run->clock.arc.first = rate / (PetscReal)run->clock.static_steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X becomes the state after a step of the length l in `its` iterations; l: length of the next one,
+   along whose direction state.path is. */
+static PetscErrorCode accept_step(Path *p, PetscInt its, PetscReal *l)
+{
+  const SbRun run = p->run;
+  const Vec path = run->state.path;
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(path, -1., run->state.U, p->X));
+  PetscCall(product(p, path, path, &length));
+  *l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
+  *l = PetscMin(*l, run->clock.arc.longest * run->clock.arc.first);
+  PetscCall(VecScale(path, *l / PetscSqrtReal(length)));
+  PetscCall(VecCopy(p->X, run->state.U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a node has moved as far as -static_max_displacement. */
+static PetscErrorCode has_moved_far(SbRun run, PetscBool *is)
+{
+  const SbModel m = run->model;
+  const PetscScalar *u;
+  PetscReal most = 0.;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  if (run->clock.arc.displacement == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(run->state.U, &u));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, m->comm));
+  *is = (PetscBool)(PetscSqrtReal(most) >= run->clock.arc.displacement);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Why no step of the length l succeeded after the load factor `factor`. */
+static PetscErrorCode explain_end(SbRun run, PetscReal factor, PetscReal l)
+{
+  char why[sizeof(run->clock.stop_reason)], motion[256];
+  PetscInt body;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (body >= 0 && !run->counters.steps)
+    PetscCall(
+      SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
+                (double)factor, run->model->body[body].name, motion));
+  else
+    PetscCall(SbRunFail(run,
+                        "the path reached the load factor %.7g, and no step of %.1e of the first "
+                        "one's length was found to go on: %s",
+                        (double)factor, (double)(2. * l / run->clock.arc.first), why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbArcLengthSolve(SbRun run)
 {
-  PetscReal factor = run->clock.t0;
+  const SbModel m = run->model;
+  SbRunClock *clock = &run->clock;
+  PetscReal factor = clock->t0;
   PetscReal sign = 1.;
-  PetscReal l, length;
-  PetscInt step = run->clock.step0;
+  PetscReal l;
+  PetscInt step = clock->step0;
   PetscInt halvings = 0;
   PetscInt its;
   PetscBool last = (PetscBool)(factor == 1.);
   PetscBool known = PETSC_FALSE;
   PetscBool ok;
-  const SbModel m = run->model;
   Path p = {.run = run, .negative = -1};
 
   PetscFunctionBeginUser;
   PetscCheck(!run->monitors.post_step.fn, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
-  for (int k = 0; k < 9; k++)
-    PetscCall(VecDuplicate(run->state.U, &p.all[k]));
-  PetscCall(VecAXPBY(p.weight, 1. / m->mass, 0., run->state.mass));
-
-  /* whether R is linear in lambda */
-  PetscCall(VecZeroEntries(p.X));
-  PetscCall(put_at(&p, 1.));
-  PetscCall(VecNorm(p.X, NORM_INFINITY, &length));
-  p.delta = length > 0. ? FINE : 1.;
-  for (PetscInt e = 0; e < m->nforce; e++)
-    p.delta = m->force[e]->steady ? p.delta : FINE;
-  for (PetscInt e = 0; e < m->nprescribe; e++)
-    p.delta = m->prescribe[e]->steady ? p.delta : FINE;
-  PetscCall(VecCopy(run->state.U, p.X));
-  PetscCall(put_at(&p, factor));
+  PetscCall(begin_path(&p, factor));
   PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
   PetscCall(product(&p, run->state.path, run->state.path, &l));
   l = PetscSqrtReal(l);
@@ -319,93 +412,47 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
         break;
       known = PETSC_TRUE;
     }
-
-    /* first step: by the load increment 1 / static_steps or, after a load path, its displacement
-       per load */
-    if (l == 0.) {
-      PetscReal rate, uu;
-
-      PetscCall(product(&p, p.begin, p.begin, &rate));
-      PetscCheck(rate > 0., m->comm, PETSC_ERR_USER_INPUT,
-                 "-static_control arc_length: no effect loads or moves the bodies more with the "
-                 "load factor");
-      rate = PetscSqrtReal(rate);
-      if (factor > 0.) {
-        PetscCall(product(&p, run->state.U, run->state.U, &uu));
-        rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
-      }
-      l = run->clock.arc.first = rate / (PetscReal)run->clock.static_steps;
-    }
+    if (l == 0.)
+      PetscCall(first_length(&p, factor, &l));
 
     /* a step along it, halved on failure */
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
       run->counters.rejected++;
       run->solve.tangent_known = PETSC_FALSE;
-      if (run->clock.stopped) {
+      if (clock->stopped) {
         PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
         break;
       }
       l *= 0.5;
-      if (++halvings <= run->clock.max_halvings &&
-          l >= run->clock.min_increment * run->clock.arc.first)
+      if (++halvings <= clock->max_halvings && l >= clock->min_increment * clock->arc.first)
         continue;
       break;
     }
 
     /* the new equilibrium, and the length of the next step */
-    run->clock.stop_reason[0] = 0;
+    clock->stop_reason[0] = 0;
     known = PETSC_FALSE;
     halvings = 0;
-    PetscCall(VecWAXPY(run->state.path, -1., run->state.U, p.X));
-    PetscCall(product(&p, run->state.path, run->state.path, &length));
-    l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
-    l = PetscMin(l, run->clock.arc.longest * run->clock.arc.first);
-    PetscCall(VecScale(run->state.path, l / PetscSqrtReal(length)));
-    PetscCall(VecCopy(p.X, run->state.U));
+    PetscCall(accept_step(&p, its, &l));
 
-    /* end at -static_max_displacement */
-    if (run->clock.arc.displacement != 0.) {
-      const PetscScalar *u;
-      PetscReal most = 0.;
-
-      PetscCall(VecGetArrayRead(run->state.U, &u));
-      for (PetscInt i = 0; i < m->space->nnode_owned; i++)
-        most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
-      PetscCall(VecRestoreArrayRead(run->state.U, &u));
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, m->comm));
-      last = (PetscBool)(PetscSqrtReal(most) >= run->clock.arc.displacement);
-    }
+    /* the end of the path */
+    PetscCall(has_moved_far(run, &last));
     last = (PetscBool)(last || p.factor == 1.);
-    if (!last && step + 1 - run->clock.step0 == run->clock.arc.steps) {
+    if (!last && step + 1 - clock->step0 == clock->arc.steps) {
       last = PETSC_TRUE;
       PetscCall(SbWarning(
         m->comm, "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
-        run->clock.arc.steps, (double)p.factor));
+        clock->arc.steps, (double)p.factor));
     }
     if (!last)
       PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
-    last = (PetscBool)(last || run->clock.stopped);
+    last = (PetscBool)(last || clock->stopped);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;
   }
-  if (run->clock.stop_reason[0] && !run->clock.stopped && !run->solve.rejected_inverted) {
-    char why[sizeof(run->clock.stop_reason)], motion[256];
-    PetscInt body;
-
-    /* the reason why no step succeeded */
-    PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
-    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-    if (body >= 0 && !run->counters.steps)
-      PetscCall(
-        SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
-                  (double)factor, m->body[body].name, motion));
-    else
-      PetscCall(SbRunFail(run,
-                          "the path reached the load factor %.7g, and no step of %.1e of the first "
-                          "one's length was found to go on: %s",
-                          (double)factor, (double)(2. * l / run->clock.arc.first), why));
-  }
+  if (clock->stop_reason[0] && !clock->stopped && !run->solve.rejected_inverted)
+    PetscCall(explain_end(run, factor, l));
   for (int k = 0; k < 9; k++)
     PetscCall(VecDestroy(&p.all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
