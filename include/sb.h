@@ -1,5 +1,6 @@
 /* sb.h - everything. */
 #pragma once
 #include "sbledger.h"
+#include "sbnewton.h"
 #include "sbremesh.h"
 #include "sbscene.h"

@@ -11,15 +11,6 @@
 
 typedef struct _p_SbContact *SbContact;
 
-/* Hessian of the contact energy in Newton's method: exact; each pair projected to positive
-   semi-definite; the same with friction majorized by quadratics, as its energy has a kink where
-   slip reverses. */
-typedef enum {
-  SB_HESSIAN_EXACT,
-  SB_HESSIAN_PROJECTED,
-  SB_HESSIAN_MAJORIZED
-} SbContactHessian;
-
 /* An active contact point of a body. */
 typedef struct {
   PetscInt id[3];      /* identify it within its effect, the same for any partition */

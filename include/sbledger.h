@@ -5,7 +5,7 @@
   velocity of the bodies; relative is the root of its share of the largest energy, kinetic and
   strain, of the run so far (static: of the strain energy).
 
-  The ledger examines each solved step (SbRun.post_solve) and is a monitor. Without -ledger,
+  The ledger examines each solved step (SbRunMonitors.post_solve) and is a monitor. Without -ledger,
   -accuracy or -step_time_budget there is none: no vector, no callback, no column. With -ledger
   alone it changes no result.
 

@@ -123,6 +123,14 @@ typedef struct {
   PetscInt n, size;
   SbBlock *block; /* [n] */
 } SbBlocks;
+/* Hessian of the contact energy in Newton's method: exact; each pair projected to positive
+   semi-definite; the same with friction majorized by quadratics, as its energy has a kink where
+   slip reverses. */
+typedef enum {
+  SB_HESSIAN_EXACT,
+  SB_HESSIAN_PROJECTED,
+  SB_HESSIAN_MAJORIZED
+} SbContactHessian;
 typedef struct _p_SbContactSystem *SbContactSystem;
 
 /* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: those of

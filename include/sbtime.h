@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "sbmodel.h"
+#include "sbnewton.h"
 
 typedef enum {
   SB_TIME_EULER_IMPLICIT,
@@ -22,8 +23,8 @@ typedef struct {
   PetscReal t_end;
   PetscInt step_end; /* last step if it is known from dt, else -1 */
   Vec U, V, A;       /* V, A NULL in a static run */
-  Vec R;             /* residual without constraints: reactions; NULL unless SbRun.want_residual */
-  SbEnergies energies;     /* filled when some monitor needs them (SbRun.want_energies) */
+  Vec R; /* residual without constraints: reactions; NULL unless SbRunMonitors.want_residual */
+  SbEnergies energies;     /* filled when some monitor needs them (SbRunMonitors.want_energies) */
   PetscInt newton, linear; /* iterations of this step */
   PetscInt rejected;       /* rejected attempts, this step */
   PetscReal wall;          /* seconds since the time loop began */
@@ -42,7 +43,7 @@ typedef struct {
   PetscReal t, dt;  /* start and length, s */
   Vec U0, V0, A0;   /* start */
   Vec U, V, A;      /* end */
-  PetscBool solved; /* by SbRun.snes; else explicitly */
+  PetscBool solved; /* by SbRunSolver.snes; else explicitly */
 } SbSolvedStep;
 /* `again`: the equations are to be solved once more, from U on. Collective. */
 typedef PetscErrorCode (*SbStepSolvedFn)(SbRun run, const SbSolvedStep *step, void *ctx,
@@ -62,74 +63,147 @@ typedef struct {
 } SbCheckpointValue;
 
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
-/* One simulation: model, solver, integrator, monitors. */
-struct _p_SbRun {
-  SbModel model; /* borrowed */
-  SbIntegrator preset;
-  TS ts;     /* NULL in a static run */
-  SNES snes; /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat J;     /* tangent */
-  Mat
-  operator; /* of linear solves: J, its projection (SbConstraints), or J plus SbModelNonsymmetric() */
-  Mat
-    whole; /* the operator that constraints project: J plus SbModelNonsymmetric(); NULL: J is complete */
+
+/* What the bodies have now, and the balance of their energy so far. Vectors: [nnode][3], owned. */
+typedef struct {
+  Vec U; /* displacement, m */
+  Vec V; /* velocity, m/s; NULL in a static run */
+  Vec A; /* acceleration of the last step, state of the integrator, m/s^2; NULL: static, alpha2 */
+  Vec mass; /* lumped mass of each displacement, kg; 0 on supports, which are prescribed */
+  Vec path; /* arc length: direction of the last step, scaled to the next step's length, m; zero at
+               the start; else NULL */
+  SbEnergies energies;    /* of the last step, and running totals of work and dissipation, J */
+  PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
+  PetscReal energy_most;  /* the largest kinetic + strain so far (kept over restarts), J */
+
+  /* at the last step, for the works of the next one; with monitors.want_energies, else NULL */
+  Vec loads;               /* f_ext, N */
+  Vec reaction;            /* residual without constraints, N; also with monitors.want_residual */
+  Vec previous;            /* displacement, m */
+  PetscReal damping_power; /* W */
+} SbRunState;
+
+/* Where the run is, how long its steps are and where it ends. t: s; in a static run the load
+   factor, 0..1, and so are lengths of steps. */
+typedef struct {
+  PetscReal t;           /* of the last accepted step */
+  PetscInt step;         /* its number */
+  PetscReal t0;          /* where the run began: 0 unless restarted */
+  PetscInt step0;        /* likewise the number of its step */
+  PetscReal dt, t_end;   /* length of a step (the first one when adaptive), and the end */
+  PetscBool dt_given;    /* -ts_dt was given */
+  PetscBool fixed;       /* steps have the length dt, but for failures */
+  PetscInt max_halvings; /* of a step that fails */
+  PetscReal good_steps; /* dynamic: accepted since one was shortened, or they became longer again */
+  PetscReal wall_start; /* MPI_Wtime() at the start of the time loop, s; 0: not begun */
+
+  /* static */
+  PetscInt static_steps;   /* equal load steps to full load */
+  PetscReal min_increment; /* smallest load increment as a part of 1 / static_steps */
   struct {
-    Vec U, x, y; /* displacement of J; factor and product; NULL where J is complete */
-    PetscReal t; /* J's time or load factor */
-  } nonsymmetric;
-  Vec U, V, A;       /* A: acceleration of the last step, state of the integrator */
-  Vec mass;          /* lumped mass of each displacement, kg; 0 on supports, which are prescribed */
-  Vec R;             /* residual for contact; NULL without */
-  Vec barrier_start; /* barrier contact: displacement at the start of the step; borrowed */
-  PetscReal barrier_dt;     /* its length, s */
-  PetscReal barrier_weight; /* weight of its end-of-step forces in the residual of the solve */
-  Vec stage,
-    stage_start; /* forces are those at stage_start + stage_part (X - stage_start); NULL: at X */
-  PetscReal stage_part;
-  PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool single; /* one linear solve per step instead of Newton's method */
-  PetscBool reject_inverted,
-    rejected_inverted;         /* -time_inverted; the last attempt was rejected by it */
-  PetscBool may_end_at_impact; /* this attempt may end where points come into contact */
-  PetscInt contact_round;      /* active-set iterations of this step, 0: without contact */
-  PetscBool shortened;         /* the warning of much shorter steps was given */
-  PetscReal time_of_impact;    /* fraction of the step at which it ended, 1: it did not */
-  PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
-  PetscInt max_halvings, static_steps;
-  PetscBool goes_on; /* a solve that starts from the last one's solution, with its tolerance */
-  PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
-  PetscReal softening; /* static: |du|/dlambda of the last step over that of the slowest; 0: none */
-  struct {
-    PetscBool
-      on; /* static: steps along the path of equilibria, with the load factor as an unknown */
-    PetscInt steps; /* largest number */
-    PetscReal longest,
-      first;                /* longest step over the first; length of the first, m, 0: not known */
+    PetscBool on;      /* steps along the path of equilibria, with the load factor as unknown */
+    PetscInt steps;    /* largest number */
+    PetscReal longest; /* longest step over the first */
+    PetscReal first;   /* length of the first step, m; 0: not known */
     PetscReal displacement; /* -static_max_displacement, m; 0: no limit */
   } arc;
-  Vec
-    path; /* with arc.on: direction of the last step, scaled to the next step's length; zero at the start */
-  PetscInt bifurcations; /* number detected by changes of negative pivots */
-  PetscBool
-    free_body; /* static, without contact: some body can move rigidly; load steps are not halved */
-  PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
-  PetscReal shift_v, shift_a;
-  PetscBool saddle;   /* some effect asks for multipliers as unknowns */
-  int saddle_choice;  /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
-  int contact_choice; /* -contact_solver: likewise */
-  SbSaddle saddle_used;
+
+  /* steps that end where points come into contact */
+  PetscBool may_end_at_impact; /* this attempt may */
+  PetscReal time_of_impact;    /* fraction of the step at which it ended, 1: it did not */
+
+  /* the early end */
+  struct {
+    PetscBool listens;        /* signals are caught, or there is a wall time limit */
+    PetscReal wall_time;      /* limit, s; 0: none */
+    PetscReal grace;          /* time for the current step after a signal, s */
+    PetscReal begun;          /* MPI_Wtime() when options were read */
+    PetscReal step_begun;     /* likewise of the step */
+    PetscReal longest_step;   /* recent maximum of a step, s */
+    PetscReal longest_output; /* recent maximum of the output after it, s */
+  } stop;
+  PetscBool paused;       /* SbRunSolve() returned by monitors.post_step; the run continues */
+  PetscBool stopped;      /* the run was asked to end, and can be restarted; why: stop_reason */
+  char stop_reason[1024]; /* why the run ended early, or a step failed; empty: neither */
+} SbRunClock;
+
+/* How a step is solved: integrator, matrices, linear and nonlinear solver. */
+typedef struct {
+  /* the integrator */
+  SbIntegrator preset;
+  PetscReal spectral_radius; /* of generalized-alpha at infinite frequency */
+  PetscReal newmark[2];      /* beta, gamma */
+  PetscBool velocity_predictor;
+  PetscBool damped; /* some body has Rayleigh damping; false in a static run */
+  TS ts;            /* owned; NULL in a static run */
+  SNES snes;        /* of the TS, or own in a static run; borrowed from ts when there is one */
+
+  /* matrices, owned; NULL with explicit integrators */
+  Mat J;                      /* tangent */
+  Mat system;                 /* of linear solves: J, its projection (SbConstraints), or J plus
+                                 SbModelNonsymmetric() */
+  Mat unprojected;            /* the operator that constraints project: J plus
+                                 SbModelNonsymmetric(); NULL: J is complete */
+  PetscBool tangent_known;    /* J holds the tangent for shift_v, shift_a */
+  PetscReal shift_v, shift_a; /* factors of damping, 1/s, and mass, 1/s^2, in it */
+  struct {
+    Vec U;       /* displacement of J, m; owned; NULL where J is complete */
+    Vec x, y;    /* factor and product; owned */
+    PetscReal t; /* J's time or load factor */
+  } nonsymmetric;
+
+  /* the solve of an attempt */
+  Vec R; /* residual for contact, N; owned; NULL without */
+  struct {
+    Vec U;     /* forces are those at U = start + part (X - start), m; NULL: at X */
+    Vec start; /* displacement at the start of the step, m; both borrowed */
+    PetscReal part;
+  } stage;
+  PetscReal barrier_weight; /* of barrier contact's forces, those at X, in the residual */
+  PetscBool single;         /* one linear solve per step instead of Newton's method */
+
+  /* attempts that are not accepted */
+  PetscBool reject_inverted;   /* -time_inverted reject */
+  PetscBool rejected_inverted; /* the last attempt was rejected by it */
+  PetscBool free_body; /* static, without contact: some body can move rigidly; load steps are not
+                          halved */
+  PetscReal softening; /* static: |du|/dlambda of the last step over that of the slowest; 0: none */
+
+  /* the linear solver */
   char solver_choice[SB_NAME_MAX]; /* -solver: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
   char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg"; with -pc_type its methods, "cg, gamg" */
-  char solver_parts
-    [SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "": no linear systems */
+  char solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "": no linear
+                                     systems */
   char solver_reason[256];
-  struct _p_SbSolverList *solver_list; /* fallbacks (solver_list.c); NULL without linear systems */
-  PetscInt nmonitor;
+  struct _p_SbPotential *potential;  /* that Newton's method minimises; owned */
+  struct _p_SbSolverList *fallbacks; /* solver_list.c; owned; NULL without linear systems */
+  PetscBool saddle;                  /* some effect asks for multipliers as unknowns */
+  int saddle_choice;                 /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
+  SbSaddle saddle_used;
+  int contact_choice; /* -contact_solver: likewise */
+} SbRunSolver;
+
+/* Totals of the run, kept over re-meshings; iterations are those of Newton and of linear solves. */
+typedef struct {
+  PetscInt steps, newton, linear, rejected; /* accepted steps, iterations, rejected attempts */
+  PetscInt newton_step, linear_step;     /* iterations of the current step, not yet in the totals */
+  PetscInt newton_before, linear_before; /* iterations of the runs before a re-meshing */
+  PetscInt rejected_seen;                /* rejected attempts up to the last step */
+  PetscInt contact_rounds; /* active-set iterations of this step, 0: without contact */
+  PetscInt bifurcations;   /* arc length: detected by changes of negative pivots */
+  PetscReal seconds_solve; /* wall time of the time loop */
+} SbRunCounters;
+
+/* Who looks at the run, and what for. */
+typedef struct {
+  PetscInt n;
   struct {
     SbMonitorFn fn;
-    void *ctx;
-  } monitor[8];
+    void *ctx; /* borrowed */
+  } list[8];
+  PetscBool want_energies, want_residual; /* some monitor needs them in SbStep */
+  SbStep last;                            /* last argument of monitors; U NULL: none yet */
   struct {
     SbStepSolvedFn fn; /* called after each solve of a step; NULL: none */
     void *ctx;
@@ -143,52 +217,35 @@ struct _p_SbRun {
        NULL: none */
     PetscErrorCode (*fn)(SbRun, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
                          PetscBool *pause);
-    PetscReal
-      dt; /* length of the last step that it was called for, or of a restart from a pause; else 0 */
+    PetscReal dt; /* length of the last step that it was called for, or of a restart from a pause;
+                     else 0 */
     void *ctx;
-  } after;
-  struct {
-    PetscBool listens;          /* signals are caught, or there is a wall time limit */
-    PetscReal wall_time, grace; /* s, 0: no limit; time for the current step after a signal */
-    PetscReal begun;            /* MPI_Wtime() when options were read */
-    PetscReal step_begun;       /* likewise of the step */
-    PetscReal longest_step,
-      longest_output; /* s, recent maxima: of a step, and of the output after it */
-  } stop;
-  PetscBool stopped; /* the run was asked to end, and can be restarted; why: stop_reason */
-  SbStep seen;       /* last argument of monitors */
-  PetscBool paused;  /* SbRunSolve() returned by `after`; the run continues */
-  PetscInt ncolumn;
-  const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
-  PetscInt ncarried;
-  const SbCheckpointValue *carried; /* [ncarried] in checkpoints; borrowed */
+  } post_step;
+
+  /* numbers that others add to output */
+  PetscInt ncolumn, ncheckpoint;
+  const SbColumn *column;              /* [ncolumn] of history.csv; borrowed */
+  const SbCheckpointValue *checkpoint; /* [ncheckpoint] in checkpoints; borrowed */
   /* values[ncell_owned] = energy of the error in space, J/m^3 at rest; NULL: no estimate.
      Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
-  PetscBool want_energies, want_residual;
-  SbEnergies energies;    /* running totals of work and dissipation */
-  PetscReal energy_most;  /* the largest kinetic + strain so far (kept over restarts), J */
-  PetscBool gain_said;    /* the warning of an unstable integrator was given */
-  PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
-  PetscInt step0;         /* first step and time when restarted */
-  PetscReal t0;
-  PetscInt step_now; /* of the last accepted step */
-  PetscReal t_now;
-  PetscInt newton_total, linear_total, rejected_total, steps_total;
-  PetscReal
-    good_steps; /* dynamic: steps accepted since one was shortened, or they became longer again */
-  PetscInt newton_before, linear_before; /* of the runs before a re-meshing */
-  PetscReal wall_start, seconds_solve;
-  PetscReal dt, t_end;               /* length of a step (the first one when adaptive) and end, s */
-  PetscInt newton_step, linear_step; /* iterations of the current step */
-  PetscInt rejected_seen;            /* rejections up to the last step */
-  Vec loads, reaction,
-    previous;              /* with want_energies: f_ext, residual, displacement of the last step */
-  PetscReal damping_power; /* at the last step, W */
-  char stop_reason[1024];  /* why the run ended early; empty when it reached its end */
-  void *output;            /* data of src/output; NULL without output */
-  PetscErrorCode (*output_destroy)(
-    SbRun run); /* frees it; called by SbRunDestroy() when not NULL */
+
+  /* warnings that were given */
+  PetscBool warned_short; /* of much shorter steps */
+  PetscBool warned_gain;  /* of an unstable integrator */
+
+  void *output;                                /* data of src/output; NULL without output */
+  PetscErrorCode (*output_destroy)(SbRun run); /* frees it, in SbRunDestroy(); NULL: none */
+} SbRunMonitors;
+
+/* One simulation. */
+struct _p_SbRun {
+  SbModel model; /* borrowed */
+  SbRunState state;
+  SbRunClock clock;
+  SbRunSolver solve;
+  SbRunCounters counters;
+  SbRunMonitors monitors;
 };
 
 /*
@@ -227,6 +284,6 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to);
 /* Recomputes A at t_now from U and V by the residual, except at prescribed displacements, and not
    with integrators whose acceleration is a history variable. Collective. */
 PetscErrorCode SbRunRestartAcceleration(SbRun run);
-/* The whole time loop or load path; an early end is in run->stop_reason, not an error. */
+/* The whole time loop or load path; an early end is in run->clock.stop_reason, not an error. */
 PetscErrorCode SbRunSolve(SbRun run);
 PetscErrorCode SbRunDestroy(SbRun *run);

@@ -54,8 +54,8 @@ static PetscErrorCode simulate(Scene *s)
   SbOutputFile(s->run, "ledger.csv", file, &quiet);
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
-  if (s->run->stop_reason[0])
-    SbErrorPost(s->run->stopped, s->run->stop_reason);
+  if (s->run->clock.stop_reason[0])
+    SbErrorPost(s->run->clock.stopped, s->run->clock.stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -144,11 +144,12 @@ static inline PetscErrorCode test_ledger(SbRun run, SbErrorSource source, PetscR
   PetscInt k = 0;
 
   PetscFunctionBeginUser;
-  while (k < run->ncarried && strcmp(run->carried[k].name, "ledger_stored_0"))
+  while (k < run->monitors.ncheckpoint &&
+         strcmp(run->monitors.checkpoint[k].name, "ledger_stored_0"))
     k++;
-  PetscCheck(k < run->ncarried, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is no ledger");
-  *stored = *run->carried[k].value;
-  *error = *run->column[source].value * PetscSqrtReal(*stored);
+  PetscCheck(k < run->monitors.ncheckpoint, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is no ledger");
+  *stored = *run->monitors.checkpoint[k].value;
+  *error = *run->monitors.column[source].value * PetscSqrtReal(*stored);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

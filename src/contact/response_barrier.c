@@ -4,7 +4,7 @@
 
   Below the width w pairs of features repel each other by the barrier of pair_energy.c, an
   energy that is infinite at contact. It is part of the potential that Newton's method minimises
-  (src/time/newton.c), and every iteration is limited by continuous collision detection
+  (src/newton), and every iteration is limited by continuous collision detection
   (pairs.c). So an accepted state can be reached from the one before it without
   surfaces passing through each other.
 

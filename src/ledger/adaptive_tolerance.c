@@ -57,13 +57,13 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
    step. */
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
-  const SNES snes = l->run->snes;
+  const SNES snes = l->run->solve.snes;
   KSP ksp;
 
   PetscFunctionBeginUser;
   l->rtol = PetscMax(TIGHTEST, PetscMin(LOOSEST, rtol));
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (l->run->single)
+  if (l->run->solve.single)
     PetscCall(KSPSetTolerances(ksp, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   else
     PetscCall(
@@ -86,7 +86,8 @@ static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx,
                                  PetscReal *ratio)
 {
   SbLedger l = (SbLedger)ctx;
-  const PetscReal allowed = STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->t_end;
+  const PetscReal allowed =
+    STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->clock.t_end;
 
   PetscFunctionBeginUser;
   *order = l->order;
@@ -100,15 +101,16 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   TSAdapt adapt;
 
   PetscFunctionBeginUser;
-  if (l->accuracy > 0. && run->ts) {
-    run->post_solve.error = step_error;
-    PetscCall(TSGetAdapt(run->ts, &adapt));
+  if (l->accuracy > 0. && run->solve.ts) {
+    run->monitors.post_solve.error = step_error;
+    PetscCall(TSGetAdapt(run->solve.ts, &adapt));
 
     /* explicit steps are at most the stable one */
-    PetscCall(TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end,
-                                   run->snes && run->J ? 0.1 * run->t_end : run->dt));
+    PetscCall(TSAdaptSetStepLimits(adapt, SHORTEST * run->clock.t_end,
+                                   run->solve.snes && run->solve.J ? 0.1 * run->clock.t_end
+                                                                   : run->clock.dt));
   }
-  if (l->may_tune && run->snes && run->J)
+  if (l->may_tune && run->solve.snes && run->solve.J)
     PetscCall(SbAdaptiveToleranceSet(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,7 +160,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   PetscFunctionBeginUser;
 
   /* until something moves, the reference energy is that of the first attempt */
-  if (!step->V || step->t == run->t0) {
+  if (!step->V || step->t == run->clock.t0) {
     SbEnergies e;
 
     PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
@@ -169,7 +171,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   if (!l->may_tune || !step->solved)
     PetscFunctionReturn(PETSC_SUCCESS);
   allowed =
-    SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * (step->V ? step->dt / run->t_end : 1.);
+    SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * (step->V ? step->dt / run->clock.t_end : 1.);
   left = left_by_solves(l);
   if (!(left > 0.) || !(allowed > 0.))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,13 +194,13 @@ PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &took, 1, MPIU_REAL, MPI_MAX, l->run->model->comm));
   l->wall = step->wall;
-  if (step->step == l->run->step0)
+  if (step->step == l->run->clock.step0)
     PetscFunctionReturn(PETSC_SUCCESS);
   l->nstep++;
   l->nkept += took <= l->budget;
   l->longest = PetscMax(l->longest, took);
   l->total += took;
-  if (!l->may_tune || !l->run->J)
+  if (!l->may_tune || !l->run->solve.J)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (took > 0.9 * l->budget)
     PetscCall(SbAdaptiveToleranceSet(l, 4. * l->rtol));

@@ -42,7 +42,7 @@ PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
 {
   PetscFunctionBeginUser;
-  PetscCall(VecPointwiseMult(l->w[2], l->run->mass, D));
+  PetscCall(VecPointwiseMult(l->w[2], l->run->state.mass, D));
   PetscCall(VecDot(l->w[2], D, form));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -59,16 +59,17 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   PetscCall(VecDuplicate(D, &R));
 
   // whether the last tangent is a matrix K + shift M of the free unknowns with the lumped mass
-  sum = (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->solver_used->matrix_free);
-  if (run->damped || run->model->space->consistent_mass)
+  sum = (PetscBool)(run->solve.J && run->solve.ts && run->solve.shift_a > 0. &&
+                    !run->solve.solver_used->matrix_free);
+  if (run->solve.damped || run->model->space->consistent_mass)
     sum = PETSC_FALSE;
   if (sum) {
     PetscCall(VecCopy(D, moved));
     PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
-    PetscCall(MatMult(run->J, moved, R));
+    PetscCall(MatMult(run->solve.J, moved, R));
     PetscCall(VecDot(R, moved, form));
     PetscCall(SbMassForm(l, moved, &mass));
-    *form = PetscMax(0., *form - run->shift_a * mass);
+    *form = PetscMax(0., *form - run->solve.shift_a * mass);
     l->own_work += 1.;
   } else {
     l->residuals -= MPI_Wtime();
@@ -92,7 +93,7 @@ PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *
   l->solving -= MPI_Wtime();
   PetscCall(SbRunSolveTangent(l->run, B, X, its, &solved));
   if (!solved) {
-    PetscCall(SNESGetKSP(l->run->snes, &ksp));
+    PetscCall(SNESGetKSP(l->run->solve.snes, &ksp));
     PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, NULL, NULL));
     PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
     PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));

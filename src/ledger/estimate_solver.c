@@ -13,14 +13,14 @@
 
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
 {
-  const PetscBool single = l->run->single;
+  const PetscBool single = l->run->solve.single;
   const Vec F = l->w[0];
   PetscReal energy, error, mass;
   PetscInt its;
 
   PetscFunctionBeginUser;
   l->residuals -= MPI_Wtime();
-  PetscCall(SNESComputeFunction(l->run->snes, step->U, F));
+  PetscCall(SNESComputeFunction(l->run->solve.snes, step->U, F));
   l->residuals += MPI_Wtime();
   PetscCall(SbProbeSolve(l, ROUGHLY, F, l->delta, &its));
   PetscCall(VecDot(l->delta, F, &energy));
@@ -36,7 +36,7 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
        Other methods do not damp like this, but the acceleration passes the remaining residual to
        their next solve. */
     PetscCall(SbMassForm(l, l->delta, &mass));
-    l->kept_part = PetscMin(1., PetscSqrtReal(l->run->shift_a * mass / energy));
+    l->kept_part = PetscMin(1., PetscSqrtReal(l->run->solve.shift_a * mass / energy));
   }
   l->own_work += 1. + 2. * (PetscReal)its;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -64,7 +64,7 @@ PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *err
   PetscCall(SbStiffnessForm(l, t, U, l->w[0], &form));
 
   /* once in a static run; in each step of a dynamic one, with random signs */
-  *error =
-    PetscSqrtReal(0.5 * form * PetscMax(1., l->run->ts ? (PetscReal)l->run->steps_total : 1.));
+  *error = PetscSqrtReal(0.5 * form *
+                         PetscMax(1., l->run->solve.ts ? (PetscReal)l->run->counters.steps : 1.));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -44,7 +44,7 @@ PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool al
 
   /* implicit Euler starts without an acceleration; after re-meshing no integrator has a valid
      one */
-  if (step->t == l->run->t0 && (l->anew || (l->order == 1 && l->run->step0 == 0)))
+  if (step->t == l->run->clock.t0 && (l->anew || (l->order == 1 && l->run->clock.step0 == 0)))
     PetscCall(VecZeroEntries(rate));
   if (all || l->order == 1)
     PetscCall(derivative_energy(l, step, step->A, rate, &l->derivative[2]));

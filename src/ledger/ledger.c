@@ -58,7 +58,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscCall(SbOptionReal(&SbRunScope, "step_time_budget", &budget));
   if (!named && accuracy == 0. && budget == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  PetscCheck(run->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the "
              "same method");
   PetscCall(PetscNew(&l));
@@ -110,11 +110,11 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   if (step->solved) {
     KSP ksp;
 
-    PetscCall(SNESGetKSP(run->snes, &ksp));
-    if (run->single)
+    PetscCall(SNESGetKSP(run->solve.snes, &ksp));
+    if (run->solve.single)
       PetscCall(KSPGetResidualNorm(ksp, &l->residual));
     else
-      PetscCall(SNESGetFunctionNorm(run->snes, &l->residual));
+      PetscCall(SNESGetFunctionNorm(run->solve.snes, &l->residual));
   }
   if (!l->seen && l->accuracy == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -135,7 +135,7 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbLedger l = (SbLedger)ctx;
-  const PetscBool first = (PetscBool)(step->step == run->step0);
+  const PetscBool first = (PetscBool)(step->step == run->clock.step0);
   const PetscReal energy = step->energies.strain + step->energies.kinetic;
   PetscReal scale;
 
@@ -145,7 +145,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
 
   // in residual evaluations: a tangent costs three, an iteration with its preconditioner two
-  l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
+  l->work +=
+    run->solve.snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
 
   /* A static run has the errors of its last solve. In a dynamic one the integrator's errors add up;
      those of linear solves, in changing directions, add in squares, those of linearisation, smooth,
@@ -157,8 +158,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscReal left = step->V ? 1. : 0.;
 
     /* the fraction that damping leaves: as of the motion, by its power over twice the energy */
-    if (step->V && run->damping_power > 0. && energy > 0.)
-      left = PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
+    if (step->V && run->state.damping_power > 0. && energy > 0.)
+      left = PetscExpReal(-0.5 * PetscMin(step->dt * run->state.damping_power / energy, 2.));
     if (step->V)
       SbEstimateTimeAdd(l, step->dt, left);
     *linear =
@@ -202,7 +203,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values[])
 {
   const SbSpace space = run->model->space;
-  SbLedger l = (SbLedger)run->post_solve.ctx;
+  SbLedger l = (SbLedger)run->monitors.post_solve.ctx;
 
   PetscFunctionBeginUser;
   begin(l);
@@ -238,14 +239,14 @@ static PetscErrorCode carry(SbLedger l)
   PetscFunctionBeginUser;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(names); k++) {
     for (int i = 0; i < (k < PETSC_STATIC_ARRAY_LENGTH(sizes) ? sizes[k] : 1); i++, n++) {
-      PetscCheck(n < SB_LEDGER_CARRIED, PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d numbers",
-                 SB_LEDGER_CARRIED);
-      PetscCall(PetscSNPrintf(l->carried[n].name, SB_NAME_MAX, "ledger_%s_%d", names[k], i));
-      l->carried[n].value = values[k] + i;
+      PetscCheck(n < SB_LEDGER_CHECKPOINT, PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d numbers",
+                 SB_LEDGER_CHECKPOINT);
+      PetscCall(PetscSNPrintf(l->checkpoint[n].name, SB_NAME_MAX, "ledger_%s_%d", names[k], i));
+      l->checkpoint[n].value = values[k] + i;
     }
   }
-  l->run->carried = l->carried;
-  l->run->ncarried = n;
+  l->run->monitors.checkpoint = l->checkpoint;
+  l->run->monitors.ncheckpoint = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -261,8 +262,8 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(SbSpaceEstimateCreate(run->model, &l->space));
   PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));
   for (int i = 0; i < 3; i++)
-    PetscCall(VecDuplicate(run->U, &l->w[i]));
-  PetscCall(VecDuplicate(run->U, &l->delta));
+    PetscCall(VecDuplicate(run->state.U, &l->w[i]));
+  PetscCall(VecDuplicate(run->state.U, &l->delta));
   if (run->model->dynamic)
     SbRunLocalError(run, &l->order, &l->c, &l->ahead);
   PetscCall(SbQuantityAttach(l));
@@ -275,17 +276,17 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
     c->unit = "1";
     c->value = &l->relative[i];
   }
-  run->column = l->column;
-  run->ncolumn = SB_ERROR_COUNT;
+  run->monitors.column = l->column;
+  run->monitors.ncolumn = SB_ERROR_COUNT;
   PetscCall(carry(l));
   end(l);
-  run->want_energies = PETSC_TRUE;
+  run->monitors.want_energies = PETSC_TRUE;
   if (run->model->contacts.nactive_set || run->model->contacts.npotential ||
       l->quantity.kind == SB_QUANTITY_REACTION)
-    run->want_residual = PETSC_TRUE;
-  run->post_solve.fn = examine_step;
-  run->post_solve.ctx = l;
-  run->cell_error = cell_error;
+    run->monitors.want_residual = PETSC_TRUE;
+  run->monitors.post_solve.fn = examine_step;
+  run->monitors.post_solve.ctx = l;
+  run->monitors.cell_error = cell_error;
   PetscCall(SbRunAddMonitor(run, monitor, l));
   PetscCall(SbAdaptiveToleranceAttach(l));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -294,8 +295,8 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < from->run->ncarried; i++)
-    *to->run->carried[i].value = *from->run->carried[i].value;
+  for (PetscInt i = 0; i < from->run->monitors.ncheckpoint; i++)
+    *to->run->monitors.checkpoint[i].value = *from->run->monitors.checkpoint[i].value;
   to->seconds += from->seconds;
   to->solving += from->solving;
   to->residuals += from->residuals;
@@ -305,7 +306,7 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   to->total = from->total;
   to->anew = PETSC_TRUE;
   PetscCall(SbQuantityContinue(from, to));
-  if (to->may_tune && to->run->snes && to->run->J)
+  if (to->may_tune && to->run->solve.snes && to->run->solve.J)
     PetscCall(SbAdaptiveToleranceSet(to, from->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -24,7 +24,7 @@ typedef struct {
   PetscReal error[SB_ERROR_COUNT];
 } SbQuantity;
 
-#define SB_LEDGER_CARRIED 40 /* upper bound of the values listed by carry() */
+#define SB_LEDGER_CHECKPOINT 40 /* upper bound of the values listed by carry() */
 
 struct _p_SbLedger {
   SbRun run; /* borrowed */
@@ -44,7 +44,7 @@ struct _p_SbLedger {
   PetscReal error[SB_ERROR_COUNT];    /* [source] errors of the run, J^(1/2) */
   PetscReal relative[SB_ERROR_COUNT]; /* the same, relative: columns of the history */
   SbColumn column[SB_ERROR_COUNT];
-  SbCheckpointValue carried[SB_LEDGER_CARRIED];
+  SbCheckpointValue checkpoint[SB_LEDGER_CHECKPOINT];
   /* errors of the last estimated step, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
   PetscReal residual,

@@ -51,7 +51,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   PetscFunctionBeginUser;
   if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(l->run->U, &q->weight));
+  PetscCall(VecDuplicate(l->run->state.U, &q->weight));
   PetscCall(VecZeroEntries(q->weight));
   if (q->kind == SB_QUANTITY_DISPLACEMENT) {
     PetscReal least = PETSC_MAX_REAL;

@@ -48,12 +48,12 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   t[SETUP] = phase[SB_PHASE_MESH] + phase[SB_PHASE_SETUP];
   t[OUTPUT] = phase[SB_PHASE_OUTPUT];
   t[ESTIMATES] = l->seconds;
-  t[TOTAL] = run->seconds_solve;
+  t[TOTAL] = run->counters.seconds_solve;
   for (int i = 0; i < COUNT; i++)
     t[i] = PetscMax(t[i], 0.);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, t, COUNT, MPIU_REAL, MPI_MAX, run->model->comm));
-  beyond = run->newton_total > run->steps_total
-             ? 1. - (PetscReal)PetscMax(run->steps_total, 1) / (PetscReal)run->newton_total
+  beyond = run->counters.newton > run->counters.steps
+             ? 1. - (PetscReal)PetscMax(run->counters.steps, 1) / (PetscReal)run->counters.newton
              : 0.;
   *s = (Seconds){.setup = t[SETUP],
                  .output = t[OUTPUT],
@@ -108,7 +108,7 @@ static PetscReal order_of_space(SbLedger l)
    else 1. */
 static PetscReal growth(SbRun run)
 {
-  const char *name = run->solver;
+  const char *name = run->solve.solver;
 
   if (strstr(name, "cholmod") || strstr(name, "mumps") || strstr(name, "umfpack"))
     return 8.;
@@ -126,7 +126,7 @@ static PetscReal cost(SbLedger l, const Seconds *s, int source)
   switch (source) {
   case SB_ERROR_SPACE:
     /* explicit: twice as many steps, which the smallest tet bounds */
-    return PetscPowReal(8. * (run->J ? 1. + solving * (growth(run) - 1.) : 2.),
+    return PetscPowReal(8. * (run->solve.J ? 1. + solving * (growth(run) - 1.) : 2.),
                         1. / order_of_space(l));
   case SB_ERROR_TIME:
     return 1. +
@@ -152,7 +152,7 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
   PetscReal times;
 
   /* not for P2 itself, nor for explicit runs, whose steps the smallest distance of nodes bounds */
-  if (nodes[1] || !l->run->J)
+  if (nodes[1] || !l->run->solve.J)
     return;
 
   // the time that P2 takes, over that of now
@@ -204,7 +204,7 @@ static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
            (double)(100. * together(l) / PetscSqrtReal(l->stored)));
   half = PetscPowReal(0.5, 1. / (most == SB_ERROR_TIME ? (PetscReal)l->order : order_of_space(l)));
   if (most == SB_ERROR_TIME)
-    half *= run->t_end / PetscMax(1, run->steps_total);
+    half *= run->clock.t_end / PetscMax(1, run->counters.steps);
   SbAppend(ROOM, w, what[most], (double)half);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
     SbAppend(ROOM, w, ", and %.2g times the time", (double)cost(l, s, most));
@@ -230,7 +230,7 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
     const PetscReal e = SbLedgerError(l, of[i].source);
     const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * PetscMax(s->total, 1e-9));
     const PetscBool factorised =
-      (PetscBool)(l->run->linear_total <= l->run->newton_total); /* no tolerance */
+      (PetscBool)(l->run->counters.linear <= l->run->counters.newton); /* no tolerance */
 
     if (!(e > 0.) || e * WASTE > most)
       continue;

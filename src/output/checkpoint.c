@@ -36,12 +36,13 @@ typedef struct {
 static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
 {
   const SbModel m = run->model;
-  const PetscBool implicit = (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2);
+  const PetscBool implicit =
+    (PetscBool)(m->dynamic && run->solve.J && run->solve.preset != SB_TIME_ALPHA2);
   const PetscBool remember = (PetscBool)(implicit && m->space->jump && !m->space->linear);
-  const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->U},
-                           {"v", "SI", NULL, &out->node, 3, 1, run->V},
-                           {"a", "SI", NULL, &out->node, 3, 2, run->A},
-                           {"path", "SI", "path_checksum", &out->node, 3, 3, run->path},
+  const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->state.U},
+                           {"v", "SI", NULL, &out->node, 3, 1, run->state.V},
+                           {"a", "SI", NULL, &out->node, 3, 2, run->state.A},
+                           {"path", "SI", "path_checksum", &out->node, 3, 3, run->state.path},
                            {"jumps", "N/m, Pa", "jumps_checksum", &out->cell, 5, 0, NULL}};
   PetscInt n = 0;
 
@@ -67,7 +68,7 @@ typedef struct {
 #define NNUMBER 16
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
-  SbEnergies *e = &run->energies;
+  SbEnergies *e = &run->state.energies;
   const Number all[NNUMBER] = {
     {"time", &times->t, PETSC_FALSE},
     {"dt_next", &times->next, PETSC_FALSE},
@@ -77,14 +78,14 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"prescribed_work", &e->prescribed_work, PETSC_FALSE},
     {"damping_loss", &e->damping_loss, PETSC_FALSE},
     {"integrator_loss", &e->integrator_loss, PETSC_FALSE},
-    {"energy_start", &run->energy_start, PETSC_FALSE},
+    {"energy_start", &run->state.energy_start, PETSC_FALSE},
     {"load_factor", &run->model->load, PETSC_FALSE},
     {"remesh_loss", &e->remesh_loss, PETSC_TRUE},
     {"remesh_mass", &e->remesh_mass, PETSC_TRUE},
     {"remesh_momentum", &e->remesh_momentum, PETSC_TRUE},
-    {"energy_most", &run->energy_most, PETSC_TRUE},
+    {"energy_most", &run->state.energy_most, PETSC_TRUE},
     {"paused_after", &times->paused, PETSC_TRUE},
-    {"good_steps", &run->good_steps, PETSC_TRUE},
+    {"good_steps", &run->clock.good_steps, PETSC_TRUE},
   };
 
   memcpy(number, all, sizeof(all));
@@ -120,7 +121,7 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
     if (p->vec)
       PetscCall(VecGetArrayRead(p->vec, &array));
     else
-      PetscCall(SbSpaceGetJumps(run->model->space, run->U, jumps));
+      PetscCall(SbSpaceGetJumps(run->model->space, run->state.U, jumps));
     PetscCall(SbForestReduce(p->order->sf, p->ncomp, MPIU_REAL, array, slice));
     if (p->vec)
       PetscCall(VecRestoreArrayRead(p->vec, &array));
@@ -132,8 +133,8 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
     else
       *checksum += sum;
   }
-  if (run->path)
-    PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
+  if (run->state.path)
+    PetscCall(SbH5PutReal(h, h->file, "path_first", run->clock.arc.first));
   PetscCall(PetscFree2(slice, jumps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -193,7 +194,7 @@ static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *su
   const PetscReal *u;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &u));
   for (PetscInt k = 0; k < m->neffect && *ok; k++) {
     SbEffect e = m->effect[k];
     SbOrder order = {0};
@@ -217,7 +218,7 @@ static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *su
       SbEffectCall(e, load, m->space, t, u, order.n, record);
     PetscCall(PetscFree(record));
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &u));
   if (!sum)
     PetscCall(SbContactSetResume(&m->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -232,7 +233,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   char message[SB_MESSAGE_MAX] = "";
   PetscBool due = PETSC_FALSE;
   uint64_t checksum;
-  Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
+  Times times = {step->t, run->clock.dt, run->clock.dt, run->clock.t_end,
+                 run->clock.paused ? run->monitors.post_step.dt : 0.};
   Number number[NNUMBER];
 
   PetscFunctionBeginUser;
@@ -243,9 +245,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     due = SbOutputDue(out->checkpoint_every, step->t, step->dt);
   if (out->checkpoint_every_steps && step->step % out->checkpoint_every_steps == 0)
     due = PETSC_TRUE;
-  if ((step->last && asked) || run->stopped)
+  if ((step->last && asked) || run->clock.stopped)
     due = PETSC_TRUE;
-  if (step->step == run->step0 || !due)
+  if (step->step == run->clock.step0 || !due)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   PetscCall(SbOutputOrder(run, out));
@@ -268,8 +270,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
 
   /* time, work and dissipation so far */
-  if (run->ts)
-    PetscCall(TSGetTimeStep(run->ts, &times.next));
+  if (run->solve.ts)
+    PetscCall(TSGetTimeStep(run->solve.ts, &times.next));
   numbers_of(run, &times, number);
   for (int i = 0; i < NNUMBER; i++)
     if (!number[i].optional || *number[i].value != 0.)
@@ -277,8 +279,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(SbH5PutInt(&h, h.file, "step", step->step));
 
   /* accumulated error estimates, and the material points of probes */
-  for (PetscInt i = 0; i < run->ncarried; i++)
-    PetscCall(SbH5PutReal(&h, h.file, run->carried[i].name, *run->carried[i].value));
+  for (PetscInt i = 0; i < run->monitors.ncheckpoint; i++)
+    PetscCall(SbH5PutReal(&h, h.file, run->monitors.checkpoint[i].name,
+                          *run->monitors.checkpoint[i].value));
   PetscCall(SbProbesWrite(run, out, &h));
 
   /* values of live formulas */
@@ -315,8 +318,8 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 
   // a run that may be asked to stop writes one, too: work and dissipation are part of the state
   if (asked)
-    run->want_energies = PETSC_TRUE;
-  if (asked || run->stop.listens)
+    run->monitors.want_energies = PETSC_TRUE;
+  if (asked || run->clock.stop.listens)
     PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -379,8 +382,8 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
     PetscCall(SbH5ReadSlice(h, p->name, p->order, p->ncomp, slice, ok));
     if (p->sum)
       SbH5GetInt(h->file, p->sum, &own, ok);
-    if (*ok && p->vec && p->vec == run->path)
-      SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
+    if (*ok && p->vec && p->vec == run->state.path)
+      SbH5GetReal(h->file, "path_first", &run->clock.arc.first, ok);
     if (!*ok)
       break;
     PetscCall(checksum_of(out->comm, p, slice, &sum));
@@ -447,17 +450,18 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
      differ */
   for (int i = 0; i < NNUMBER && *ok; i++)
     *number[i].value = values[i];
-  if (*ok && run->ts && (!run->fixed_step || (times.dt == run->dt && times.t_end == run->t_end)))
-    PetscCall(TSSetTimeStep(run->ts, times.next));
+  if (*ok && run->solve.ts &&
+      (!run->clock.fixed || (times.dt == run->clock.dt && times.t_end == run->clock.t_end)))
+    PetscCall(TSSetTimeStep(run->solve.ts, times.next));
 
   /* accumulated error estimates: all or none, as a run without -ledger writes none */
-  if (*ok && run->ncarried) {
+  if (*ok && run->monitors.ncheckpoint) {
     PetscBool all = PETSC_TRUE;
 
-    for (PetscInt i = 0; i < run->ncarried; i++)
-      all = (PetscBool)(all && H5Aexists(h.file, run->carried[i].name) > 0);
-    for (PetscInt i = 0; i < run->ncarried && all; i++)
-      SbH5GetReal(h.file, run->carried[i].name, run->carried[i].value, ok);
+    for (PetscInt i = 0; i < run->monitors.ncheckpoint; i++)
+      all = (PetscBool)(all && H5Aexists(h.file, run->monitors.checkpoint[i].name) > 0);
+    for (PetscInt i = 0; i < run->monitors.ncheckpoint && all; i++)
+      SbH5GetReal(h.file, run->monitors.checkpoint[i].name, run->monitors.checkpoint[i].value, ok);
     if (!all)
       PetscCall(SbWarning(
         out->comm, "%s has no errors, as it was written without -ledger: they count from there",
@@ -479,15 +483,15 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(SbH5Close(&h));
   if (!*ok)
     PetscFunctionReturn(PETSC_SUCCESS);
-  run->after.dt = times.paused;
-  run->step0 = (PetscInt)step;
-  run->t0 = times.t;
+  run->monitors.post_step.dt = times.paused;
+  run->clock.step0 = (PetscInt)step;
+  run->clock.t0 = times.t;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbCheckpointLoad(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
   PetscBool ok;
   char path[PETSC_MAX_PATH_LEN];
   struct stat info;
@@ -518,6 +522,6 @@ PetscErrorCode SbCheckpointLoad(SbRun run)
   }
   if (!out->quiet)
     PetscCall(PetscPrintf(out->comm, "restart from %s: step %" PetscInt_FMT ", t = %g s\n", path,
-                          run->step0, run->t0));
+                          run->clock.step0, run->clock.t0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -54,7 +54,7 @@ static uint64_t sum_of(const Array array[NARRAY])
 
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
 
   PetscFunctionBeginUser;
   for (const SbBody *body = run->model->body; body < run->model->body + run->model->nbody; body++) {
@@ -177,7 +177,7 @@ void SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok)
 
 PetscErrorCode SbOutputRestoreMeshes(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
   const SbModel m = run->model;
   char path[PETSC_MAX_PATH_LEN];
   PetscBool ok = PETSC_FALSE;

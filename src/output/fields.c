@@ -20,14 +20,14 @@
 static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, *(const Vec *)((const char *)step + f->from),
-                           values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->monitors.output,
+                           *(const Vec *)((const char *)step + f->from), values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
 
   PetscFunctionBeginUser;
   PetscCall(vector(f, run, step, values));
@@ -46,14 +46,14 @@ static PetscErrorCode reaction(const SbField *f, SbRun run, const SbStep *step, 
   (void)f;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
-  PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_TRUE, step->R, values));
+  PetscCall(SbPointsForces(run, (SbOutput)run->monitors.output, PETSC_TRUE, step->R, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Force, or gap: of obstacles and other bodies. */
 static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   Vec x;
 
   PetscFunctionBeginUser;
@@ -74,7 +74,7 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
 static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step,
                                  const PetscReal **array)
 {
-  SbOutput o = (SbOutput)run->output;
+  SbOutput o = (SbOutput)run->monitors.output;
   const PetscReal *u;
 
   PetscFunctionBeginUser;
@@ -136,7 +136,7 @@ static PetscErrorCode space_error(const SbField *f, SbRun run, const SbStep *ste
 {
   PetscFunctionBeginUser;
   (void)f;
-  PetscCall((*run->cell_error)(run, step, values));
+  PetscCall((*run->monitors.cell_error)(run, step, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,7 +148,8 @@ static PetscErrorCode number(const SbField *f, SbRun run, const SbStep *step, Pe
   PetscFunctionBeginUser;
   (void)step;
   for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
-    values[c] = (PetscReal)(body ? run->model->mesh->cell_body[c] : ((SbOutput)run->output)->rank);
+    values[c] =
+      (PetscReal)(body ? run->model->mesh->cell_body[c] : ((SbOutput)run->monitors.output)->rank);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -242,7 +243,8 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
   const PetscBool forces = (PetscBool)(f->compute == reaction || !strcmp(f->name, "contact_force"));
 
   PetscFunctionBeginUser;
-  PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  PetscCheck(f->compute != space_error || run->monitors.cell_error, PETSC_COMM_WORLD,
+             PETSC_ERR_USER_INPUT,
              "-output_fields space_error needs its estimate: give -ledger yes, too");
 
   /* the array of the cells' state that this field needs */
@@ -255,7 +257,7 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 
   /* weights of nodes at vertices; forces also need the residual of each step */
   if (forces)
-    run->want_residual = PETSC_TRUE;
+    run->monitors.want_residual = PETSC_TRUE;
   if (!f->cell)
     PetscCall(SbPointsPrepare(
       run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));

@@ -148,7 +148,7 @@ static void lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 
 PetscErrorCode SbOutputLock(SbRun run)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;

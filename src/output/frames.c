@@ -298,14 +298,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* along an arc length the load factor may fall, viewers expect times that rise: the step is the
      time */
-  const PetscReal time = run->path ? (PetscReal)step->step : step->t;
+  const PetscReal time = run->state.path ? (PetscReal)step->step : step->t;
   const PetscBool full = (PetscBool)(fr->node < 0 || fr->nlink == SB_H5_NODE_LINKS);
   hid_t group;
 
   PetscFunctionBeginUser;
 
   /* frames at intervals of time or of steps, at the start and at the end */
-  if (step->step != run->step0 && !step->last &&
+  if (step->step != run->clock.step0 && !step->last &&
       (out->every > 0. ? !SbOutputDue(out->every, step->t, step->dt)
                        : step->step % out->every_steps))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -329,7 +329,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   /* an anonymous group, linked under its name when it is complete, with its time */
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", time));
-  if (run->path)
+  if (run->state.path)
     PetscCall(SbH5PutReal(&fr->h5, group, "load_factor", step->t));
   PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));
   if (fr->mesh)
@@ -469,7 +469,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   PetscCall(l.ierr);
   PetscCall(SbSortByKeys(l.n, sizeof(*l.frame), 1, l.frame));
   fr->nnode = l.nhundred;
-  for (; k < l.n && l.frame[k].step <= run->step0; k++, shown = mesh) {
+  for (; k < l.n && l.frame[k].step <= run->clock.step0; k++, shown = mesh) {
     const hid_t group = H5Gopen2(fr->h5.file, l.frame[k].group, H5P_DEFAULT);
 
     fr->last_step = l.frame[k].step;
@@ -550,7 +550,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   if (fr) {
     has = has_mesh(out, fr->h5.file, fr->mesh);
     if (!has)
-      fr->mesh = run->step0; /* beside the earlier ones */
+      fr->mesh = run->clock.step0; /* beside the earlier ones */
   } else {
     PetscCall(PetscNew(&fr));
     *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};
@@ -583,7 +583,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     PetscMax(3 * out->point.nowned, wide * out->cell.nowned), &fr->owned,
     PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n), &fr->slice));
   if (out->contact_points)
-    run->want_residual = PETSC_TRUE;
+    run->monitors.want_residual = PETSC_TRUE;
   if (!has) {
     PetscCall(write_mesh(run, out));
     if (fr->top < 0) {

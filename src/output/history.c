@@ -144,8 +144,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 
     put_column(line, unit, ",%s", column);
   }
-  for (PetscInt c = 0; c < run->ncolumn; c++)
-    put_column(line, run->column[c].unit, ",%s", run->column[c].name);
+  for (PetscInt c = 0; c < run->monitors.ncolumn; c++)
+    put_column(line, run->monitors.column[c].unit, ",%s", run->monitors.column[c].name);
   (void)fclose(line[1]);
   (void)fprintf(h->text, "\n#%s\n", units + 1);
   free(units);
@@ -182,7 +182,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   PetscFunctionBeginUser;
   if (h->last_step >= step->step ||
-      (step->step != run->step0 && !step->last && step->step % out->history_every))
+      (step->step != run->clock.step0 && !step->last && step->step % out->history_every))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
@@ -249,8 +249,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       (void)fprintf(h->text, ",%.17g", h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)
       (void)fprintf(h->text, ",%.17g", SbLiveGet(k, step->t));
-    for (PetscInt k = 0; k < run->ncolumn; k++)
-      (void)fprintf(h->text, ",%.17g", *run->column[k].value);
+    for (PetscInt k = 0; k < run->monitors.ncolumn; k++)
+      (void)fprintf(h->text, ",%.17g", *run->monitors.column[k].value);
     (void)fputc('\n', h->text);
     (void)fflush(h->text);
     write_row(h, h->message);
@@ -284,7 +284,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
       for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
         const long step = strtol(line, NULL, 10);
 
-        if (step > run->step0)
+        if (step > run->clock.step0)
           break;
         h->last_step = (PetscInt)step;
       }
@@ -300,7 +300,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
       char other[PETSC_MAX_PATH_LEN + 32];
 
       (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv",
-                     (int)(strlen(h->path) - 4), h->path, run->step0);
+                     (int)(strlen(h->path) - 4), h->path, run->clock.step0);
       if (!rename(h->path, other))
         PetscCall(
           PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
@@ -350,9 +350,9 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   PetscCall(SbProbesFind(run, out));
   if (out->history_bodies)
     PetscCall(SbModelCentres(model, NULL, h->mass));
-  run->want_energies = PETSC_TRUE;
+  run->monitors.want_energies = PETSC_TRUE;
   if (model->nhistory)
-    run->want_residual = PETSC_TRUE;
+    run->monitors.want_residual = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -57,7 +57,7 @@ const SbOption SbOutputRows[] = {
 
 void SbOutputFile(SbRun run, const char *name, char path[PETSC_MAX_PATH_LEN], PetscBool *quiet)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
 
   *quiet = out->quiet;
   SbOutputPath(out, name, path);
@@ -168,7 +168,7 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 
 static PetscErrorCode destroy(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
 
   PetscFunctionBeginUser;
   if (!out)
@@ -184,7 +184,7 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->remeshed));
   SbFolderUnlock(out);
-  PetscCall(PetscFree(run->output));
+  PetscCall(PetscFree(run->monitors.output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,8 +197,8 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run, const char *scenario)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&out));
-  run->output = out;
-  run->output_destroy = destroy;
+  run->monitors.output = out;
+  run->monitors.output_destroy = destroy;
   out->lock = -1;
   out->comm = run->model->comm;
   PetscCallMPI(MPI_Comm_rank(out->comm, &out->rank));
@@ -231,7 +231,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run, const char *scenario)
 
 PetscErrorCode SbOutputAttach(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
   char *scenario = NULL;
   char path[PETSC_MAX_PATH_LEN];
   char message[SB_MESSAGE_MAX] = "";
@@ -281,7 +281,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
     PetscCall(SbFramesCheck(run, out));
   }
   if (!out->rank)
-    PetscCall(SbFolderClear(out, run->step0));
+    PetscCall(SbFolderClear(out, run->clock.step0));
 
   /* scenario.opts and run.json */
   SbOutputPath(out, "scenario.opts", path);
@@ -304,14 +304,14 @@ PetscErrorCode SbOutputAttach(SbRun run)
 /* Row and frame of this step are written, on the old mesh; the next ones are on the new mesh. */
 PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
 {
-  SbOutput out = (SbOutput)from->output;
+  SbOutput out = (SbOutput)from->monitors.output;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
-  to->output = out;
-  to->output_destroy = from->output_destroy;
-  from->output = NULL;
-  from->output_destroy = NULL;
+  to->monitors.output = out;
+  to->monitors.output_destroy = from->monitors.output_destroy;
+  from->monitors.output = NULL;
+  from->monitors.output_destroy = NULL;
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbOutputCountNodes(to->model->space, out));
   PetscCall(SbFramesAttach(to, out));

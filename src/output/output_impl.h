@@ -403,9 +403,9 @@ PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files
   SbCheckpointLoad - state of a run from the checkpoint that -restart names, or for `latest` the
   newest readable one of the folder (a warning names others), on any number of ranks. Collective.
 
-  Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
-  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT
-  when its mesh, bodies or effects are not those of this run (the message names the first option
-  that differs).
+  Fills run->state.U, V, A, step0, t0, dt, the running totals in run->state.energies and
+  run->state.energy_start. Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign
+  file; PETSC_ERR_USER_INPUT when its mesh, bodies or effects are not those of this run (the message
+  names the first option that differs).
 */
 PetscErrorCode SbCheckpointLoad(SbRun run);

@@ -40,7 +40,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionBeginUser;
 
   /* already printed: first step after a re-meshing, or the last one again */
-  if ((p->titled && step->step == run->step0) || step->again)
+  if ((p->titled && step->step == run->clock.step0) || step->again)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (!p->titled) {
     p->titled = PETSC_TRUE;
@@ -91,10 +91,10 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
    Newton's method, -1: none. Not collective. */
 static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, PetscReal residual)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   const PetscReal now = MPI_Wtime();
-  const PetscReal begun = run->stop.step_begun;
-  PetscReal dt = run->dt;
+  const PetscReal begun = run->clock.stop.step_begun;
+  PetscReal dt = run->clock.dt;
   char contact[32] = "";
   char solve[40] = "";
 
@@ -102,17 +102,18 @@ static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, Pe
   if (!out->line.on || begun == 0. || now - begun < LONG || now - out->line.within < LONG)
     PetscFunctionReturn(PETSC_SUCCESS);
   out->line.within = now;
-  if (run->ts)
-    PetscCall(TSGetTimeStep(run->ts, &dt));
+  if (run->solve.ts)
+    PetscCall(TSGetTimeStep(run->solve.ts, &dt));
   if (run->model->contacts.nactive_set)
-    (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
+    (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT,
+                   run->counters.contact_rounds);
   if (linear >= 0)
     (void)snprintf(solve, sizeof(solve), ", linear iteration %" PetscInt_FMT, linear);
   SbProgressEnd(out);
   PetscCall(PetscPrintf(PETSC_COMM_SELF,
                         "  step %" PetscInt_FMT " has taken %.0f s: Newton iteration %" PetscInt_FMT
                         "%s, residual %.2e N%s, length %.3g%s\n",
-                        run->step_now + 1, (now - begun), newton, solve, residual, contact, dt,
+                        run->clock.step + 1, (now - begun), newton, solve, residual, contact, dt,
                         run->model->dynamic ? " s" : ""));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,7 +133,7 @@ static PetscErrorCode within_linear(KSP ksp, PetscInt iteration, PetscReal resid
 
   PetscFunctionBeginUser;
   (void)ksp;
-  PetscCall(SNESGetIterationNumber(((SbRun)run)->snes, &newton));
+  PetscCall(SNESGetIterationNumber(((SbRun)run)->solve.snes, &newton));
   if (iteration % 10 == 0)
     PetscCall(say_within((SbRun)run, newton, iteration, residual));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -145,7 +146,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet)
     PetscFunctionReturn(PETSC_SUCCESS);
-  run->want_energies = PETSC_TRUE;
+  run->monitors.want_energies = PETSC_TRUE;
   out->line.on = (PetscBool)!out->rank;
   out->line.terminal = (PetscBool)(out->line.on && is_terminal());
 
@@ -153,10 +154,10 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
      monitor */
   if (out->line.on)
     PetscCall(SbRunAddMonitor(run, monitor, out));
-  if (!run->snes)
+  if (!run->solve.snes)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetKSP(run->snes, &ksp));
-  PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
+  PetscCall(SNESGetKSP(run->solve.snes, &ksp));
+  PetscCall(SNESMonitorSet(run->solve.snes, within_newton, run, NULL));
   PetscCall(KSPMonitorSet(ksp, within_linear, run, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -115,7 +115,7 @@ static void print_bodies(SbModel m, SbOutput out)
 
 PetscErrorCode SbReportHeader(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
   char threads[64] = "one thread";
   char text[1024] = "";
   char name[SB_NAME_MAX];
@@ -151,19 +151,20 @@ PetscErrorCode SbReportHeader(SbRun run)
 
   // integrator and steps
   SbRunIntegrator(run, sizeof(name), name);
-  if (run->arc.on)
+  if (run->clock.arc.on)
     entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
-          1. / (double)run->static_steps);
+          1. / (double)run->clock.static_steps);
   else if (!run->model->dynamic)
-    entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
-          run->static_steps == 1 ? "" : "s");
+    entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->clock.static_steps,
+          run->clock.static_steps == 1 ? "" : "s");
   else
-    entry("time", "%s, t = %g to %g s%s %g s", name, run->t0, run->t_end,
-          run->fixed_step ? " in steps of" : ", adaptive steps, the first one", run->dt);
-  if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
-    entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason);
+    entry("time", "%s, t = %g to %g s%s %g s", name, run->clock.t0, run->clock.t_end,
+          run->clock.fixed ? " in steps of" : ", adaptive steps, the first one", run->clock.dt);
+  if (run->solve.solver_parts[0] && strcmp(run->solve.solver, run->solve.solver_parts))
+    entry("solver", "%s (%s): %s", run->solve.solver, run->solve.solver_parts,
+          run->solve.solver_reason);
   else
-    entry("solver", "%s: %s", run->solver, run->solver_reason);
+    entry("solver", "%s: %s", run->solve.solver, run->solve.solver_reason);
   text[0] = 0;
   for (PetscInt k = 0; k < out->nfield; k++)
     SbAppend(sizeof(text), text, "%s%s", k ? ", " : ": ", out->field[k]->name);
@@ -198,7 +199,7 @@ PetscErrorCode SbReportHeader(SbRun run)
 
 PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 {
-  SbOutput out = (SbOutput)run->output;
+  SbOutput out = (SbOutput)run->monitors.output;
   const PetscReal change = event->energy[1] - event->energy[0];
 
   PetscFunctionBeginUser;
@@ -231,8 +232,8 @@ static void size_text(PetscReal bytes, size_t size, char text[])
 
 PetscErrorCode SbReportSummary(SbRun run)
 {
-  SbOutput out = (SbOutput)run->output;
-  const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
+  SbOutput out = (SbOutput)run->monitors.output;
+  const PetscBool stopped = (PetscBool)(run->clock.stop_reason[0] != 0);
   SbPhases phases;
   char files[1024] = "";
   char memory[32], sum[32], solver[SB_NAME_MAX], text[512];
@@ -242,22 +243,22 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscFunctionBeginUser;
   SbProgressEnd(out);
   PetscCall(SbFramesClose(out));
-  PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->stop_reason));
+  PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->clock.stop_reason));
   PetscCall(SbPhasesGet(out, &phases));
-  if (run->want_energies && run->energies.ninverted)
+  if (run->monitors.want_energies && run->state.energies.ninverted)
     PetscCall(
       SbWarning(run->model->comm,
                 "%" PetscInt_FMT
                 " tetrahedra are inverted or flat at the end (det F down to %g): what they show is "
                 "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
                 "they come back, see docs/reference/guarantees.md",
-                run->energies.ninverted, run->energies.min_J));
+                run->state.energies.ninverted, run->state.energies.min_J));
   if (out->quiet)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   // seconds of the phases
   if (!out->rank) {
-    const PetscReal steps = (PetscReal)run->steps_total;
+    const PetscReal steps = (PetscReal)run->counters.steps;
     const PetscReal tets = (PetscReal)run->model->mesh->Ncell;
 
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
@@ -293,11 +294,11 @@ PetscErrorCode SbReportSummary(SbRun run)
   entry("steps",
         "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
         " Newton and %" PetscInt_FMT " linear iterations",
-        run->steps_total, run->rejected_total, run->newton_total, run->linear_total);
-  if (run->solver_parts[0]) {
-    PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(solver), solver));
-    if (strcmp(solver, run->solver_parts))
-      entry("solver", "%s at the end, %s at first", solver, run->solver_parts);
+        run->counters.steps, run->counters.rejected, run->counters.newton, run->counters.linear);
+  if (run->solve.solver_parts[0]) {
+    PetscCall(SbSolverDescribe(run->solve.snes, run->model->space, sizeof(solver), solver));
+    if (strcmp(solver, run->solve.solver_parts))
+      entry("solver", "%s at the end, %s at first", solver, run->solve.solver_parts);
   }
   size_text(phases.memory_max, sizeof(memory), memory);
   size_text(phases.memory_sum, sizeof(sum), sum);
@@ -312,7 +313,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscCall(PetscFree(file));
   entry("files", "in %s: %s", out->dir, files);
   if (stopped)
-    entry("stopped", "%s", run->stop_reason);
+    entry("stopped", "%s", run->clock.stop_reason);
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

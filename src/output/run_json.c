@@ -98,13 +98,13 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
 
   // settings; the solver is the current one: a fallback may have replaced it
   SbRunIntegrator(run, sizeof(name), name);
-  if (run->solver_parts[0])
-    PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(parts), parts));
+  if (run->solve.solver_parts[0])
+    PetscCall(SbSolverDescribe(run->solve.snes, m->space, sizeof(parts), parts));
   put(f,
       "\n  ],\n  'time': $s,\n  'solver': $s,\n  'solver_reason': $s,\n  'solver_parts': $s,\n"
       "  'unknowns': $d,\n  'dt': $g,\n  't_start': $g,\n  't_end': $g,\n",
-      name, run->solver, run->solver_reason, parts, 3 * m->space->Nnode, run->dt, run->t0,
-      run->t_end);
+      name, run->solve.solver, run->solve.solver_reason, parts, 3 * m->space->Nnode, run->clock.dt,
+      run->clock.t0, run->clock.t_end);
   for (int notes = 0; notes < 2; notes++) {
     put(f, notes ? "  'effect_notes': [" : "  'effects': [");
     for (PetscInt e = 0; e < m->neffect; e++)
@@ -140,13 +140,14 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
         "  'steps': $d,\n  'newton_iterations': $d,\n  'linear_iterations': $d,\n  "
         "'rejected_steps': $d,\n"
         "  'seconds': {",
-        run->steps_total, run->newton_total, run->linear_total, run->rejected_total);
+        run->counters.steps, run->counters.newton, run->counters.linear, run->counters.rejected);
     for (int i = 0; i < SB_PHASE_COUNT; i++)
       put(f, "$s: $g, ", SbPhaseNames[i], phases->seconds[i]);
     put(f,
         "'time loop': $g, 'total': $g},\n  'cpu_seconds_max': $g,\n  'memory_max_bytes': $g,\n"
         "  'memory_sum_bytes': $g,\n  'files': [",
-        run->seconds_solve, phases->total, phases->cpu, phases->memory_max, phases->memory_sum);
+        run->counters.seconds_solve, phases->total, phases->cpu, phases->memory_max,
+        phases->memory_sum);
     PetscCall(SbOutputFiles(out, &nfile, &file));
     for (PetscInt i = 0; i < nfile; i++)
       (void)fprintf(f, "%s\n    {\"name\": \"%s\", \"bytes\": %" PetscInt64_FMT "}", i ? "," : "",
@@ -155,8 +156,9 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
     put(f, "\n  ],\n");
   }
   put(f, "  'reason': $s,\n", reason);
-  if (run->stopped)
-    put(f, "  'go_on': $s,\n", run->seen.step > run->step0 ? "-restart latest" : "-restart auto");
+  if (run->clock.stopped)
+    put(f, "  'go_on': $s,\n",
+        run->monitors.last.step > run->clock.step0 ? "-restart latest" : "-restart auto");
   put(f, "  'status': $s\n}\n", status);
   (void)fclose(f);
   SbOutputPath(out, "run.json", path);
@@ -207,7 +209,7 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 
 PetscErrorCode SbReportFailure(SbRun run, const char *reason)
 {
-  SbOutput out = run ? (SbOutput)run->output : NULL;
+  SbOutput out = run ? (SbOutput)run->monitors.output : NULL;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;

@@ -220,8 +220,8 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
                        0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
   }
   PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, off, &locator));
-  PetscCall(VecGetArray(run->U, &u));
-  PetscCall(VecGetArray(run->V, &v));
+  PetscCall(VecGetArray(run->state.U, &u));
+  PetscCall(VecGetArray(run->state.V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal L[4], Q[SB_CELL_NODES];
     const PetscReal *weight = L;
@@ -252,8 +252,8 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
         v[3 * i + k] = 0.;
     }
   }
-  PetscCall(VecRestoreArray(run->U, &u));
-  PetscCall(VecRestoreArray(run->V, &v));
+  PetscCall(VecRestoreArray(run->state.U, &u));
+  PetscCall(VecRestoreArray(run->state.V, &v));
   PetscCall(SbLocatorDestroy(&locator));
   PetscCall(PetscFree(off));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
@@ -274,7 +274,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 */
 static PetscErrorCode order_of_file(SbRun run, PetscInt n, SbOrder *order, PetscBool *ok)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   const SbSpace s = run->model->space;
   const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell;
   const PetscInt edge = support + 4 * s->mesh->Ncell;
@@ -311,9 +311,9 @@ static PetscErrorCode order_of_file(SbRun run, PetscInt n, SbOrder *order, Petsc
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       size_t size, char frame[], PetscBool *is)
 {
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   const SbSpace s = run->model->space;
-  const Vec target[2] = {run->U, run->V};
+  const Vec target[2] = {run->state.U, run->state.V};
   struct stat info;
   SbH5 h;
   int64_t hash = 0;
@@ -404,7 +404,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
 PetscErrorCode SbOutputLoadState(SbRun run)
 {
   const SbModel m = run->model;
-  const SbOutput out = (SbOutput)run->output;
+  const SbOutput out = (SbOutput)run->monitors.output;
   PetscBool any = PETSC_FALSE;
   PetscBool checkpoint;
 
@@ -442,6 +442,6 @@ PetscErrorCode SbOutputLoadState(SbRun run)
     PetscCall(SbCaughtRaise(m->comm, &caught));
   }
   if (any)
-    PetscCall(SbModelPrescribe(m, 0., run->U));
+    PetscCall(SbModelPrescribe(m, 0., run->state.U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,11 +16,11 @@ static PetscInt vectors_of(SbRun run, Vec vec[3])
 {
   PetscInt n = 0;
 
-  vec[n++] = run->U;
-  if (run->V)
-    vec[n++] = run->V;
-  if (run->A)
-    vec[n++] = run->A;
+  vec[n++] = run->state.U;
+  if (run->state.V)
+    vec[n++] = run->state.V;
+  if (run->state.A)
+    vec[n++] = run->state.A;
   return n;
 }
 
@@ -81,7 +81,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(
     SbForestCreate(mesh->comm, rank ? 0 : mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
-  PetscCall(SbCornerPositions(s, run->U, now));
+  PetscCall(SbCornerPositions(s, run->state.U, now));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, now, g->x));
   PetscCall(PetscFree(now));
@@ -186,7 +186,7 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
   const PetscReal *u;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(b->space, to->U, &u));
+  PetscCall(SbSpaceGetLocalRead(b->space, to->state.U, &u));
   for (PetscInt k = 0; k < a->neffect; k++) {
     SbEffect e = a->effect[k];
     PetscReal *records, *own;
@@ -218,10 +218,10 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
         n++;
       }
     }
-    SbEffectCall(b->effect[k], load, b->space, from->t_now, u, n, records);
+    SbEffectCall(b->effect[k], load, b->space, from->clock.t, u, n, records);
     PetscCall(PetscFree(records));
   }
-  PetscCall(SbSpaceRestoreLocalRead(b->space, to->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(b->space, to->state.U, &u));
   PetscCall(SbContactSetResume(&b->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,12 +2,12 @@
   Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given
   times, and the run continues.
 
-  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is
-  gathered on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the
-  scene is set up again from its options with these meshes in memory, and the state is transferred:
-  vectors, history variables of effects, totals, output, ledger. Scaled densities conserve mass
-  (SbMemoryMesh.mass), a rigid motion added to the velocities conserves momenta (check.c). The
-  change of kinetic and strain energy is remesh_loss in the energy balance.
+  After each step a callback decides whether the time loop returns (SbRunMonitors.post_step). Then
+  the state is gathered on rank 0 (gather.c), bodies are re-meshed and the state is interpolated
+  (bodies.c), the scene is set up again from its options with these meshes in memory, and the state
+  is transferred: vectors, history variables of effects, totals, output, ledger. Scaled densities
+  conserve mass (SbMemoryMesh.mass), a rigid motion added to the velocities conserves momenta
+  (check.c). The change of kinetic and strain energy is remesh_loss in the energy balance.
 
   If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is
   when its quality has halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds
@@ -213,7 +213,7 @@ static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, Petsc
   *pause = r->changes;
   r->how.better = (PetscBool)!time;
   if (r->meshes)
-    PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+    PetscCall(SbBodyQualities(run->model, run->state.U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody && r->meshes; b++) {
     const PetscBool bad =
       (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
@@ -232,16 +232,16 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
 
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
-  if (!r->failed || !run->stop_reason[0] || run->stopped || run->step_now <= r->tried)
+  if (!r->failed || !run->clock.stop_reason[0] || run->clock.stopped || run->clock.step <= r->tried)
     PetscFunctionReturn(PETSC_SUCCESS);
-  r->tried = run->step_now;
-  if (!run->step_now) {
+  r->tried = run->clock.step;
+  if (!run->clock.step) {
     PetscCall(SbWarning(run->model->comm,
                         "-remesh_failed: the first step failed, with the bodies as they were "
                         "given: none is re-meshed, their meshes, loads or steps must change"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+  PetscCall(SbBodyQualities(run->model, run->state.U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody; b++) {
     r->due[b] = PETSC_FALSE;
     if (r->named[b] && (worst < 0 || r->worst[b] < r->worst[worst]))
@@ -251,7 +251,7 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
     PetscFunctionReturn(PETSC_SUCCESS);
   r->due[worst] = *again = PETSC_TRUE;
   r->how.better = PETSC_FALSE;
-  PetscCall(SbWarning(run->model->comm, "%s; body '%s' is re-meshed", run->stop_reason,
+  PetscCall(SbWarning(run->model->comm, "%s; body '%s' is re-meshed", run->clock.stop_reason,
                       run->model->body[worst].name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -261,19 +261,21 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
   PetscFunctionBeginUser;
   if (!r)
     PetscFunctionReturn(PETSC_SUCCESS);
-  run->after.fn = check_quality;
-  run->after.ctx = r;
+  run->monitors.post_step.fn = check_quality;
+  run->monitors.post_step.ctx = r;
   if (!r->meshes)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
-  PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));
-  PetscCall(PetscArraycpy(r->column, run->column, run->ncolumn));
-  r->column[run->ncolumn++] = (SbColumn){"remesh_loss", "J", &run->energies.remesh_loss};
-  r->column[run->ncolumn++] = (SbColumn){"remesh_mass", "kg", &run->energies.remesh_mass};
-  r->column[run->ncolumn++] =
-    (SbColumn){"remesh_momentum", "kg m/s", &run->energies.remesh_momentum};
-  run->column = r->column;
-  run->want_energies = PETSC_TRUE;
+  PetscCall(PetscMalloc1(run->monitors.ncolumn + 3, &r->column));
+  PetscCall(PetscArraycpy(r->column, run->monitors.column, run->monitors.ncolumn));
+  r->column[run->monitors.ncolumn++] =
+    (SbColumn){"remesh_loss", "J", &run->state.energies.remesh_loss};
+  r->column[run->monitors.ncolumn++] =
+    (SbColumn){"remesh_mass", "kg", &run->state.energies.remesh_mass};
+  r->column[run->monitors.ncolumn++] =
+    (SbColumn){"remesh_momentum", "kg m/s", &run->state.energies.remesh_momentum};
+  run->monitors.column = r->column;
+  run->monitors.want_energies = PETSC_TRUE;
   for (PetscInt b = 0; b < r->nbody; b++) {
     const SbMemoryMesh *in_memory = run->model->body[b].in_memory;
 
@@ -307,7 +309,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbSceneCreate(old->model->comm, &s.model));
   PetscCall(SbRunCreate(s.model, &run));
   s.run = run;
-  PetscCall(PetscStrncpy(run->solver_choice, before->solver, sizeof(run->solver_choice)));
+  PetscCall(
+    PetscStrncpy(run->solve.solver_choice, before->solve.solver, sizeof(run->solve.solver_choice)));
   PetscCall(SbLedgerSetFromOptions(run, &s.ledger));
 
   // the bodies' meshes, on rank 0; the model owns them from now on
@@ -316,56 +319,57 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
     s.model->body[b].in_memory = result->in_memory[b];
     result->in_memory[b] = NULL;
   }
-  s.model->t_begin = before->t_now;
+  s.model->t_begin = before->clock.t;
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbRunSetUp(run));
-  PetscCall(PetscStrncpy(run->solver_reason, before->solver_reason, sizeof(run->solver_reason)));
+  PetscCall(PetscStrncpy(run->solve.solver_reason, before->solve.solver_reason,
+                         sizeof(run->solve.solver_reason)));
 
   // transfer the state
   PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
-  PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
+  PetscCall(SbModelPrescribe(s.model, run->clock.t, run->state.U));
 
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations
   PetscCall(PetscCalloc1(old->model->nbody, &momenta));
   for (int i = 0; i < 2; i++) {
-    const Vec from = i ? before->A : before->V;
-    const Vec to = i ? run->A : run->V;
+    const Vec from = i ? before->state.A : before->state.V;
+    const Vec to = i ? run->state.A : run->state.V;
 
     if (!to)
       continue;
-    PetscCall(SbBodyMomenta(old->model, before->U, from, momenta));
-    PetscCall(
-      SbBodySetMomenta(s.model, run->U, to, r->due, (const PetscReal(*)[6])momenta, &speed[i]));
+    PetscCall(SbBodyMomenta(old->model, before->state.U, from, momenta));
+    PetscCall(SbBodySetMomenta(s.model, run->state.U, to, r->due, (const PetscReal(*)[6])momenta,
+                               &speed[i]));
   }
   PetscCall(PetscFree(momenta));
   PetscCall(SbEffectsHandOver(before, run, &result->renamed));
 
   // penalty of CR and DG for the new state, before accelerations and energies are computed
-  if (run->J && s.model->dynamic && run->preset != SB_TIME_ALPHA2)
+  if (run->solve.J && s.model->dynamic && run->solve.preset != SB_TIME_ALPHA2)
     PetscCall(SbSpaceFollowJumps(
-      s.model->space, run->U, run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,
-      NULL));
+      s.model->space, run->state.U,
+      run->solve.preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME, NULL));
   PetscCall(SbRunRestartAcceleration(run));
 
   // energy, mass and momentum of both states; the difference of energy is remesh_loss
-  PetscCall(SbModelEnergies(old->model, before->U, before->V, &e[0]));
-  PetscCall(SbModelEnergies(s.model, run->U, run->V, &e[1]));
-  run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
-  run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
-  run->energies.remesh_momentum += PetscSqrtReal(SbDistance2(e[0].momentum, e[1].momentum));
+  PetscCall(SbModelEnergies(old->model, before->state.U, before->state.V, &e[0]));
+  PetscCall(SbModelEnergies(s.model, run->state.U, run->state.V, &e[1]));
+  run->state.energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
+  run->state.energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
+  run->state.energies.remesh_momentum += PetscSqrtReal(SbDistance2(e[0].momentum, e[1].momentum));
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger)
     PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, run));
-  if (before->output)
+  if (before->monitors.output)
     PetscCall(SbOutputReattach(before, run));
 
   // one line for each body that was re-meshed
   for (PetscInt b = 0; b < r->nbody; b++) {
     const SbRemeshOutcome *o = &result->outcome[b];
-    SbRemeshed entry = {.step = run->step_now,
-                        .t = run->t_now,
+    SbRemeshed entry = {.step = run->clock.step,
+                        .t = run->clock.t,
                         .tets = {o->ncell[0], o->ncell[1]},
                         .vertices = {o->nvert[0], o->nvert[1]},
                         .energy = {e[0].kinetic + e[0].strain, e[1].kinetic + e[1].strain},
@@ -405,7 +409,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscCall(SbGather(run, &g));
   PetscCall(SbRemeshResultCreate(&g, &result));
   if (!rank)
-    PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, &result));
+    PetscCall(SbRemeshBodies(m, &g, r->due, run->clock.step, &r->how, &result));
   PetscCall(SbGatheredDestroy(&g));
   PetscCallMPI(MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)),
                          MPI_BYTE, 0, m->comm));
@@ -425,13 +429,13 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
       continue;
     if (!done)
       PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
-                          m->body[b].name, run->step_now, result.outcome[b].message));
+                          m->body[b].name, run->clock.step, result.outcome[b].message));
 
     // quality and step from which the body may be re-meshed again
     if (reached > 0.)
       r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
     r->rest[b] = done && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
-    r->from[b] = run->step_now + r->rest[b];
+    r->from[b] = run->clock.step + r->rest[b];
     if (result.in_memory[b] && done)
       result.in_memory[b]->bound = r->bound[b];
     r->due[b] = done; /* which replace() needs */
@@ -444,10 +448,10 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 
   // without a new mesh the time loop resumes at the current step
   if (!*any) {
-    run->step0 = run->step_now;
-    run->t0 = run->t_now;
-    run->newton_before = run->newton_total;
-    run->linear_before = run->linear_total;
+    run->clock.step0 = run->clock.step;
+    run->clock.t0 = run->clock.t;
+    run->counters.newton_before = run->counters.newton;
+    run->counters.linear_before = run->counters.linear;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -461,13 +465,13 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
   PetscFunctionBeginUser;
 
   // a checkpoint before a due re-meshing contains the old meshes: a restart re-meshes first
-  if (r && first->step0 && (first->after.dt > 0. || r->nchange)) {
-    const PetscBool initial = (PetscBool) !(first->after.dt > 0.);
+  if (r && first->clock.step0 && (first->monitors.post_step.dt > 0. || r->nchange)) {
+    const PetscBool initial = (PetscBool) !(first->monitors.post_step.dt > 0.);
 
-    first->step_now = first->step0;
-    first->t_now = first->t0;
-    PetscCall(check_quality(first, first->step0, first->t0, initial ? first->t0 : first->after.dt,
-                            r, &again));
+    first->clock.step = first->clock.step0;
+    first->clock.t = first->clock.t0;
+    PetscCall(check_quality(first, first->clock.step0, first->clock.t0,
+                            initial ? first->clock.t0 : first->monitors.post_step.dt, r, &again));
 
     // the new scene is in its initial state, as at the start of the first run: only supports come
     // and go
@@ -480,7 +484,7 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
     PetscBool failed = PETSC_FALSE;
 
     PetscCall(SbRunSolve(scene.run));
-    again = scene.run->paused;
+    again = scene.run->clock.paused;
     if (r && !again)
       PetscCall(check_after_failure(r, scene.run, &failed));
     if (again || failed)

@@ -72,9 +72,9 @@ static PetscErrorCode put_at(Path *p, PetscReal factor)
 static PetscErrorCode residual(Path *p, PetscReal *norm)
 {
   PetscFunctionBeginUser;
-  PetscCall(SNESComputeFunction(p->run->snes, p->X, p->r));
+  PetscCall(SNESComputeFunction(p->run->solve.snes, p->X, p->r));
   PetscCall(VecNorm(p->r, NORM_2, norm));
-  PetscCall(SNESSetFunctionNorm(p->run->snes, *norm));
+  PetscCall(SNESSetFunctionNorm(p->run->solve.snes, *norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,13 +85,13 @@ static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(p->run->snes, &ksp));
-  PetscCall(KSPSetOperators(ksp, p->run->operator, p->run->J));
+  PetscCall(SNESGetKSP(p->run->solve.snes, &ksp));
+  PetscCall(KSPSetOperators(ksp, p->run->solve.system, p->run->solve.J));
   PetscCall(VecZeroEntries(x));
   PetscCall(KSPSolve(ksp, b, x));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   PetscCall(KSPGetIterationNumber(ksp, &its));
-  p->run->linear_step += its;
+  p->run->counters.linear_step += its;
   *ok = (PetscBool)(reason > 0);
   if (!*ok)
     PetscCall(SbRunFail(p->run, "load factor %g: the linear solver ended with %s",
@@ -106,13 +106,13 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   const PetscReal factor = p->factor;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESComputeJacobian(run->snes, p->X, run->operator, run->J));
-  run->newton_step++;
+  PetscCall(SNESComputeJacobian(run->solve.snes, p->X, run->solve.system, run->solve.J));
+  run->counters.newton_step++;
 
   /* q; w: derivative of the prescribed displacements by lambda */
   PetscCall(VecCopy(p->X, p->w));
   PetscCall(put_at(p, factor + p->delta));
-  PetscCall(SNESComputeFunction(run->snes, p->X, p->q));
+  PetscCall(SNESComputeFunction(run->solve.snes, p->X, p->q));
   PetscCall(VecAXPBY(p->q, 1. / p->delta, -1. / p->delta, p->r));
   PetscCall(VecAYPX(p->w, -1., p->X));
   PetscCall(put_at(p, factor));
@@ -128,7 +128,7 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscReal more = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESGetTolerances(p->run->snes, &atol, &rtol, NULL, NULL, NULL));
+  PetscCall(SNESGetTolerances(p->run->solve.snes, &atol, &rtol, NULL, NULL, NULL));
   for (*its = 0;; (*its)++) {
     PetscCall(residual(p, &norm));
     *ok = (PetscBool)(norm <= PetscMax(atol, rtol * p->load));
@@ -153,7 +153,7 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
     if (!*ok)
       break;
     if (l > 0.) {
-      PetscCall(VecWAXPY(p->d, -1., p->run->U, p->X));
+      PetscCall(VecWAXPY(p->d, -1., p->run->state.U, p->X));
       PetscCall(product(p, p->d, p->d, &dd));
       PetscCall(product(p, p->d, p->du, &dr));
       PetscCall(product(p, p->d, p->v, &dv));
@@ -174,17 +174,17 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   const SbRun run = p->run;
   PetscReal vv, dd, dv;
   PetscBool far;
-  PetscBool again = (PetscBool)(run->post_solve.fn != NULL);
+  PetscBool again = (PetscBool)(run->monitors.post_solve.fn != NULL);
   PetscInt more;
 
   PetscFunctionBeginUser;
   PetscCall(product(p, p->begin, p->begin, &vv));
-  PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->U));
+  PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->state.U));
   PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
   PetscCall(correct(p, l, its, ok));
 
   /* too large an angle: another branch */
-  PetscCall(VecWAXPY(p->d, -1., run->U, p->X));
+  PetscCall(VecWAXPY(p->d, -1., run->state.U, p->X));
   PetscCall(product(p, p->d, p->d, &dd));
   PetscCall(product(p, p->d, p->begin, &dv));
   if (*ok && !(sign * dv >= STRAIGHT * PetscSqrtReal(dd * vv))) {
@@ -197,20 +197,20 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
 
   /* past the end of the path: solve at lambda = 1 */
   if (*ok && from < 1. && p->factor > 1.) {
-    PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->U));
+    PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->state.U));
     PetscCall(put_at(p, 1.));
     PetscCall(correct(p, l = 0., &more, ok));
     *its += more;
   }
-  for (int i = 0; i < SB_LOOKS && again && *ok; i++) {
+  for (int i = 0; i < SB_MAX_RESOLVES && again && *ok; i++) {
     const SbSolvedStep step = {.t = from, .dt = p->factor - from, .U = p->X, .solved = PETSC_TRUE};
 
     again = PETSC_FALSE;
-    PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
+    PetscCall((*run->monitors.post_solve.fn)(run, &step, run->monitors.post_solve.ctx, &again));
     if (again)
       PetscCall(correct(p, l, &more, ok));
   }
-  PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->U, p->X}, ok));
+  PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->state.U, p->X}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -222,7 +222,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscReal norm, along;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, SB_STEPS_OF_LOAD, NULL));
+  PetscCall(SbSpaceFollowJumps(run->model->space, run->state.U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
   if (!*ok)
@@ -230,20 +230,19 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscCall(VecCopy(p->v, p->begin));
   if (p->load == 0.)
     PetscCall(VecNorm(p->q, NORM_2, &p->load));
-  PetscCall(product(p, run->path, p->begin, &along));
+  PetscCall(product(p, run->state.path, p->begin, &along));
   *sign = along < 0. ? -1. : 1.;
-  PetscCall(SbSolverCountNegativeEigenvalues(run->snes, run->model->space, &negative));
-  if (run->nonsymmetric.U)
+  PetscCall(SbSolverCountNegativeEigenvalues(run->solve.snes, run->model->space, &negative));
+  if (run->solve.nonsymmetric.U)
     negative = -1; /* the matrix lacks a part of K: its inertia is unknown */
   if (negative >= 0 && p->negative >= 0 &&
-      PetscAbsInt(negative - p->negative) != (*sign != p->turned) && !run->bifurcations++)
-    PetscCall(SbWarning(
-      run->model->comm,
-      "load factor %g: the tangent has %" PetscInt_FMT
-      " negative eigenvalues, a step before %" PetscInt_FMT
-      ", and the load does not turn: a bifurcation was passed, and other equilibria may be "
-      "reached by a small imperfection",
-      (double)p->factor, negative, p->negative));
+      PetscAbsInt(negative - p->negative) != (*sign != p->turned) && !run->counters.bifurcations++)
+    PetscCall(SbWarning(run->model->comm,
+                        "load factor %g: the tangent has %" PetscInt_FMT
+                        " negative eigenvalues, a step before %" PetscInt_FMT
+                        ", and the load does not turn: a bifurcation was passed, and other "
+                        "equilibria may be reached by a small imperfection",
+                        (double)p->factor, negative, p->negative));
   p->negative = negative;
   p->turned = *sign;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -252,161 +251,208 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->contacts.nactive_set  ? m->contacts.active_set[0]->effect->name
-                     : m->contacts.npotential ? m->contacts.potential[0]->effect->name
-                                              : "";
+  const char *name = "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCheck(
-    !m->contacts.nactive_set && !m->contacts.npotential, m->comm, PETSC_ERR_USER_INPUT,
-    "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
-    "dynamic run with damping",
-    name);
-  PetscCall(SNESGetKSP(run->snes, &ksp));
+  if (m->contacts.npotential)
+    name = m->contacts.potential[0]->effect->name;
+  if (m->contacts.nactive_set)
+    name = m->contacts.active_set[0]->effect->name;
+  PetscCheck(!m->contacts.nactive_set && !m->contacts.npotential, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length does not know contact (effect %s): use -static_control "
+             "load, or a dynamic run with damping",
+             name);
+  PetscCall(SNESGetKSP(run->solve.snes, &ksp));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
-  PetscCall(PetscStrcmp(run->solver, "cholmod", &cholmod));
-  PetscCheck(
-    !cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
-    "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave "
-    "-solver to auto, or give mumps or umfpack",
-    run->solver);
+  PetscCall(PetscStrcmp(run->solve.solver, "cholmod", &cholmod));
+  PetscCheck(!cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length meets indefinite matrices, which -solver %s does not "
+             "take: leave -solver to auto, or give mumps or umfpack",
+             run->solve.solver);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vectors and weights at the start of the path, at the load factor `factor`. */
+static PetscErrorCode begin_path(Path *p, PetscReal factor)
+{
+  const SbRun run = p->run;
+  const SbModel m = run->model;
+  PetscReal most;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 9; k++)
+    PetscCall(VecDuplicate(run->state.U, &p->all[k]));
+  PetscCall(VecAXPBY(p->weight, 1. / m->mass, 0., run->state.mass));
+
+  /* whether R is linear in lambda */
+  PetscCall(VecZeroEntries(p->X));
+  PetscCall(put_at(p, 1.));
+  PetscCall(VecNorm(p->X, NORM_INFINITY, &most));
+  p->delta = most > 0. ? FINE : 1.;
+  for (PetscInt e = 0; e < m->nforce; e++)
+    p->delta = m->force[e]->steady ? p->delta : FINE;
+  for (PetscInt e = 0; e < m->nprescribe; e++)
+    p->delta = m->prescribe[e]->steady ? p->delta : FINE;
+  PetscCall(VecCopy(run->state.U, p->X));
+  PetscCall(put_at(p, factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Length of the first step, m: by the load increment 1 / static_steps or, after a load path, its
+   displacement per load. */
+static PetscErrorCode first_length(Path *p, PetscReal factor, PetscReal *length)
+{
+  const SbRun run = p->run;
+  PetscReal rate, uu;
+
+  PetscFunctionBeginUser;
+  PetscCall(product(p, p->begin, p->begin, &rate));
+  PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length: no effect loads or moves the bodies more with the "
+             "load factor");
+  rate = PetscSqrtReal(rate);
+  if (factor > 0.) {
+    PetscCall(product(p, run->state.U, run->state.U, &uu));
+    rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
+  }
+  *length = run->clock.arc.first = rate / (PetscReal)run->clock.static_steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X becomes the state after a step of the length l in `its` iterations; l: length of the next one,
+   along whose direction state.path is. */
+static PetscErrorCode accept_step(Path *p, PetscInt its, PetscReal *l)
+{
+  const SbRun run = p->run;
+  const Vec path = run->state.path;
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(path, -1., run->state.U, p->X));
+  PetscCall(product(p, path, path, &length));
+  *l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
+  *l = PetscMin(*l, run->clock.arc.longest * run->clock.arc.first);
+  PetscCall(VecScale(path, *l / PetscSqrtReal(length)));
+  PetscCall(VecCopy(p->X, run->state.U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a node has moved as far as -static_max_displacement. */
+static PetscErrorCode has_moved_far(SbRun run, PetscBool *is)
+{
+  const SbModel m = run->model;
+  const PetscScalar *u;
+  PetscReal most = 0.;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  if (run->clock.arc.displacement == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(run->state.U, &u));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, m->comm));
+  *is = (PetscBool)(PetscSqrtReal(most) >= run->clock.arc.displacement);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Why no step of the length l succeeded after the load factor `factor`. */
+static PetscErrorCode explain_end(SbRun run, PetscReal factor, PetscReal l)
+{
+  char why[sizeof(run->clock.stop_reason)], motion[256];
+  PetscInt body;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (body >= 0 && !run->counters.steps)
+    PetscCall(
+      SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
+                (double)factor, run->model->body[body].name, motion));
+  else
+    PetscCall(SbRunFail(run,
+                        "the path reached the load factor %.7g, and no step of %.1e of the first "
+                        "one's length was found to go on: %s",
+                        (double)factor, (double)(2. * l / run->clock.arc.first), why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbArcLengthSolve(SbRun run)
 {
-  PetscReal factor = run->t0;
+  const SbModel m = run->model;
+  SbRunClock *clock = &run->clock;
+  PetscReal factor = clock->t0;
   PetscReal sign = 1.;
-  PetscReal l, length;
-  PetscInt step = run->step0;
-  PetscInt cuts = 0;
+  PetscReal l;
+  PetscInt step = clock->step0;
+  PetscInt halvings = 0;
   PetscInt its;
   PetscBool last = (PetscBool)(factor == 1.);
   PetscBool known = PETSC_FALSE;
   PetscBool ok;
-  const SbModel m = run->model;
   Path p = {.run = run, .negative = -1};
 
   PetscFunctionBeginUser;
-  PetscCheck(!run->after.fn, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!run->monitors.post_step.fn, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
-  for (int k = 0; k < 9; k++)
-    PetscCall(VecDuplicate(run->U, &p.all[k]));
-  PetscCall(VecAXPBY(p.weight, 1. / m->mass, 0., run->mass));
-
-  /* whether R is linear in lambda */
-  PetscCall(VecZeroEntries(p.X));
-  PetscCall(put_at(&p, 1.));
-  PetscCall(VecNorm(p.X, NORM_INFINITY, &length));
-  p.delta = length > 0. ? FINE : 1.;
-  for (PetscInt e = 0; e < m->nforce; e++)
-    p.delta = m->force[e]->steady ? p.delta : FINE;
-  for (PetscInt e = 0; e < m->nprescribe; e++)
-    p.delta = m->prescribe[e]->steady ? p.delta : FINE;
-  PetscCall(VecCopy(run->U, p.X));
-  PetscCall(put_at(&p, factor));
+  PetscCall(begin_path(&p, factor));
   PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
-  PetscCall(product(&p, run->path, run->path, &l));
+  PetscCall(product(&p, run->state.path, run->state.path, &l));
   l = PetscSqrtReal(l);
   while (!last) {
     /* direction and length of the step */
     if (!known) {
-      PetscCall(VecCopy(run->U, p.X));
+      PetscCall(VecCopy(run->state.U, p.X));
       PetscCall(put_at(&p, factor));
       PetscCall(begin_step(&p, &sign, &ok));
       if (!ok)
         break;
       known = PETSC_TRUE;
     }
-
-    /* first step: by the load increment 1 / static_steps or, after a load path, its displacement
-       per load */
-    if (l == 0.) {
-      PetscReal rate, uu;
-
-      PetscCall(product(&p, p.begin, p.begin, &rate));
-      PetscCheck(rate > 0., m->comm, PETSC_ERR_USER_INPUT,
-                 "-static_control arc_length: no effect loads or moves the bodies more with the "
-                 "load factor");
-      rate = PetscSqrtReal(rate);
-      if (factor > 0.) {
-        PetscCall(product(&p, run->U, run->U, &uu));
-        rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
-      }
-      l = run->arc.first = rate / (PetscReal)run->static_steps;
-    }
+    if (l == 0.)
+      PetscCall(first_length(&p, factor, &l));
 
     /* a step along it, halved on failure */
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
-      run->rejected_total++;
-      run->tangent_known = PETSC_FALSE;
-      if (run->stopped) {
+      run->counters.rejected++;
+      run->solve.tangent_known = PETSC_FALSE;
+      if (clock->stopped) {
         PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
         break;
       }
       l *= 0.5;
-      if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first)
+      if (++halvings <= clock->max_halvings && l >= clock->min_increment * clock->arc.first)
         continue;
       break;
     }
 
     /* the new equilibrium, and the length of the next step */
-    run->stop_reason[0] = 0;
+    clock->stop_reason[0] = 0;
     known = PETSC_FALSE;
-    cuts = 0;
-    PetscCall(VecWAXPY(run->path, -1., run->U, p.X));
-    PetscCall(product(&p, run->path, run->path, &length));
-    l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
-    l = PetscMin(l, run->arc.longest * run->arc.first);
-    PetscCall(VecScale(run->path, l / PetscSqrtReal(length)));
-    PetscCall(VecCopy(p.X, run->U));
+    halvings = 0;
+    PetscCall(accept_step(&p, its, &l));
 
-    /* end at -static_max_displacement */
-    if (run->arc.displacement != 0.) {
-      const PetscScalar *u;
-      PetscReal most = 0.;
-
-      PetscCall(VecGetArrayRead(run->U, &u));
-      for (PetscInt i = 0; i < m->space->nnode_owned; i++)
-        most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
-      PetscCall(VecRestoreArrayRead(run->U, &u));
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, m->comm));
-      last = (PetscBool)(PetscSqrtReal(most) >= run->arc.displacement);
-    }
+    /* the end of the path */
+    PetscCall(has_moved_far(run, &last));
     last = (PetscBool)(last || p.factor == 1.);
-    if (!last && step + 1 - run->step0 == run->arc.steps) {
+    if (!last && step + 1 - clock->step0 == clock->arc.steps) {
       last = PETSC_TRUE;
       PetscCall(SbWarning(
         m->comm, "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
-        run->arc.steps, (double)p.factor));
+        clock->arc.steps, (double)p.factor));
     }
     if (!last)
       PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
-    last = (PetscBool)(last || run->stopped);
+    last = (PetscBool)(last || clock->stopped);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;
   }
-  if (run->stop_reason[0] && !run->stopped && !run->rejected_inverted) {
-    char why[sizeof(run->stop_reason)], motion[256];
-    PetscInt body;
-
-    /* the reason why no step succeeded */
-    PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-    if (body >= 0 && !run->steps_total)
-      PetscCall(
-        SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
-                  (double)factor, m->body[body].name, motion));
-    else
-      PetscCall(
-        SbRunFail(run,
-                  "the path reached the load factor %.7g, and no step of %.1e of the first one's "
-                  "length was found to go on: %s",
-                  (double)factor, (double)(2. * l / run->arc.first), why));
-  }
+  if (clock->stop_reason[0] && !clock->stopped && !run->solve.rejected_inverted)
+    PetscCall(explain_end(run, factor, l));
   for (int k = 0; k < 9; k++)
     PetscCall(VecDestroy(&p.all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -12,22 +12,22 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
                                    Vec U, Vec V, Mat P)
 {
   PetscFunctionBeginUser;
-  if (run->model->linear && run->tangent_known &&
-      PetscAbsReal(run->shift_v - shift_v) <= TINY * shift_v &&
-      PetscAbsReal(run->shift_a - shift_a) <= TINY * shift_a)
+  if (run->model->linear && run->solve.tangent_known &&
+      PetscAbsReal(run->solve.shift_v - shift_v) <= TINY * shift_v &&
+      PetscAbsReal(run->solve.shift_a - shift_a) <= TINY * shift_a)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
 
   /* a rotated preconditioner needs the displacement of the matrix */
-  if (run->solver_used->precondition)
+  if (run->solve.solver_used->precondition)
     PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
-  if (run->nonsymmetric.U) {
-    PetscCall(VecCopy(U, run->nonsymmetric.U));
-    run->nonsymmetric.t = t;
+  if (run->solve.nonsymmetric.U) {
+    PetscCall(VecCopy(U, run->solve.nonsymmetric.U));
+    run->solve.nonsymmetric.t = t;
   }
-  run->tangent_known = PETSC_TRUE;
-  run->shift_v = shift_v;
-  run->shift_a = shift_a;
+  run->solve.tangent_known = PETSC_TRUE;
+  run->solve.shift_v = shift_v;
+  run->solve.shift_a = shift_a;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -38,11 +38,11 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &run));
-  PetscCall(VecCopy(x, run->nonsymmetric.x));
-  PetscCall(SbModelNonsymmetric(run->model, run->nonsymmetric.t, run->nonsymmetric.U,
-                                run->nonsymmetric.x, run->nonsymmetric.y));
-  PetscCall(MatMult(run->J, x, y));
-  PetscCall(VecAXPY(y, 1., run->nonsymmetric.y));
+  PetscCall(VecCopy(x, run->solve.nonsymmetric.x));
+  PetscCall(SbModelNonsymmetric(run->model, run->solve.nonsymmetric.t, run->solve.nonsymmetric.U,
+                                run->solve.nonsymmetric.x, run->solve.nonsymmetric.y));
+  PetscCall(MatMult(run->solve.J, x, y));
+  PetscCall(VecAXPY(y, 1., run->solve.nonsymmetric.y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,12 +51,12 @@ PetscErrorCode SbFormCreateOperator(SbRun run)
   const PetscInt n = 3 * run->model->space->nnode_owned;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.U));
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.x));
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.y));
-  PetscCall(
-    MatCreateShell(run->model->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, run, &run->operator));
-  PetscCall(MatShellSetOperation(run->operator, MATOP_MULT, SB_OPERATION(multiply)));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->solve.nonsymmetric.U));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->solve.nonsymmetric.x));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->solve.nonsymmetric.y));
+  PetscCall(MatCreateShell(run->model->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, run,
+                           &run->solve.system));
+  PetscCall(MatShellSetOperation(run->solve.system, MATOP_MULT, SB_OPERATION(multiply)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,7 +123,7 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBoo
     /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a
        division */
     PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &M));
-    PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
+    PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->state.U, run->state.V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));
     PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
     PetscCall(KSPSetOperators(ksp, M, M));
@@ -135,7 +135,7 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBoo
     PetscCall(KSPDestroy(&ksp));
     PetscCall(MatDestroy(&M));
   } else
-    PetscCall(VecPointwiseDivide(A, A, run->mass));
+    PetscCall(VecPointwiseDivide(A, A, run->state.mass));
   PetscCall(VecScale(A, -1.));
   if (!constrain) {
     PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, A));

@@ -3,10 +3,10 @@
   work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
   change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
   times angle); damping dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own
-  work (src/contact/response_barrier.c), as the energy of its gaps may change much in a step. The
-  rest of the difference between the energies at the start and now was dissipated (negative: added)
-  by the integrator. A stable implicit one adds little; if one adds most of the energy, it is
-  unstable, and the run means nothing from there on.
+  work (src/effect/barrier.c), as the energy of its gaps may change much in a step. The rest of the
+  difference between the energies at the start and now was dissipated (negative: added) by the
+  integrator. A stable implicit one adds little; if one adds most of the energy, it is unstable, and
+  the run means nothing from there on.
 */
 #include "time_impl.h"
 
@@ -19,15 +19,16 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscScalar *r;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
+  PetscCall(
+    SbModelResidual(run->model, t, run->state.U, run->state.V, run->state.A, PETSC_FALSE, R));
   if (s->constraints) {
     /* keep reactions at prescribed unknowns, and contact forces */
-    PetscCall(SbSpaceGetLocalRead(s, run->U, &u));
+    PetscCall(SbSpaceGetLocalRead(s, run->state.U, &u));
     PetscCall(VecGetArray(R, &r));
     SbConstraintsComputeForces(s, u, r);
     SbConstraintsReactions(s, r);
     PetscCall(VecRestoreArray(R, &r));
-    PetscCall(SbSpaceRestoreLocalRead(s, run->U, &u));
+    PetscCall(SbSpaceRestoreLocalRead(s, run->state.U, &u));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -35,42 +36,42 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first)
 {
   SbModel m = run->model;
-  SbEnergies *e = &run->energies;
+  SbEnergies *e = &run->state.energies;
   PetscReal work[4], power = 0.,
                      own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelEnergies(m, run->U, run->V, e));
-  PetscCall(VecDuplicate(run->U, &loads));
-  PetscCall(VecDuplicate(run->U, &reaction));
-  PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
+  PetscCall(SbModelEnergies(m, run->state.U, run->state.V, e));
+  PetscCall(VecDuplicate(run->state.U, &loads));
+  PetscCall(VecDuplicate(run->state.U, &reaction));
+  PetscCall(SbModelLoads(m, t, run->state.U, run->state.V, loads));
 
   /* loads without barrier contact, which has its own work */
   if (m->contacts.npotential)
-    PetscCall(SbContactSetGradient(&m->contacts, run->U, 1., PETSC_FALSE, NULL, loads));
+    PetscCall(SbContactSetGradient(&m->contacts, run->state.U, 1., PETSC_FALSE, NULL, loads));
   own[0] += SbContactSetWork(&m->contacts);
   PetscCall(SbRunReactions(run, t, reaction));
-  if (run->damped)
-    PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
+  if (run->solve.damped)
+    PetscCall(SbModelDampingPower(m, run->state.U, run->state.V, &power));
   if (!first) {
     const PetscScalar *before, *now;
     Vec moved;
 
     /* twice the work of loads and reactions: at prescribed unknowns, and where contact acts or just
        did */
-    PetscCall(VecDuplicate(run->U, &moved));
-    PetscCall(VecWAXPY(moved, -1., run->previous, run->U));
+    PetscCall(VecDuplicate(run->state.U, &moved));
+    PetscCall(VecWAXPY(moved, -1., run->state.previous, run->state.U));
     PetscCall(VecDot(loads, moved, &work[0]));
-    PetscCall(VecDot(run->loads, moved, &work[1]));
+    PetscCall(VecDot(run->state.loads, moved, &work[1]));
     if (!m->space->constraints)
       PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, moved));
     PetscCall(VecDot(reaction, moved, &work[2]));
-    PetscCall(VecDot(run->reaction, moved, &work[3]));
+    PetscCall(VecDot(run->state.reaction, moved, &work[3]));
     PetscCall(VecDestroy(&moved));
 
     /* work of reactions along rotations beyond that of their mean along the chord */
-    PetscCall(VecGetArrayRead(run->reaction, &before));
+    PetscCall(VecGetArrayRead(run->state.reaction, &before));
     PetscCall(VecGetArrayRead(reaction, &now));
     for (PetscInt k = 0; k < m->nprescribe; k++) {
       if (!m->prescribe[k]->ops.turning_work)
@@ -78,31 +79,32 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
       SbEffectCall(m->prescribe[k], turning_work, m->space, t - dt, t, before, now, &own[1]);
     }
     PetscCall(VecRestoreArrayRead(reaction, &now));
-    PetscCall(VecRestoreArrayRead(run->reaction, &before));
+    PetscCall(VecRestoreArrayRead(run->state.reaction, &before));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, own, 2, MPIU_REAL, MPI_SUM, m->comm));
     e->load_work += 0.5 * (work[0] + work[1]) + own[0];
     e->prescribed_work += 0.5 * (work[2] + work[3]) + own[1];
-    e->damping_loss += 0.5 * dt * (power + run->damping_power);
-  } else if (run->step0 == 0)
-    run->energy_start = e->kinetic + e->strain;
-  e->integrator_loss = run->energy_start + e->load_work + e->prescribed_work - e->damping_loss -
-                       e->remesh_loss - e->kinetic - e->strain;
-  run->energy_most = PetscMax(run->energy_most, e->kinetic + e->strain);
-  if (m->dynamic && !run->gain_said && -e->integrator_loss > GIVEN * run->energy_most) {
-    run->gain_said = PETSC_TRUE;
+    e->damping_loss += 0.5 * dt * (power + run->state.damping_power);
+  } else if (run->clock.step0 == 0)
+    run->state.energy_start = e->kinetic + e->strain;
+  e->integrator_loss = run->state.energy_start + e->load_work + e->prescribed_work -
+                       e->damping_loss - e->remesh_loss - e->kinetic - e->strain;
+  run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
+  if (m->dynamic && !run->monitors.warned_gain &&
+      -e->integrator_loss > GIVEN * run->state.energy_most) {
+    run->monitors.warned_gain = PETSC_TRUE;
     PetscCall(SbWarning(
       m->comm,
       "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
       "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
       (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
   }
-  run->damping_power = power;
-  PetscCall(VecDestroy(&run->loads));
-  PetscCall(VecDestroy(&run->reaction));
-  run->loads = loads;
-  run->reaction = reaction;
-  if (!run->previous)
-    PetscCall(VecDuplicate(run->U, &run->previous));
-  PetscCall(VecCopy(run->U, run->previous));
+  run->state.damping_power = power;
+  PetscCall(VecDestroy(&run->state.loads));
+  PetscCall(VecDestroy(&run->state.reaction));
+  run->state.loads = loads;
+  run->state.reaction = reaction;
+  if (!run->state.previous)
+    PetscCall(VecDuplicate(run->state.U, &run->state.previous));
+  PetscCall(VecCopy(run->state.U, run->state.previous));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -15,8 +15,8 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
   PetscReal least[2];
 
   PetscFunctionBeginUser;
-  run->rejected_inverted = PETSC_FALSE;
-  if (!run->reject_inverted || !*ok)
+  run->solve.rejected_inverted = PETSC_FALSE;
+  if (!run->solve.reject_inverted || !*ok)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) {
     const SbSpace s = run->model->space;
@@ -33,13 +33,14 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
   if (n[1] <= n[0])
     PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_FALSE;
-  run->rejected_inverted = PETSC_TRUE;
-  PetscCall(SbRunFail(
-    run,
-    "%s %g to %g would invert %" PetscInt_FMT
-    " more tet%s (smallest det F %.3g, before it %.3g), which -time_inverted reject; "
-    "re-mesh the body before that (-remesh_quality), or give it a finer mesh",
-    run->ts ? "the step from t, s =" : "the step from the load factor", (double)t, (double)(t + dt),
-    n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
+  run->solve.rejected_inverted = PETSC_TRUE;
+  PetscCall(
+    SbRunFail(run,
+              "%s %g to %g would invert %" PetscInt_FMT
+              " more tet%s (smallest det F %.3g, before it %.3g), which -time_inverted reject; "
+              "re-mesh the body before that (-remesh_quality), or give it a finer mesh",
+              run->solve.ts ? "the step from t, s =" : "the step from the load factor", (double)t,
+              (double)(t + dt), n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1],
+              (double)least[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -108,7 +108,7 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   const PetscScalar *u;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(run->U, &u));
+  PetscCall(VecGetArrayRead(run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] != part->label)
       continue;
@@ -126,7 +126,7 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
     for (PetscInt c = 0; c < 3; c++)
       sum[4] += PetscSqr(coordinate(s, u, 3 * i + c) - part->centre[c]);
   }
-  PetscCall(VecRestoreArrayRead(run->U, &u));
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum[4], 1, MPIU_REAL, MPI_SUM, s->comm));
   part->size = PetscSqrtReal(sum[4] / sum[0]);
   part->body = (PetscInt)(sum[5] / sum[0] + 0.5);
@@ -168,7 +168,7 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
       continue;
     PetscCall(VecPointwiseMult(w, d, z[k]));
     PetscCall(VecDot(w, z[k], &size));
-    PetscCall(MatMult(run->operator, z[k], w));
+    PetscCall(MatMult(run->solve.system, z[k], w));
     PetscCall(VecDot(w, z[k], &stiffness));
     if (PetscAbsReal(stiffness) > FREE * size)
       continue;
@@ -195,7 +195,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   PetscCall(measure(run, label, part));
   PetscCall(VecDuplicateVecs(d, 6, &Z));
   PetscCall(VecDuplicateVecs(d, 6, &z));
-  PetscCall(VecGetArrayRead(run->U, &u));
+  PetscCall(VecGetArrayRead(run->state.U, &u));
   for (PetscInt k = 0; k < 6; k++) {
     PetscScalar *to;
 
@@ -220,7 +220,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     PetscCall(VecCopy(Z[k], z[k]));
     PetscCall(SbSpaceProjectAdmissible(s, z[k]));
   }
-  PetscCall(VecRestoreArrayRead(run->U, &u));
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
 
   /* n admissible motions (problem 1), by coefficients of the six in the columns of x; Z becomes Z -
      P Z */
@@ -248,7 +248,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     for (PetscInt j = 0; j < n; j++) {
       PetscCall(VecPointwiseMult(w, d, y[j]));
       PetscCall(VecMDot(w, j + 1, y, M + 6 * j));
-      PetscCall(MatMult(run->operator, y[j], w));
+      PetscCall(MatMult(run->solve.system, y[j], w));
       PetscCall(VecMDot(w, j + 1, y, E + 6 * j));
     }
     PetscCall(eigen(n, E, M, value, &ok));
@@ -356,13 +356,13 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
 
   PetscFunctionBeginUser;
   *body = -1;
-  PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
+  PetscCall(MatHasOperation(run->solve.J, MATOP_GET_DIAGONAL, &diagonal));
   if (!diagonal)
     PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
 
   /* the first part with a free motion; the labels of all parts are sorted, the same on all ranks */
   PetscCall(SbSpaceCreateVec(s, &d));
-  PetscCall(MatGetDiagonal(run->J, d));
+  PetscCall(MatGetDiagonal(run->solve.J, d));
   PetscCall(VecAbs(d));
   PetscCall(label_parts(s, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));

@@ -21,9 +21,9 @@
   and damping the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f over u1 - u0 is at most
   the decrease of B, as B is convex: contact only dissipates.
 
-  The acceleration is part of the state (run->A), so a restart continues exactly. A step may be
-  repeated once, up to the first time of impact; the remainder is the next step (contact.c). A step
-  whose solve fails is halved and repeated; after four good steps its length doubles, up to the
+  The acceleration is part of the state (run->state.A), so a restart continues exactly. A step may
+  be repeated once, up to the first time of impact; the remainder is the next step (solve.c). A
+  step whose solve fails is halved and repeated; after four good steps its length doubles, up to the
   nominal one. The local error for TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991),
   for implicit Euler h^2/2 a1.
 
@@ -68,17 +68,19 @@ typedef struct {
     struct {
       Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
       Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
-      Vec own0,
-        own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
+
+      /* Newmark with contact: accelerations without contact at start and end; else NULL */
+      Vec free0, free1;
       Vec work; /* NULL with explicit methods */
     };
     Vec all[11]; /* the same vectors */
   };
-  Vec U, V, A;    /* where the equation is evaluated; borrowed */
-  PetscReal rest; /* length of the remainder of a step after a time of impact, s; 0: none */
-  PetscReal
-    whole; /* length of the step before its division, s: the remainder ends at the original time */
-  PetscBool started; /* run->A holds the acceleration of the current state */
+  Vec U, V, A; /* where the equation is evaluated; borrowed */
+
+  /* a step that was divided at a time of impact, s; 0: none. The remainder ends at the original
+     time */
+  PetscReal remainder, undivided; /* length of its second part, and of both */
+  PetscBool started;              /* run->state.A holds the acceleration of the current state */
 } SecondOrder;
 
 /* Computes v1 and a1 from the end displacement X. */
@@ -88,7 +90,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
   const PetscReal h = ts->time_step;
   const PetscReal beta = so->set.beta;
   const PetscReal gamma = so->set.gamma;
-  const Vec A0 = so->own0 ? so->own0 : so->run->A;
+  const Vec A0 = so->free0 ? so->free0 : so->run->state.A;
 
   PetscFunctionBeginUser;
   if (so->set.method == SB_METHOD_EULER_IMPLICIT) {
@@ -125,8 +127,8 @@ static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t)
     PetscCall(VecAYPX(so->Xa, so->set.alpha_f, so->X0));
     PetscCall(VecWAXPY(so->Va, -1., so->V0, so->V1));
     PetscCall(VecAYPX(so->Va, so->set.alpha_f, so->V0));
-    PetscCall(VecWAXPY(so->Aa, -1., so->run->A, so->A1));
-    PetscCall(VecAYPX(so->Aa, so->set.alpha_m, so->run->A));
+    PetscCall(VecWAXPY(so->Aa, -1., so->run->state.A, so->A1));
+    PetscCall(VecAYPX(so->Aa, so->set.alpha_m, so->run->state.A));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,7 +146,7 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   if (so->set.alpha_f != 1.)
     PetscCall(VecScale(F, 1. / so->set.alpha_f));
   if (so->run->model->barrier_apart)
-    PetscCall(SbContactSetGradient(&so->run->model->contacts, X, so->run->barrier_weight,
+    PetscCall(SbContactSetGradient(&so->run->model->contacts, X, so->run->solve.barrier_weight,
                                    PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,7 +183,7 @@ static PetscErrorCode predict(void *ctx)
 
   PetscFunctionBeginUser;
   if (!ts->usessnes) {
-    PetscCall(VecWAXPY(so->V1, h, run->A, so->V0));
+    PetscCall(VecWAXPY(so->V1, h, run->state.A, so->V0));
     PetscCall(
       VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
     PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
@@ -189,19 +191,19 @@ static PetscErrorCode predict(void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecCopy(so->X0, so->X1));
-  if (run->velocity_predictor)
+  if (run->solve.velocity_predictor)
     PetscCall(VecAXPY(so->X1, h, so->V0));
   PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
 
   /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
-  if (run->single && warm) {
+  if (run->solve.single && warm) {
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
     if (Y)
-      PetscCall(VecAXPBY(Y, run->velocity_predictor ? 0. : -h, 0., so->V0));
+      PetscCall(VecAXPBY(Y, run->solve.velocity_predictor ? 0. : -h, 0., so->V0));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -225,7 +227,7 @@ static SbSolvedStep solved_step(TS ts)
 {
   const SecondOrder *s = (SecondOrder *)ts->data;
 
-  return (SbSolvedStep){ts->ptime, ts->time_step, s->X0, s->V0,       s->run->A,
+  return (SbSolvedStep){ts->ptime, ts->time_step, s->X0, s->V0,       s->run->state.A,
                         s->X1,     s->V1,         s->A1, ts->usessnes};
 }
 
@@ -247,10 +249,10 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
     PetscCall(SbContactSetGradient(&run->model->contacts, so->X1, -1., PETSC_TRUE, NULL, so->work));
-    PetscCall(VecPointwiseDivide(so->work, so->work, run->mass));
+    PetscCall(VecPointwiseDivide(so->work, so->work, run->state.mass));
     PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
     PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
-    PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->A));
+    PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->state.A));
     PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
   }
   if (*ok && so->set.impulses) {
@@ -261,9 +263,9 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       PetscCall(
         SbContactSetProjectVelocity(&run->model->contacts, ts->ptime + h, h, so->X1, so->V1));
     PetscCall(VecAYPX(so->work, -1., so->V1));
-    PetscCall(VecCopy(so->A1, so->own1));
-    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->own1));
-    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->own1));
+    PetscCall(VecCopy(so->A1, so->free1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->free1));
+    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->free1));
     PetscCall(VecAXPY(so->A1, 1. / h, so->work));
   }
   if (!*ok && !ts->usessnes)
@@ -287,104 +289,168 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TSStep_SecondOrder(TS ts)
+/* The acceleration and the penalty on jumps at the start of a step, and a copy of its state, to
+   which a rejected attempt returns. */
+static PetscErrorCode begin_step(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscBool explicit = (PetscBool)!ts->usessnes;
   const SbRun run = so->run;
-  PetscInt cuts = 0;
   PetscBool jumps;
 
   PetscFunctionBeginUser;
 
   /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other
      state */
-  if (!so->started && run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
-    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_TRUE, run->A));
+  if (!so->started && run->clock.step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
+    PetscCall(
+      SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_TRUE, run->state.A));
 
   /* the penalty on jumps of CR and DG for this step */
   PetscCall(SbRunFollowJumps(run, &jumps));
-  if (so->own0 && (!so->started || jumps)) {
-    PetscCall(VecCopy(run->A, so->own0));
-    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->own0));
+  if (so->free0 && (!so->started || jumps)) {
+    PetscCall(VecCopy(run->state.A, so->free0));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->free0));
   }
   so->started = PETSC_TRUE;
 
-  /* copy the initial state, to which a rejected step returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
-  run->stage = so->Xa;
-  run->stage_start = so->X0;
-  run->stage_part = so->set.alpha_f;
-  for (;;) {
+  run->solve.stage.U = so->Xa;
+  run->solve.stage.start = so->X0;
+  run->solve.stage.part = so->set.alpha_f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the error of a solved attempt lets it be accepted, and the length of the next one, s. */
+static PetscErrorCode choose_length(TS ts, PetscReal *next, PetscBool *accept)
+{
+  const SecondOrder *so = (const SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  PetscReal h = ts->time_step;
+  PetscBool fixed;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
+  if (fixed) {
+    /* return to the nominal length: double it after four steps without halving */
+    if (run->clock.good_steps >= 3)
+      h = PetscMin(2. * ts->time_step, run->clock.dt);
+
+    /* the remainder of a step after a time of impact, and the length from before it */
+    if (so->undivided > 0.)
+      h = so->remainder > 0. ? so->remainder : so->undivided;
+  }
+  PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, next, accept));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of the attempt becomes the state; next: length of the next step, s. */
+static PetscErrorCode accept_step(TS ts, PetscReal next)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  SbRunClock *clock = &so->run->clock;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->A1, so->run->state.A));
+  if (so->free0)
+    PetscCall(VecCopy(so->free1, so->free0));
+  ts->ptime += ts->time_step;
+  clock->good_steps = next > ts->time_step ? 0 : clock->good_steps + 1;
+  clock->stop_reason[0] = 0;
+  ts->time_step = next;
+
+  /* a step up to an impact, or its remainder */
+  if (so->remainder > 0.)
+    so->remainder = 0.;
+  else
+    so->undivided = 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The length after a failed attempt, s: half of it; or up to the time of impact, which is no
+   failure and whose remainder is the next step. */
+static PetscReal shorter_length(TS ts, PetscInt *halvings)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal impact = so->run->clock.time_of_impact;
+  PetscReal next = 0.5 * ts->time_step;
+
+  so->undivided = so->remainder = 0.;
+  if (!so->run->solve.rejected_inverted && impact < 1.) {
+    next = impact * ts->time_step;
+    so->undivided = ts->time_step;
+    so->remainder = ts->time_step - next;
+    (*halvings)--;
+  }
+  return next;
+}
+
+/* Back to the start of the step, to repeat it with the length `next`, s; *again: that may help. */
+static PetscErrorCode reject_attempt(TS ts, PetscReal next, PetscInt *halvings, PetscBool *again)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  SbRunClock *clock = &run->clock;
+  const PetscBool hopeless = (PetscBool)(!ts->usessnes || clock->stopped);
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->X0, ts->vec_sol));
+  PetscCall(VecCopy(so->V0, ts->vec_dot));
+  ts->reject++;
+  run->counters.rejected++;
+  clock->good_steps = 0;
+
+  /* bounds the number of halvings, also when steps in between succeed */
+  *again = (PetscBool)(!hopeless && ++*halvings <= clock->max_halvings &&
+                       next >= SHORTEST * clock->dt && !SbRunTooShort(run, next));
+  if (*again) {
+    ts->time_step = next;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  ts->reason = TS_DIVERGED_STEP_REJECTED;
+  if (!hopeless && clock->stop_reason[0])
+    SbAppend(sizeof(clock->stop_reason), clock->stop_reason,
+             "; try a shorter -ts_dt, or loads and motions that begin gently "
+             "(docs/guides/when_it_fails.md, R1)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSStep_SecondOrder(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  PetscInt halvings = 0;
+  PetscBool again = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_step(ts));
+  while (again) {
     const SbAttempt attempt = {solved_step(ts), predict, contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE;
     PetscBool accept = PETSC_FALSE;
-    PetscBool fixed;
-    PetscReal next, h;
+    PetscReal next;
 
     /* one attempt */
-    run->may_end_at_impact =
-      (PetscBool)(run->model->contacts.ends_step && !cuts && so->whole == 0.);
-    run->time_of_impact = 1.;
+    run->clock.may_end_at_impact =
+      (PetscBool)(run->model->contacts.ends_step && !halvings && so->undivided == 0.);
+    run->clock.time_of_impact = 1.;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
-    ts->snes_its = run->newton_total - run->newton_before + run->newton_step;
-    ts->ksp_its = run->linear_total - run->linear_before + run->linear_step;
+    ts->snes_its = run->counters.newton - run->counters.newton_before + run->counters.newton_step;
+    ts->ksp_its = run->counters.linear - run->counters.linear_before + run->counters.linear_step;
+
+    /* its error, and the next length */
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
+      PetscCall(choose_length(ts, &next, &accept));
+    } else
+      next = shorter_length(ts, &halvings);
 
-      /* return to the nominal length: double it after four steps without halving */
-      PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-      h = fixed && run->good_steps >= 3 ? PetscMin(2. * ts->time_step, run->dt) : ts->time_step;
-      if (fixed && so->whole > 0.)
-        h = so->rest > 0. ? so->rest : so->whole;
-      PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
-      if (accept) {
-        PetscCall(VecCopy(so->A1, run->A));
-        if (so->own0)
-          PetscCall(VecCopy(so->own1, so->own0));
-        ts->ptime += ts->time_step;
-        run->good_steps = next > ts->time_step ? 0 : run->good_steps + 1;
-        ts->time_step = next;
-        run->stop_reason[0] = 0;
-
-        /* a step up to an impact, or its remainder, was accepted */
-        if (so->rest > 0.)
-          so->rest = 0.;
-        else
-          so->whole = 0.;
-        break;
-      }
-    } else if (!run->rejected_inverted && run->time_of_impact < 1.) {
-      /* repeat the step up to the time of impact; the next one is the remainder */
-      next = run->time_of_impact * ts->time_step;
-      so->whole = ts->time_step;
-      so->rest = ts->time_step - next;
-      cuts--;
-    } else {
-      so->whole = so->rest = 0.;
-      next = 0.5 * ts->time_step;
-    }
-
-    /* rejected: restore the initial state, and repeat the step with another length */
-    PetscCall(VecCopy(so->X0, ts->vec_sol));
-    PetscCall(VecCopy(so->V0, ts->vec_dot));
-    ts->reject++;
-    run->rejected_total++;
-    run->good_steps = 0;
-
-    // bounds the number of halvings, also when steps in between succeed
-    if (explicit || run->stopped || ++cuts > run->max_halvings || next < SHORTEST * run->dt ||
-        SbRunTooShort(run, next)) {
-      ts->reason = TS_DIVERGED_STEP_REJECTED;
-      if (!explicit && !run->stopped && run->stop_reason[0])
-        SbAppend(sizeof(run->stop_reason), run->stop_reason,
-                 "; try a shorter -ts_dt, or loads and motions that begin gently "
-                 "(docs/guides/when_it_fails.md, R1)");
+    if (accept) {
+      PetscCall(accept_step(ts, next));
       break;
     }
-    ts->time_step = next;
+    PetscCall(reject_attempt(ts, next, &halvings, &again));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -398,14 +464,15 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
   PetscReal absolute, relative;
 
   PetscFunctionBeginUser;
-  if (so->run->post_solve.error) {
+  if (so->run->monitors.post_solve.error) {
     const SbSolvedStep step = solved_step(ts);
 
-    PetscCall((*so->run->post_solve.error)(so->run, &step, so->run->post_solve.ctx, order, wlte));
+    PetscCall((*so->run->monitors.post_solve.error)(so->run, &step,
+                                                    so->run->monitors.post_solve.ctx, order, wlte));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
-    PetscCall(VecWAXPY(so->work, -1., so->run->A, so->A1));
+    PetscCall(VecWAXPY(so->work, -1., so->run->state.A, so->A1));
     PetscCall(VecAYPX(so->work, h * h * (so->set.beta - 1. / 6.), so->X1));
     *order = 3;
   } else {
@@ -437,9 +504,20 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
   const PetscBool staged = (PetscBool)(so->set.alpha_f != 1. || so->set.alpha_m != 1.);
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 11; k++)
-    if (k < 5 || (k < 8 ? staged : k < 10 ? so->set.impulses : ts->usessnes))
+
+  /* in the order of the vectors: both ends, stage, accelerations without contact, work */
+  for (int k = 0; k < 11; k++) {
+    PetscBool needed = PETSC_TRUE;
+
+    if (k >= 5)
+      needed = staged;
+    if (k >= 8)
+      needed = so->set.impulses;
+    if (k >= 10)
+      needed = ts->usessnes;
+    if (needed)
       PetscCall(VecDuplicate(ts->vec_sol, &so->all[k]));
+  }
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,7 +9,7 @@
 
   Not replaced: solvers chosen by -ksp_type or -pc_type; factorisations of the saddle-point system
   of contact; solves along an arc length; static systems with a free rigid motion (rigid_modes.c),
-  which are singular; exact tangents that Newton's method will project (newton.c).
+  which are singular; exact tangents that Newton's method will project (src/newton).
 
   petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not
   public.
@@ -64,7 +64,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, memory, 1, SB_MPI_BOOL, MPI_LOR, l->run->model->comm));
   if (ksp->reason == KSP_DIVERGED_PC_FAILED)
     PetscCall(
-      PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solver,
+      PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solve.solver,
                     *memory ? "not enough memory" : "its set-up met a pivot that is not positive"));
   else {
     PetscCall(KSPGetOperators(ksp, &A, NULL));
@@ -76,7 +76,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
     PetscCall(VecDestroy(&r));
     PetscCall(PetscSNPrintf(
       text, size, "%s of %s after %" PetscInt_FMT " iterations, %.2g of the residual left", reason,
-      l->run->solver, ksp->its, (double)(residual / load)));
+      l->run->solve.solver, ksp->its, (double)(residual / load)));
   }
   if (!l->again)
     l->failures[0] = 0;
@@ -89,7 +89,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 {
   const SbRun run = l->run;
   const SbSpace s = run->model->space;
-  const SbSolverPreset *old = run->solver_used;
+  const SbSolverPreset *old = run->solve.solver_used;
   const char *prefix;
   PetscReal rtol, atol;
   void *test;
@@ -113,38 +113,38 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
   /* another operator if `next` needs another matrix type */
   if (old->create || next->create || old->matrix != next->matrix) {
-    PetscCall(MatDestroy(&run->J));
-    PetscCall(SbSolverCreateOperator(s, next, &run->J));
+    PetscCall(MatDestroy(&run->solve.J));
+    PetscCall(SbSolverCreateOperator(s, next, &run->solve.J));
 
-    /* the nonsymmetric operator multiplies by run->J anyway */
-    if (!run->nonsymmetric.U) {
-      Mat *whole = SbConstraintsSeparate(s) ? &run->whole : &run->operator;
+    /* the nonsymmetric operator multiplies by run->solve.J anyway */
+    if (!run->solve.nonsymmetric.U) {
+      Mat *whole = SbConstraintsSeparate(s) ? &run->solve.unprojected : &run->solve.system;
 
       PetscCall(MatDestroy(whole));
-      PetscCall(PetscObjectReference((PetscObject)run->J));
-      *whole = run->J;
+      PetscCall(PetscObjectReference((PetscObject)run->solve.J));
+      *whole = run->solve.J;
     }
     if (SbConstraintsSeparate(s)) {
-      s->constraints->K = run->J;
-      s->constraints->whole = run->whole;
+      s->constraints->K = run->solve.J;
+      s->constraints->whole = run->solve.unprojected;
     }
-    PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
+    PetscCall(SNESSetJacobian(run->solve.snes, run->solve.system, run->solve.J, NULL, NULL));
   }
 
   /* the options of the new solver, set up as at the start of a run */
-  run->solver_used = next;
-  PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
-  PetscCall(SbSolverSetUp(run->snes, s, next));
+  run->solve.solver_used = next;
+  PetscCall(PetscStrncpy(run->solve.solver, next->name, sizeof(run->solve.solver)));
+  PetscCall(SbSolverSetUp(run->solve.snes, s, next));
   PetscCall(KSPSetFromOptions(ksp));
-  PetscCall(SbSolverFinish(run->snes, s, next, run->J));
+  PetscCall(SbSolverFinish(run->solve.snes, s, next, run->solve.J));
   PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(attach(l, ksp));
 
   /* the tangent at Newton's iterate, in the new matrix */
-  run->tangent_known = PETSC_FALSE;
-  PetscCall(SNESGetSolution(run->snes, &X));
-  PetscCall(SNESComputeJacobian(run->snes, X, run->operator, run->J));
-  PetscCall(KSPSetOperators(ksp, run->operator, run->J));
+  run->solve.tangent_known = PETSC_FALSE;
+  PetscCall(SNESGetSolution(run->solve.snes, &X));
+  PetscCall(SNESComputeJacobian(run->solve.snes, X, run->solve.system, run->solve.J));
+  PetscCall(KSPSetOperators(ksp, run->solve.system, run->solve.J));
   PetscCall(SbSolverUpdateSymmetry(ksp, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,12 +160,12 @@ static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
   PetscCall(VecZeroEntries(x));
 
   /* keep the relative tolerance of this Newton step (Eisenstat and Walker) */
-  PetscCall(SNESKSPGetUseEW(l->run->snes, &forcing));
-  PetscCall(SNESKSPSetUseEW(l->run->snes, PETSC_FALSE));
+  PetscCall(SNESKSPGetUseEW(l->run->solve.snes, &forcing));
+  PetscCall(SNESKSPSetUseEW(l->run->solve.snes, PETSC_FALSE));
   l->again = PETSC_TRUE;
   PetscCall(KSPSolve(ksp, b, x));
   l->again = outer;
-  PetscCall(SNESKSPSetUseEW(l->run->snes, forcing));
+  PetscCall(SNESKSPSetUseEW(l->run->solve.snes, forcing));
   ksp->its += its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,7 +174,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
 {
   SbSolverList l = (SbSolverList)ctx;
   SbRun run = l->run;
-  const SbSolverPreset *next = run->solver_used;
+  const SbSolverPreset *next = run->solve.solver_used;
   PetscBool memory;
   PetscBool simpler = PETSC_FALSE;
   PetscBool minres, newton;
@@ -219,9 +219,9 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
 
   /* then the next solver of the list, with a warning: of a preset, in Newton's method, if b is
      finite */
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
-                                      SNESKSPONLY, ""));
-  PetscCall(SNESGetSolution(run->snes, &X));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->solve.snes, &newton, SB_SNES_NEWTON,
+                                      SNESNEWTONLS, SNESKSPONLY, ""));
+  PetscCall(SNESGetSolution(run->solve.snes, &X));
   PetscCall(VecNorm(b, NORM_2, &size));
   if (!l->own || !newton || !X || SbConstraintsFactored(run->model->space) ||
       PetscIsInfOrNanReal(size))
@@ -237,7 +237,8 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(
     SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
-  PetscCall(PetscSNPrintf(run->solver_reason, sizeof(run->solver_reason), "after %s", text));
+  PetscCall(
+    PetscSNPrintf(run->solve.solver_reason, sizeof(run->solve.solver_reason), "after %s", text));
   PetscCall(replace(l, ksp, next));
   PetscCall(solve_again(l, ksp, b, x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -250,23 +251,24 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   KSP ksp;
 
   PetscFunctionBeginUser;
-  if (!run->J)
+  if (!run->solve.J)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&l));
   l->run = run;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &type));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &pc));
-  l->own = (PetscBool)(!type && !pc &&
-                       !run->arc.on); /* arc length needs the inertia from its factorisation */
-  PetscCall(SNESGetKSP(run->snes, &ksp));
+  l->own =
+    (PetscBool)(!type && !pc &&
+                !run->clock.arc.on); /* arc length needs the inertia from its factorisation */
+  PetscCall(SNESGetKSP(run->solve.snes, &ksp));
   PetscCall(attach(l, ksp));
-  run->solver_list = l;
+  run->solve.fallbacks = l;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations)
 {
-  SbSolverList l = run->solver_list;
+  SbSolverList l = run->solve.fallbacks;
   PetscBool apart;
   char system[128];
 
@@ -274,7 +276,7 @@ PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, P
   if (!l)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsHasName(NULL, NULL, "-contact_pc_type", &apart));
-  PetscCall(SbContactSystemDescribe(run->contact_choice, system, sizeof(system)));
+  PetscCall(SbContactSystemDescribe(run->solve.contact_choice, system, sizeof(system)));
   PetscCall(PetscSNPrintf(
     l->failures, sizeof(l->failures), "%s of %s after %" PetscInt_FMT " iterations%s",
     KSPConvergedReasons[reason], system, iterations,
@@ -284,8 +286,8 @@ PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, P
 
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
 {
-  const SbSolverList l = run->solver_list;
-  const SbSolverPreset *next = run->solver_used;
+  const SbSolverList l = run->solve.fallbacks;
+  const SbSolverPreset *next = run->solve.solver_used;
   uint32_t tried = 0;
   char causes[256] = "";
   const SbModel m = run->model;

@@ -42,7 +42,7 @@ static PetscErrorCode predict(void *ctx)
 
   PetscFunctionBeginUser;
   l->run->model->load = l->factor;
-  PetscCall(VecCopy(l->run->U, l->X));
+  PetscCall(VecCopy(l->run->state.U, l->X));
   PetscCall(SbModelPrescribe(l->run->model, l->factor, l->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -64,12 +64,12 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(l->X, &forces));
   PetscCall(VecDuplicate(l->X, &way));
-  PetscCall(VecWAXPY(way, -1., l->run->U, l->X));
+  PetscCall(VecWAXPY(way, -1., l->run->state.U, l->X));
   for (int k = 0; k < 2; k++) {
-    PetscCall(SbModelStrainEnergy(m, k ? l->X : l->run->U, forces, &psi[k], &n));
+    PetscCall(SbModelStrainEnergy(m, k ? l->X : l->run->state.U, forces, &psi[k], &n));
     PetscCall(VecDot(forces, way, &work[k]));
   }
-  PetscCall(PetscInfo(l->run->snes,
+  PetscCall(PetscInfo(l->run->solve.snes,
                       "strain energy %g -> %g J, work of the forces at both ends %g J\n",
                       (double)psi[0], (double)psi[1], (double)(work[0] + work[1])));
   *is = (PetscBool)((1. - EXCESS) * psi[1] > psi[0] + PetscMax(0., work[0] + work[1]));
@@ -79,7 +79,7 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 }
 
 /* Searches for an unsupported body, before a step is solved or after it was tried; *found:
-   run->stop_reason describes it. */
+   run->clock.stop_reason describes it. */
 static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved,
                                      PetscBool *found)
 {
@@ -91,7 +91,7 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
   PetscFunctionBeginUser;
   if (tried)
     PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-  run->free_body = (PetscBool)(body >= 0 && !l->contact);
+  run->solve.free_body = (PetscBool)(body >= 0 && !l->contact);
 
   /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising
      load, as a hanging weight, makes shorter steps succeed; a load that drives the motion has no
@@ -100,21 +100,21 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
     PetscReal work, force, way;
     Vec along, F;
 
-    PetscCall(VecDuplicate(run->U, &along));
-    PetscCall(VecDuplicate(run->U, &F));
+    PetscCall(VecDuplicate(run->state.U, &along));
+    PetscCall(VecDuplicate(run->state.U, &F));
     run->model->load = l->factor - l->length;
-    PetscCall(SNESComputeJacobian(run->snes, run->U, run->operator, run->J));
+    PetscCall(SNESComputeJacobian(run->solve.snes, run->state.U, run->solve.system, run->solve.J));
     PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, along));
     run->model->load = l->factor;
     if (body >= 0 && !l->contact) {
-      PetscCall(contact_residual((void *)l, run->U, F));
+      PetscCall(contact_residual((void *)l, run->state.U, F));
       PetscCall(SbSpaceProjectAdmissible(run->model->space, F));
       PetscCall(VecDot(F, along, &work));
       PetscCall(VecNorm(F, NORM_2, &force));
       PetscCall(VecNorm(along, NORM_2, &way));
-      run->free_body = (PetscBool)(PetscAbsReal(work) > PUSH * force * way);
+      run->solve.free_body = (PetscBool)(PetscAbsReal(work) > PUSH * force * way);
     }
-    if (!run->free_body)
+    if (!run->solve.free_body)
       loads = " but its loads";
     PetscCall(VecDestroy(&along));
     PetscCall(VecDestroy(&F));
@@ -143,12 +143,11 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   if (other)
     PetscCall(SbRunFail(l->run,
                         "load factor %g: contact was found at another equilibrium, with more "
-                        "strain energy than the loads "
-                        "have done work; use more -static_steps",
+                        "strain energy than the loads have done work; use more -static_steps",
                         (double)l->factor));
 
   /* find the cause of a failed solve */
-  if (!*ok && !other && !l->run->stopped) {
+  if (!*ok && !other && !l->run->clock.stopped) {
     char why[512] = "use more -static_steps";
 
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_FALSE, &found));
@@ -164,110 +163,118 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   }
 
   /* with balanced loads a singular system has solutions, up to any rigid motion */
-  if (*ok && !l->run->steps_total && !l->contact && l->run->newton_step) {
+  if (*ok && !l->run->counters.steps && !l->contact && l->run->counters.newton_step) {
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No equilibrium was found at the shortest increment `length`: says which load was reached, and the
+   likely cause. */
+static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal length,
+                                      PetscBool contact)
+{
+  char why[sizeof(run->clock.stop_reason)];
+  PetscBool unstable;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+  PetscCall(SbNewtonUnstable(run->solve.snes, &unstable));
+  if (run->solve.softening > LIMIT)
+    PetscCall(SbRunFail(run,
+                        "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
+                        "further on: a limit load is likely, as displacements grow %.0f times as "
+                        "fast with the load as before; -static_control arc_length goes past it",
+                        (double)factor, (double)length, (double)run->solve.softening));
+  else if (factor > 0. && unstable && !contact)
+    PetscCall(SbRunFail(run,
+                        "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
+                        "further on, where the tangent is not positive definite: a limit load is "
+                        "likely, or a bifurcation; -static_control arc_length goes past it%s%s",
+                        (double)factor, (double)length, run->solve.rejected_inverted ? "; " : "",
+                        run->solve.rejected_inverted ? why : ""));
+  else if (factor > 0.)
+    PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStaticSolve(SbRun run)
 {
-  const PetscReal nominal = 1. / (PetscReal)run->static_steps;
-  const PetscReal least = run->min_increment * nominal;
-  PetscReal factor = run->t0;
+  const PetscReal nominal = 1. / (PetscReal)run->clock.static_steps;
+  const PetscReal least = run->clock.min_increment * nominal;
+  PetscReal factor = run->clock.t0;
   PetscReal length = nominal;
   PetscReal rate;
   PetscReal slowest = 0.;
-  PetscInt step = run->step0;
-  PetscInt cuts = 0;
+  PetscInt step = run->clock.step0;
+  PetscInt halvings = 0;
   const PetscBool contact =
     (PetscBool)(run->model->contacts.nactive_set || run->model->contacts.npotential);
   Vec X;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(run->U, &X));
+  PetscCall(VecDuplicate(run->state.U, &X));
   run->model->load = factor;
   PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_FALSE));
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
     LoadStep load = {run, next, next - factor, X, contact};
-    const SbSolvedStep end = {factor, next - factor, run->U, .U = X, .solved = PETSC_TRUE};
+    const SbSolvedStep end = {factor, next - factor, run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE;
     PetscBool found;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure
        takes long */
-    if (run->nonsymmetric.U && !run->steps_total && !contact)
+    if (run->solve.nonsymmetric.U && !run->counters.steps && !contact)
       PetscCall(find_free_body(&load, PETSC_FALSE, PETSC_FALSE, &found));
-    if (!run->free_body)
+    if (!run->solve.free_body)
       PetscCall(SbRunAttempt(run, &attempt, &ok));
 
     /* halve a failed step, if that may help */
     if (!ok) {
-      char why[sizeof(run->stop_reason)];
-      PetscBool unstable;
-
-      run->rejected_total++;
+      run->counters.rejected++;
       length *= 0.5;
-      run->tangent_known = PETSC_FALSE;
-      if (run->stopped)
+      run->solve.tangent_known = PETSC_FALSE;
+      if (run->clock.stopped)
         PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
-      if (run->free_body || run->stopped)
+      if (run->solve.free_body || run->clock.stopped)
         break;
 
       /* halving does not help in a linear problem, unless contact is active */
       if (run->model->linear && !contact)
-        cuts = run->max_halvings;
-      if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length))
+        halvings = run->clock.max_halvings;
+      if (++halvings <= run->clock.max_halvings && length >= least && !SbRunTooShort(run, length))
         continue;
 
-      /* steps are too short: report the load reached, and the likely cause */
-      PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-      PetscCall(SbNewtonUnstable(run->snes, &unstable));
-      if (run->softening > LIMIT)
-        PetscCall(
-          SbRunFail(run,
-                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                    "on: a limit load is likely, as displacements grow %.0f times as fast with the "
-                    "load as before; -static_control arc_length goes past it",
-                    (double)factor, (double)(2. * length), (double)run->softening));
-      else if (factor > 0. && unstable && !contact)
-        PetscCall(
-          SbRunFail(run,
-                    "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
-                    "on, where the tangent is not positive definite: a limit load is likely, or a "
-                    "bifurcation; -static_control arc_length goes past it%s%s",
-                    (double)factor, (double)(2. * length), run->rejected_inverted ? "; " : "",
-                    run->rejected_inverted ? why : ""));
-      else if (factor > 0.)
-        PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+      PetscCall(report_shortest(run, factor, 2. * length, contact));
       break;
     }
-    run->stop_reason[0] = 0;
+    run->clock.stop_reason[0] = 0;
 
     /* the new equilibrium, and its growth of displacement with the load, relative to the slowest
        step */
-    PetscCall(VecAXPY(run->U, -1., X));
-    PetscCall(VecNorm(run->U, NORM_2, &rate));
+    PetscCall(VecAXPY(run->state.U, -1., X));
+    PetscCall(VecNorm(run->state.U, NORM_2, &rate));
     rate /= next - factor;
-    if (slowest == 0. || (rate < slowest && run->newton_step))
+    if (slowest == 0. || (rate < slowest && run->counters.newton_step))
       slowest = rate;
-    if (slowest > 0. && run->newton_step)
-      run->softening = rate / slowest;
-    PetscCall(VecCopy(X, run->U));
+    if (slowest > 0. && run->counters.newton_step)
+      run->solve.softening = rate / slowest;
+    PetscCall(VecCopy(X, run->state.U));
 
     /* re-meshing, effects and monitors */
-    run->after.dt = next - factor;
-    if (run->after.fn && next < 1.)
-      PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
+    run->monitors.post_step.dt = next - factor;
+    if (run->monitors.post_step.fn && next < 1.)
+      PetscCall((*run->monitors.post_step.fn)(run, step + 1, next, next - factor,
+                                              run->monitors.post_step.ctx, &run->clock.paused));
     if (next < 1.)
       PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
-    if (run->newton_step)
-      cuts = 0;
+    if (run->counters.newton_step)
+      halvings = 0;
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
-    if (run->paused || run->stopped)
+    if (run->clock.paused || run->clock.stopped)
       break;
 
     /* lengthen the next step */

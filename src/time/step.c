@@ -1,63 +1,78 @@
 /*
   One step, dynamic or static, from its start to its acceptance; see second_order.c, static.c.
 
-    attempt: predictor, Newton's method in the active-set iteration of contact, post-solve callback,
-    rejection accepted: effects save their history, the energy balance is updated
-    (energy_balance.c), monitors called
+    begin   effects move, surfaces are updated, candidates of contact are found; a guess
+    repeat  solves: gradient and Hessian of the incremental potential, linear solve, largest safe
+            length, line search (src/newton); contact set (solve.c); post-solve callback
+    accept  state, history of effects, energies (energy_balance.c), monitors; the next length
+    follows
+            in second_order.c and static.c
 */
 #include "time_impl.h"
 
 #define SHORT 0.13 /* step over the requested one, below which a warning follows: three halvings */
 #define FORGET 0.9 /* decay per step of the recorded longest step */
+#define FULL 0.9   /* step over the requested one, from which on it counts as that */
 
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 {
   const SbModel m = run->model;
+  SbStepsOf steps = SB_STEPS_IN_TIME;
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
-  if (!run->J || run->preset == SB_TIME_ALPHA2)
+  if (!run->solve.J || run->solve.preset == SB_TIME_ALPHA2)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceFollowJumps(m->space, run->U,
-                               !m->dynamic                      ? SB_STEPS_OF_LOAD
-                               : run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED
-                                                                : SB_STEPS_IN_TIME,
-                               changed));
+  if (run->solve.preset == SB_TIME_NEWMARK)
+    steps = SB_STEPS_UNDAMPED;
+  if (!m->dynamic)
+    steps = SB_STEPS_OF_LOAD;
+  PetscCall(SbSpaceFollowJumps(m->space, run->state.U, steps, changed));
   if (!m->dynamic || !*changed)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the acceleration follows from the changed forces */
   PetscCall(SbRunRestartAcceleration(run));
-  if (run->reaction)
-    PetscCall(SbRunReactions(run, run->t_now, run->reaction));
+  if (run->state.reaction)
+    PetscCall(SbRunReactions(run, run->clock.t, run->state.reaction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Warns of much shorter steps, once until they have the requested length again. */
+static PetscErrorCode warn_short(SbRun run, PetscReal dt)
+{
+  const PetscBool dynamic = run->model->dynamic;
+
+  PetscFunctionBeginUser;
+  if (!run->clock.stop_reason[0] || run->clock.stopped || run->monitors.warned_short ||
+      dt > SHORT * run->clock.dt)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  run->monitors.warned_short = PETSC_TRUE;
+  PetscCall(SbWarning(
+    run->model->comm,
+    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, "
+    "try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
+    (double)(dt / run->clock.dt), run->clock.stop_reason,
+    dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
+  const SbModel m = run->model;
   const SbSolvedStep *step = &a->step;
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
+  PetscBool warm = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  if (!run->model->dynamic)
-    PetscCall(SbSpaceFollowJumps(run->model->space, step->U0, SB_STEPS_OF_LOAD, NULL));
-  run->goes_on = PETSC_FALSE;
+  if (!m->dynamic)
+    PetscCall(SbSpaceFollowJumps(m->space, step->U0, SB_STEPS_OF_LOAD, NULL));
   for (int solves = 0; again; solves++) {
-    /* contact begins the step */
-    if (run->model->contacts.n) {
-      PetscReal speed;
+    /* begin: effects move, surfaces are updated, candidates of contact are found; a guess */
+    PetscCall(SbRunBeginSolve(run, a, warm));
 
-      PetscCall(SbModelStepSpeed(run->model, step->t, step->dt, step->U0, run->V, &speed));
-      PetscCall(
-        SbContactSetBeginStep(&run->model->contacts, step->t, step->dt, speed, step->U0, run->V));
-      run->barrier_start = step->U0;
-      run->barrier_dt = step->dt;
-    }
-
-    /* the predictor, and the solution from there; with contact by active-set iterations */
-    if (!run->goes_on)
-      PetscCall((*a->predict)(a->ctx));
+    /* the solution from there; explicit: the guess */
     if (!SbRunIsExplicit(run))
       PetscCall(SbRunSolveStep(run, a, &reason));
 
@@ -66,115 +81,136 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
-    if (*ok && !run->model->dynamic && !run->goes_on) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, step->U, SB_STEPS_OF_LOAD, &run->goes_on));
-      if (run->goes_on)
+    if (*ok && !m->dynamic && !warm) {
+      PetscCall(SbSpaceFollowJumps(m->space, step->U, SB_STEPS_OF_LOAD, &warm));
+      if (warm)
         continue;
     }
-    run->goes_on = PETSC_FALSE;
+    warm = PETSC_FALSE;
 
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
-    if (*ok && run->post_solve.fn && solves < SB_LOOKS)
-      PetscCall((*run->post_solve.fn)(run, step, run->post_solve.ctx, &again));
+    if (*ok && run->monitors.post_solve.fn && solves < SB_MAX_RESOLVES)
+      PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, &again));
   }
 
   /* -time_inverted reject */
   PetscCall(SbRunRejectInverted(run, step->t, step->dt, (Vec[2]){step->U0, step->U}, ok));
+  if (*ok)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* restore prescribed motions to the start of the step, in case the run ends there */
-  if (!*ok)
-    SbContactSetAdvance(&run->model->contacts, 0.);
-
-  /* warn of much shorter steps, once until they have the requested length again */
-  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened &&
-      step->dt <= SHORT * run->dt) {
-    run->shortened = PETSC_TRUE;
-    PetscCall(SbWarning(
-      run->model->comm,
-      "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
-      "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
-      (double)(step->dt / run->dt), run->stop_reason,
-      run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
-  }
+  SbContactSetAdvance(&m->contacts, 0.);
+  PetscCall(warn_short(run, step->dt));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Effects save their history of the step. */
+static PetscErrorCode save_history(SbRun run, PetscInt step, PetscReal t, PetscReal dt)
+{
+  const SbModel m = run->model;
+  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
+
+  PetscFunctionBeginUser;
+  if (!m->naccept)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
+  if (run->state.V)
+    PetscCall(SbSpaceGetLocalRead(m->space, run->state.V, &stage.v));
+  for (PetscInt e = 0; e < m->naccept; e++)
+    SbEffectCall(m->accept[e], accept, m->space, &stage);
+  if (run->state.V)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.V, &stage.v));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode call_monitors(SbRun run, const SbStep *step)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < run->monitors.n; k++)
+    PetscCall(run->monitors.list[k].fn(run, step, run->monitors.list[k].ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the iterations and rejections of the step to the totals. */
+static void count(SbRunCounters *c, PetscBool first, SbStep *now)
+{
+  now->newton = c->newton_step;
+  now->linear = c->linear_step;
+  now->rejected = c->rejected - c->rejected_seen;
+  c->newton += now->newton;
+  c->linear += now->linear;
+  c->steps += !first;
+  c->rejected_seen = c->rejected;
+  c->newton_step = c->linear_step = 0;
 }
 
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last)
 {
-  const PetscBool first = (PetscBool)(step == run->step0);
+  SbRunClock *clock = &run->clock;
+  const PetscBool first = (PetscBool)(step == clock->step0);
   const PetscReal begun = MPI_Wtime();
-  const SbModel m = run->model;
-  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
+  SbStep now = {.step = step,
+                .t = t,
+                .dt = dt,
+                .t_end = clock->t_end,
+                .step_end = -1,
+                .U = run->state.U,
+                .V = run->state.V,
+                .A = run->state.A};
   PetscBool jumps;
-  SbStep now = {
-    .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  run->t_now = t;
+  clock->t = t;
   if (first)
     PetscCall(SbRunFollowJumps(run, &jumps));
 
   /* monitors have seen this step already, before it was known to be the last one */
-  if (run->seen.U && run->seen.step == step) {
-    if (!run->stopped || first)
+  if (run->monitors.last.U && run->monitors.last.step == step) {
+    if (!clock->stopped || first)
       PetscFunctionReturn(PETSC_SUCCESS);
-    now = run->seen;
+    now = run->monitors.last;
     now.last = now.again = PETSC_TRUE;
-    for (PetscInt k = 0; k < run->nmonitor; k++)
-      PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
+    PetscCall(call_monitors(run, &now));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  now.last = (PetscBool)(last || run->stopped);
+
+  /* the clock */
+  clock->step = step;
+  now.last = (PetscBool)(last || clock->stopped);
   if (!first)
-    run->stop.longest_step =
-      PetscMax(FORGET * run->stop.longest_step, begun - run->stop.step_begun);
-  if (dt > 0.9 * run->dt)
-    run->shortened = PETSC_FALSE;
+    clock->stop.longest_step =
+      PetscMax(FORGET * clock->stop.longest_step, begun - clock->stop.step_begun);
+  if (dt > FULL * clock->dt)
+    run->monitors.warned_short = PETSC_FALSE;
+  if (clock->fixed)
+    now.step_end = step + (PetscInt)PetscCeilReal((clock->t_end - t) / clock->dt - 1e-6);
 
-  /* effects save their history */
-  run->step_now = step;
-  if (!first && m->naccept) {
-    PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-    if (run->V)
-      PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
-    for (PetscInt e = 0; e < m->naccept; e++)
-      SbEffectCall(m->accept[e], accept, m->space, &stage);
-    if (run->V)
-      PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
-    PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  }
-
-  /* energy balance */
-  if (run->want_energies)
+  /* history of effects, energies, reactions */
+  if (!first)
+    PetscCall(save_history(run, step, t, dt));
+  if (run->monitors.want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
-  else if (run->want_residual) {
-    if (!run->reaction)
-      PetscCall(VecDuplicate(run->U, &run->reaction));
-    PetscCall(SbRunReactions(run, t, run->reaction));
+  else if (run->monitors.want_residual) {
+    if (!run->state.reaction)
+      PetscCall(VecDuplicate(run->state.U, &run->state.reaction));
+    PetscCall(SbRunReactions(run, t, run->state.reaction));
   }
+  now.R = run->state.reaction;
+  now.energies = run->state.energies;
 
-  /* call monitors */
-  now.R = run->reaction;
-  now.energies = run->energies;
-  now.step_end =
-    run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;
-  now.newton = run->newton_step;
-  now.linear = run->linear_step;
-  now.rejected = run->rejected_total - run->rejected_seen;
-  now.wall = MPI_Wtime() - run->wall_start;
-  run->newton_total += now.newton;
-  run->linear_total += now.linear;
-  run->steps_total += !first;
-  run->rejected_seen = run->rejected_total;
-  run->newton_step = run->linear_step = 0;
-  for (PetscInt k = 0; k < run->nmonitor; k++)
-    PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
-  run->seen = now;
+  /* monitors */
+  count(&run->counters, first, &now);
+  now.wall = MPI_Wtime() - clock->wall_start;
+  PetscCall(call_monitors(run, &now));
+  run->monitors.last = now;
+
+  /* interactive values of the next step */
   if (SbLiveCount())
-    PetscCall(SbLiveAdvance(m->comm, t));
-  run->stop.step_begun = MPI_Wtime();
-  run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
+    PetscCall(SbLiveAdvance(run->model->comm, t));
+  clock->stop.step_begun = MPI_Wtime();
+  clock->stop.longest_output = PetscMax(clock->stop.longest_output, clock->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -34,19 +34,21 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   PetscFunctionBeginUser;
 
   /* keep the reason of an abandoned step */
-  if (run->stopped && run->stop_reason[0])
+  if (run->clock.stopped && run->clock.stop_reason[0])
     PetscFunctionReturn(PETSC_SUCCESS);
   va_start(args, format);
-  PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
+  PetscCall(
+    PetscVSNPrintf(run->clock.stop_reason, sizeof(run->clock.stop_reason), format, NULL, args));
   va_end(args);
-  PetscCall(PetscInfo(NULL, "%s\n", run->stop_reason));
+  PetscCall(PetscInfo(NULL, "%s\n", run->clock.stop_reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscBool SbRunTooShort(SbRun run, PetscReal dt)
 {
-  return (PetscBool)(run->rejected_inverted &&
-                     dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
+  return (PetscBool)(run->solve.rejected_inverted &&
+                     dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->clock.max_halvings) *
+                            run->clock.dt);
 }
 
 static double seconds(void)
@@ -86,7 +88,7 @@ PetscErrorCode SbRunCatchSignals(SbRun run)
   (void)sigemptyset(&action.sa_mask);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(signals); i++)
     (void)sigaction(signals[i], &action, NULL);
-  run->stop.listens = PETSC_TRUE;
+  run->clock.stop.listens = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,8 +101,8 @@ PetscErrorCode SbRunReadStop(SbRun run)
   char text[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  run->stop.begun = MPI_Wtime();
-  PetscCall(SbOptionReal(&SbRunScope, "stop_grace", &run->stop.grace));
+  run->clock.stop.begun = MPI_Wtime();
+  PetscCall(SbOptionReal(&SbRunScope, "stop_grace", &run->clock.stop.grace));
   PetscCall(SbOptionString(&SbRunScope, "wall_time", sizeof(text), text));
   if (!text[0])
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -112,9 +114,9 @@ PetscErrorCode SbRunReadStop(SbRun run)
     n = sscanf(text, "%d:%2d:%2d%n", &hour, &minute, &second, &end);
   if (n == 3 && !text[end] && day >= 0 && hour >= 0 && minute >= 0 && minute < 60 && second >= 0 &&
       second < 60)
-    run->stop.wall_time = 86400. * day + 3600. * hour + 60. * minute + second;
-  run->stop.listens = PETSC_TRUE;
-  PetscCheck(run->stop.wall_time > 0., PETSC_COMM_SELF, PETSC_ERR_USER,
+    run->clock.stop.wall_time = 86400. * day + 3600. * hour + 60. * minute + second;
+  run->clock.stop.listens = PETSC_TRUE;
+  PetscCheck(run->clock.stop.wall_time > 0., PETSC_COMM_SELF, PETSC_ERR_USER,
              "-wall_time %s is no duration: give hours:minutes:seconds, 1:30:00, or "
              "days-hours:minutes:seconds, 2-00:00:00",
              text);
@@ -123,23 +125,24 @@ PetscErrorCode SbRunReadStop(SbRun run)
 
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
 {
+  const char *why = "SIGUSR1";
   PetscMPIInt rank;
   int reason;
 
   PetscFunctionBeginUser;
-  if (!run->stop.listens || run->stopped)
+  if (!run->clock.stop.listens || run->clock.stopped)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the signal or WALL_TIME that ends the run, the same on all ranks; 0: none */
   PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
   reason =
-    asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
-  if (run->stop.wall_time > 0. && !rank) {
-    const PetscReal reserve =
-      PetscMin(RESERVE_LONGEST, RESERVE_PART * run->stop.wall_time) + 2. * run->stop.longest_output;
-    const PetscReal next = within ? 0. : STEP_FACTOR * run->stop.longest_step;
+    asked.signal && (!within || seconds() > asked.since + run->clock.stop.grace) ? asked.signal : 0;
+  if (run->clock.stop.wall_time > 0. && !rank) {
+    const PetscReal reserve = PetscMin(RESERVE_LONGEST, RESERVE_PART * run->clock.stop.wall_time) +
+                              2. * run->clock.stop.longest_output;
+    const PetscReal next = within ? 0. : STEP_FACTOR * run->clock.stop.longest_step;
 
-    if (MPI_Wtime() - run->stop.begun + reserve + next >= run->stop.wall_time)
+    if (MPI_Wtime() - run->clock.stop.begun + reserve + next >= run->clock.stop.wall_time)
       reason = WALL_TIME;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &reason, 1, MPI_INT, MPI_MAX, run->model->comm));
@@ -147,21 +150,23 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* no step fits into -wall_time: an error, else a requeued job would repeat this forever */
-  PetscCheck(reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(reason != WALL_TIME || step > run->clock.step0, run->model->comm, PETSC_ERR_USER_INPUT,
              "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a "
              "coarser mesh",
-             (double)run->stop.wall_time);
-  run->stopped = PETSC_TRUE;
-  run->paused = PETSC_FALSE;
-  run->stop_reason[0] = 0;
-  PetscCall(SbRunFail(run,
-                      "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
-                      reason == WALL_TIME ? "the end of -wall_time is near"
-                      : reason == SIGTERM ? "SIGTERM"
-                      : reason == SIGINT  ? "SIGINT"
-                                          : "SIGUSR1",
-                      within ? ", and the next step is given up" : "", step,
-                      run->model->dynamic ? "t =" : "load factor", (double)t,
-                      run->model->dynamic ? " s" : "", step > run->step0 ? "latest" : "auto"));
+             (double)run->clock.stop.wall_time);
+  if (reason == WALL_TIME)
+    why = "the end of -wall_time is near";
+  if (reason == SIGTERM)
+    why = "SIGTERM";
+  if (reason == SIGINT)
+    why = "SIGINT";
+  run->clock.stopped = PETSC_TRUE;
+  run->clock.paused = PETSC_FALSE;
+  run->clock.stop_reason[0] = 0;
+  PetscCall(
+    SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
+              why, within ? ", and the next step is given up" : "", step,
+              run->model->dynamic ? "t =" : "load factor", (double)t,
+              run->model->dynamic ? " s" : "", step > run->clock.step0 ? "latest" : "auto"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

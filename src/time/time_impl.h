@@ -4,7 +4,7 @@
 #pragma once
 #include "sbtime.h"
 
-#define SB_LOOKS 4 /* most repetitions of a step by a post-solve callback */
+#define SB_MAX_RESOLVES 4 /* most repetitions of a step by a post-solve callback */
 #define SB_TS_SECOND_ORDER "sb_second_order"
 
 /* The one-step methods of second_order.c. */
@@ -24,8 +24,8 @@ typedef struct {
 
 static inline PetscBool SbRunIsExplicit(SbRun run)
 {
-  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT ||
-                     run->preset == SB_TIME_EULER_SYMPLECTIC);
+  return (PetscBool)(run->solve.preset == SB_TIME_EULER_EXPLICIT ||
+                     run->solve.preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
 PetscErrorCode SbSecondOrderCreate(TS ts);
@@ -39,7 +39,7 @@ typedef struct {
     void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
   PetscErrorCode (*residual)(void *ctx, Vec U,
                              Vec R); /* residual without constraints, N; for contact */
-  /* computes the end state from U; if not ok run->stop_reason is the reason */
+  /* computes the end state from U; if not ok run->clock.stop_reason is the reason */
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, PetscBool *ok);
   void *ctx;
 } SbAttempt;
@@ -52,20 +52,21 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode
 SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                   PetscBool last); /* saves history, calls monitors; also at the start */
-#define SB_NEWTON_ITERATIONS 100
-/* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is
-   borrowed. */
-#define SB_SNES_NEWTON "newton"
-PetscErrorCode SbNewtonCreate(SNES snes);
-PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
-/* Whether a tangent of the last solve was indefinite; false for another SNESType or tangent. */
-PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
+
+/* incremental_potential.c: what Newton's method minimises, for run->solve.snes. Create: after the
+   type of the SNES is known. Collective. */
+typedef struct _p_SbPotential *SbPotential;
+PetscErrorCode SbPotentialCreate(SbRun run);
+PetscErrorCode SbPotentialDestroy(SbPotential *potential);
+/* Before a solve of the step; warm: it starts from the last one's solution, with its tolerance.
+   Collective. */
+PetscErrorCode SbPotentialBegin(SbPotential potential, const SbSolvedStep *step, PetscBool warm);
 
 /* stop.c: early end of runs. */
 /* Options -wall_time and -stop_grace. */
 PetscErrorCode SbRunReadStop(SbRun run);
-/* After a step that ended at t (within: in the next solve): sets run->stopped if it is to end.
-   Collective. */
+/* After a step that ended at t (within: in the next solve): sets run->clock.stopped if it is to
+   end. Collective. */
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* Whether inverted.c rejected the last step, and would reject one of length dt, s. */
@@ -73,7 +74,7 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /* inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted
    reject. U: displacements at its start and end. Not ok: it inverted tets; sets
-   run->rejected_inverted, stop_reason. */
+   run->solve.rejected_inverted, stop_reason. */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
                                    PetscBool *ok);
 
@@ -81,7 +82,8 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
 PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v,
                                 PetscReal shift_a, Mat J, Mat P, void *run);
-/* run->operator: the shell matrix of linear solves where the matrix lacks a part. Collective. */
+/* run->solve.system: the shell matrix of linear solves where the matrix lacks a part.
+   Collective. */
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
@@ -89,8 +91,8 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
    there. */
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
 
-/* solver_list.c, after SbSolverFinish(): solvers of run->snes that fail are replaced from here
-   on. */
+/* solver_list.c, after SbSolverFinish(): solvers of run->solve.snes that fail are replaced from
+   here on. */
 PetscErrorCode SbSolverListCreate(SbRun run);
 /* Message after a failed linear solve: solvers tried, with reasons, likely causes, advice.
    Collective. */
@@ -119,9 +121,22 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
    Collective. */
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
-/* SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change;
-   U: initial guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if
-   the active set does not converge. With run->may_end_at_impact, if nodes come into contact within
-   the step, it ends after the first solve with SNES_CONVERGED_ITERATING: to be repeated with the
-   fraction run->time_of_impact of its length. */
+/* integrator.c. Set-up: the TS, with its SNES. Integrate: the time loop, its failure in
+   run->clock.stop_reason. Collective. */
+PetscErrorCode SbRunSetUpIntegrator(SbRun run);
+PetscErrorCode SbRunIntegrate(SbRun run);
+/* contact_check.c: errors unless integrator and solver go with the contact of the scene. */
+PetscErrorCode SbRunCheckContact(SbRun run);
+
+/* solve.c. */
+/* Type, tolerances and options of run->solve.snes, and of the TS. Collective. */
+PetscErrorCode SbRunSetUpSolver(SbRun run);
+/* Before each solve of an attempt: effects move, surfaces are updated, candidates of contact are
+   found; warm: U is the last solution, else the predictor's guess. Collective. */
+PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool warm);
+/* Solves a step by run->solve.snes, with contact until the active set does not change; U: initial
+   guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active
+   set does not converge. With run->clock.may_end_at_impact, if nodes come into contact within the
+   step, it ends after the first solve with SNES_CONVERGED_ITERATING: to be repeated with the
+   fraction run->clock.time_of_impact of its length. */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

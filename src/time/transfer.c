@@ -10,30 +10,30 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   PetscReal dt;
 
   PetscFunctionBeginUser;
-  to->step0 = to->step_now = from->step_now;
-  to->t0 = to->t_now = from->t_now;
+  to->clock.step0 = to->clock.step = from->clock.step;
+  to->clock.t0 = to->clock.t = from->clock.t;
   to->model->load =
-    to->model->dynamic ? 1. : from->t_now; /* a failed attempt has changed the load factor */
-  to->energies = from->energies;
-  to->energy_start = from->energy_start;
-  to->energy_most = from->energy_most;
-  to->gain_said = from->gain_said;
-  to->newton_total = to->newton_before = from->newton_total;
-  to->linear_total = to->linear_before = from->linear_total;
-  to->rejected_total = to->rejected_seen = from->rejected_total;
-  to->steps_total = from->steps_total;
-  to->wall_start = from->wall_start;
-  to->stop = from->stop;
+    to->model->dynamic ? 1. : from->clock.t; /* a failed attempt has changed the load factor */
+  to->state.energies = from->state.energies;
+  to->state.energy_start = from->state.energy_start;
+  to->state.energy_most = from->state.energy_most;
+  to->monitors.warned_gain = from->monitors.warned_gain;
+  to->counters.newton = to->counters.newton_before = from->counters.newton;
+  to->counters.linear = to->counters.linear_before = from->counters.linear;
+  to->counters.rejected = to->counters.rejected_seen = from->counters.rejected;
+  to->counters.steps = from->counters.steps;
+  to->clock.wall_start = from->clock.wall_start;
+  to->clock.stop = from->clock.stop;
 
   /* fixed steps return to their nominal length, also after a shortened one */
-  if (!SbRunIsExplicit(to) || from->dt_given)
-    to->dt = from->dt;
-  to->dt_given = from->dt_given;
-  if (to->ts) {
-    PetscCall(TSGetTimeStep(from->ts, &dt));
-    if (to->fixed_step)
-      dt = to->dt;
-    PetscCall(TSSetTimeStep(to->ts, PetscMin(dt, to->t_end - from->t_now)));
+  if (!SbRunIsExplicit(to) || from->clock.dt_given)
+    to->clock.dt = from->clock.dt;
+  to->clock.dt_given = from->clock.dt_given;
+  if (to->solve.ts) {
+    PetscCall(TSGetTimeStep(from->solve.ts, &dt));
+    if (to->clock.fixed)
+      dt = to->clock.dt;
+    PetscCall(TSSetTimeStep(to->solve.ts, PetscMin(dt, to->clock.t_end - from->clock.t)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -43,13 +43,13 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   Vec own;
 
   PetscFunctionBeginUser;
-  if (!run->A || !(SbRunIsExplicit(run) ||
-                   (run->preset == SB_TIME_NEWMARK && !run->model->contacts.nactive_set)))
+  if (!run->state.A || !(SbRunIsExplicit(run) || (run->solve.preset == SB_TIME_NEWMARK &&
+                                                  !run->model->contacts.nactive_set)))
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(run->A, &own));
-  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, PETSC_TRUE, own));
-  PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_FALSE, run->A));
-  PetscCall(VecAXPY(run->A, 1., own));
+  PetscCall(VecDuplicate(run->state.A, &own));
+  PetscCall(SbFormAcceleration(run, run->clock.t, run->state.U, run->state.V, PETSC_TRUE, own));
+  PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_FALSE, run->state.A));
+  PetscCall(VecAXPY(run->state.A, 1., own));
   PetscCall(VecDestroy(&own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -63,7 +63,7 @@ static PetscErrorCode make_linear_fail(HardRun *r, PetscInt until, PetscInt fail
   *s = (Saboteur){until, failures};
   both[0] = s;
   PetscCall(KSPConvergedDefaultCreate(&both[1]));
-  PetscCall(SNESGetKSP(r->run->snes, &ksp));
+  PetscCall(SNESGetKSP(r->run->solve.snes, &ksp));
   PetscCall(KSPSetConvergenceTest(ksp, linear_fails, both, forget_linear));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,7 +110,7 @@ static PetscErrorCode newton_fails_often(HardRun *r)
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&s));
   *s = (Saboteur){30, 3};
-  PetscCall(SNESSetConvergenceTest(r->run->snes, newton_fails, s, forget_newton));
+  PetscCall(SNESSetConvergenceTest(r->run->solve.snes, newton_fails, s, forget_newton));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

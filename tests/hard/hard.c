@@ -71,9 +71,9 @@ static PetscErrorCode prepare(HardRun *r, PetscInt k)
   PetscCall(PetscRandomSeed(r->random));
   PetscCall(HardMeasureBegin(r));
   if (k && c->jitter > 0.)
-    PetscCall(HardNoise(r, c->jitter * r->size, r->run->U));
+    PetscCall(HardNoise(r, c->jitter * r->size, r->run->state.U));
   if (k && c->jitter_speed > 0.)
-    PetscCall(HardNoise(r, c->jitter_speed, r->run->V));
+    PetscCall(HardNoise(r, c->jitter_speed, r->run->state.V));
   if (c->start)
     PetscCall((*c->start)(r));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -82,7 +82,7 @@ static PetscErrorCode prepare(HardRun *r, PetscInt k)
 /* Checks that a run ended as the case requires. */
 static void check_end(const HardRun *r)
 {
-  const char *reason = r->run->stop_reason;
+  const char *reason = r->run->clock.stop_reason;
   const char *stops = r->c->stops;
 
   if (!stops)
@@ -110,8 +110,8 @@ static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt 
   else
     PetscCall(SbRunSolve(r.run));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "work|%s|%d|%d|%d|%d|%d|%.2f\n", c->name, (int)k,
-                        (int)t.run->steps_total, (int)t.run->rejected_total,
-                        (int)t.run->newton_total, (int)t.run->linear_total,
+                        (int)t.run->counters.steps, (int)t.run->counters.rejected,
+                        (int)t.run->counters.newton, (int)t.run->counters.linear,
                         (double)(clock() - began) / CLOCKS_PER_SEC));
   PetscCall(HardMeasureEnd(&r));
   check_end(&r);

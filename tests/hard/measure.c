@@ -67,7 +67,7 @@ PetscErrorCode HardMeasureBegin(HardRun *r)
   for (int k = 0; k < 3; k++)
     r->size = PetscMax(r->size, high[k] - low[k]);
   r->value[HARD_MIN_J_EVER] = PETSC_MAX_REAL;
-  r->run->want_energies = PETSC_TRUE;
+  r->run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(r->run, HardMeasureStep, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -115,8 +115,9 @@ static void look_energies(HardRun *r, const SbStep *step)
   }
 
   /* energy that is missing in the balance may be regained later */
-  r->most = PetscMax(r->most, PetscMax(now, r->run->energy_start + PetscAbsReal(e->load_work) +
-                                              PetscAbsReal(e->prescribed_work)));
+  r->most =
+    PetscMax(r->most, PetscMax(now, r->run->state.energy_start + PetscAbsReal(e->load_work) +
+                                      PetscAbsReal(e->prescribed_work)));
   r->gain = PetscMax(r->gain, -e->integrator_loss);
   value[HARD_ACCOUNT] = PetscMax(value[HARD_ACCOUNT], PetscAbsReal(e->integrator_loss));
   value[HARD_RISE] = PetscMax(value[HARD_RISE], now - r->last);
@@ -174,7 +175,7 @@ static PetscErrorCode measure_shape(HardRun *r)
   PetscReal worst = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(s, r->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, r->run->state.U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
     for (int i = 0; i < 4; i++) {
       for (int j = 0; j < i; j++) {
@@ -192,7 +193,7 @@ static PetscErrorCode measure_shape(HardRun *r)
       }
     }
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, r->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, r->run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(&worst, &r->value[HARD_SHAPE], 1, MPIU_REAL, MPI_MAX, r->model->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,9 +207,9 @@ static PetscErrorCode measure_max_J(HardRun *r)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(s->mesh->ncell_owned, &J));
-  PetscCall(SbSpaceGetLocalRead(s, r->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, r->run->state.U, &u));
   SbSpaceCellState(s, u, NULL, J, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, r->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, r->run->state.U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
     most = PetscMax(most, J[c]);
   PetscCall(PetscFree(J));
@@ -229,7 +230,7 @@ PetscErrorCode HardMeasureEnd(HardRun *r)
   PetscFunctionBeginUser;
   PetscCall(measure_shape(r));
   PetscCall(measure_max_J(r));
-  value[HARD_REJECTED] = (PetscReal)r->run->rejected_total;
+  value[HARD_REJECTED] = (PetscReal)r->run->counters.rejected;
   value[HARD_EXCESS] = part(r->gain, r->most);
   value[HARD_ACCOUNT] = part(value[HARD_ACCOUNT], r->most);
   value[HARD_RISE] = part(value[HARD_RISE], r->most);

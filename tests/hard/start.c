@@ -51,7 +51,7 @@ PetscErrorCode HardPlace(HardRun *r,
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArray(r->run->U, &u));
+  PetscCall(VecGetArray(r->run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscReal *x = s->node_x + 3 * i;
     PetscReal to[3];
@@ -61,7 +61,7 @@ PetscErrorCode HardPlace(HardRun *r,
       if (!(s->fixed[i] & (1 << k)))
         u[3 * i + k] += to[k] - x[k];
   }
-  PetscCall(VecRestoreArray(r->run->U, &u));
+  PetscCall(VecRestoreArray(r->run->state.U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +92,7 @@ PetscErrorCode HardStartRandom(HardRun *r)
 {
   PetscFunctionBeginUser;
   PetscCall(HardPlace(r, at_origin));
-  PetscCall(HardNoise(r, 0.5 * r->size, r->run->U));
+  PetscCall(HardNoise(r, 0.5 * r->size, r->run->state.U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -107,7 +107,7 @@ PetscErrorCode HardStartPoint(HardRun *r)
 {
   PetscFunctionBeginUser;
   PetscCall(HardStartExactPoint(r));
-  PetscCall(HardNoise(r, POINT * r->size, r->run->U));
+  PetscCall(HardNoise(r, POINT * r->size, r->run->state.U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

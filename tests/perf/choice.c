@@ -35,16 +35,16 @@ static PetscErrorCode report(const TestScene *scene, PetscInt made, double secon
   (void)getrusage(RUSAGE_SELF, &use);
   mb = (double)use.ru_maxrss / 1024.;
   PetscCallMPI(MPI_Allreduce(&mb, &most, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "solver %s: %s\n", scene->run->solver,
-                        scene->run->solver_reason));
-  if (scene->run->stop_reason[0])
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "stopped: %s\n", scene->run->stop_reason));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "solver %s: %s\n", scene->run->solve.solver,
+                        scene->run->solve.solver_reason));
+  if (scene->run->clock.stop_reason[0])
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "stopped: %s\n", scene->run->clock.stop_reason));
   PetscCall(perf_fact("tets", (double)scene->model->mesh->Ncell));
   PetscCall(perf_fact("slivers", (double)made));
   PetscCall(perf_fact("unknowns", 3. * (double)scene->model->space->Nnode));
-  PetscCall(perf_fact("newton", (double)scene->run->newton_total));
-  PetscCall(perf_fact("linear", (double)scene->run->linear_total));
-  PetscCall(perf_fact("rejected", (double)scene->run->rejected_total));
+  PetscCall(perf_fact("newton", (double)scene->run->counters.newton));
+  PetscCall(perf_fact("linear", (double)scene->run->counters.linear));
+  PetscCall(perf_fact("rejected", (double)scene->run->counters.rejected));
   PetscCall(perf_fact("cpu", seconds));
   PetscCall(perf_fact("memory", most));
   PetscFunctionReturn(PETSC_SUCCESS);

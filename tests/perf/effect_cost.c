@@ -100,8 +100,8 @@ static PetscErrorCode run(const char *mesh, const Part *part, PetscBool named, C
   PetscCall(PetscMallocGetCurrentUsage(&after));
   cost->setup = after - before;
   PetscCall(SbRunSolve(t.run));
-  PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_PLIB, "%s %s: %s", part->family,
-             part->name, t.run->stop_reason);
+  PetscCheck(!t.run->clock.stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_PLIB, "%s %s: %s",
+             part->family, part->name, t.run->clock.stop_reason);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

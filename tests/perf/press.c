@@ -161,12 +161,12 @@ int main(int argc, char **argv)
                   (double)friction, (int)steps));
   PetscCall(PetscStrlcat(text, more, sizeof(text)));
   PetscCall(perf_open(text, &t));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
   PetscCall(SbRunAddMonitor(t.run, watch, &w));
   PetscCall(SbRunSolve(t.run));
-  if (t.run->stop_reason[0])
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->stop_reason));
+  if (t.run->clock.stop_reason[0])
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->clock.stop_reason));
   PetscCall(test_scene_close(&t));
   PetscCall(PetscFinalize());
   return 0;

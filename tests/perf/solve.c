@@ -34,16 +34,16 @@ int main(int argc, char **argv)
     start = perf_start();
     PetscCall(SbRunSolve(t.run));
     used = perf_stop(start);
-    PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s",
-               t.run->stop_reason);
+    PetscCheck(!t.run->clock.stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s",
+               t.run->clock.stop_reason);
     PetscCall(perf_sample("solve_wall", "s", used.wall));
     PetscCall(perf_sample("solve_cpu", "s", used.cpu));
-    PetscCall(perf_sample("solve_iterations", "1", (double)t.run->linear_total));
+    PetscCall(perf_sample("solve_iterations", "1", (double)t.run->counters.linear));
     if (!r)
       PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
     if (!r)
-      PetscCall(
-        PetscPrintf(PETSC_COMM_WORLD, "note %s: %s\n", t.run->solver, t.run->solver_reason));
+      PetscCall(PetscPrintf(PETSC_COMM_WORLD, "note %s: %s\n", t.run->solve.solver,
+                            t.run->solve.solver_reason));
     PetscCall(test_scene_close(&t));
   }
   PetscCall(PetscFinalize());

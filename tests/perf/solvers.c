@@ -334,22 +334,22 @@ static PetscErrorCode set_up(Case *c, KSP *ksp)
 
   PetscFunctionBeginUser;
   PetscCall(SbRunSetUp(run));
-  PetscCall(SNESSetUp(run->snes));
-  PetscCall(SNESGetKSP(run->snes, ksp));
-  PetscCall(VecDuplicate(run->U, &U));
-  PetscCall(VecDuplicate(run->U, &c->x));
-  PetscCall(VecDuplicate(run->U, &c->b));
+  PetscCall(SNESSetUp(run->solve.snes));
+  PetscCall(SNESGetKSP(run->solve.snes, ksp));
+  PetscCall(VecDuplicate(run->state.U, &U));
+  PetscCall(VecDuplicate(run->state.U, &c->x));
+  PetscCall(VecDuplicate(run->state.U, &c->b));
   c->scene.model->load = 1.;
   PetscCall(SbModelPrescribe(c->scene.model, 1., U));
-  PetscCall(SNESComputeFunction(run->snes, U, c->b));
+  PetscCall(SNESComputeFunction(run->solve.snes, U, c->b));
   PetscCall(VecScale(c->b, -1.));
-  PetscCall(SNESComputeJacobian(run->snes, U, run->J, run->J));
+  PetscCall(SNESComputeJacobian(run->solve.snes, U, run->solve.J, run->solve.J));
   if (c->plain)
-    PetscCall(MatSetNearNullSpace(run->J, NULL));
-  PetscCall(KSPSetOperators(*ksp, run->J, run->J));
+    PetscCall(MatSetNearNullSpace(run->solve.J, NULL));
+  PetscCall(KSPSetOperators(*ksp, run->solve.J, run->solve.J));
   PetscCall(KSPGetPC(*ksp, &pc));
   if (c->star)
-    PetscCall(set_star_preconditioner(c->scene.model->space, run->J, pc));
+    PetscCall(set_star_preconditioner(c->scene.model->space, run->solve.J, pc));
   PetscCall(KSPSetUp(*ksp));
   PetscCall(KSPSetUpOnBlocks(*ksp));
   if (c->star)
@@ -375,7 +375,7 @@ static PetscErrorCode report(Case *c, KSP ksp)
   PetscCall(KSPGetIterationNumber(ksp, &its));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   PetscCall(VecDuplicate(c->b, &r));
-  PetscCall(MatMult(c->scene.run->J, c->x, r));
+  PetscCall(MatMult(c->scene.run->solve.J, c->x, r));
   PetscCall(VecAYPX(r, -1., c->b));
   PetscCall(VecNorm(c->b, NORM_2, &size));
   PetscCall(VecNorm(r, NORM_2, &residual));
@@ -389,7 +389,7 @@ static PetscErrorCode report(Case *c, KSP ksp)
   PetscCall(perf_fact("reason", (double)reason));
   PetscCall(perf_fact("residual", (double)(residual / size)));
   PetscCall(perf_fact("memory", most));
-  if (!strcmp(c->scene.run->solver, "cg_two_level")) {
+  if (!strcmp(c->scene.run->solve.solver, "cg_two_level")) {
     PetscCall(KSPGetPC(ksp, &pc));
     PetscCall(test_pc_view(pc, sizeof(text), text));
     simple = (PetscBool)!strstr(text, "type: icc");

@@ -51,7 +51,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
       PetscCall(perf_sample("iterations", "1", (double)step->linear));
   }
   if (wall > w->limit)
-    PetscCall(TSSetConvergedReason(run->ts, TS_CONVERGED_USER));
+    PetscCall(TSSetConvergedReason(run->solve.ts, TS_CONVERGED_USER));
   w->before = wall;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,11 +90,11 @@ int main(int argc, char **argv)
   start = perf_start();
   PetscCall(SbRunSolve(t.run));
   PetscCall(perf_fact("cpu_per_step_ms",
-                      1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->steps_total, 1)));
-  PetscCall(TSGetSNES(t.run->ts, &snes));
+                      1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->counters.steps, 1)));
+  PetscCall(TSGetSNES(t.run->solve.ts, &snes));
   PetscCall(tell_work(snes));
-  if (t.run->stop_reason[0])
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->stop_reason));
+  if (t.run->clock.stop_reason[0])
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->clock.stop_reason));
   PetscCall(test_scene_close(&t));
   PetscCall(PetscFinalize());
   return 0;

@@ -148,17 +148,17 @@ int main(int argc, char **argv)
   before = counts();
   PetscCall(SbRunSolve(t.run));
   after = counts();
-  PetscCheck(!t.run->stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s",
-             t.run->stop_reason);
+  PetscCheck(!t.run->clock.stop_reason[0], PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "%s",
+             t.run->clock.stop_reason);
   PetscCall(PetscLogEventGetPerfInfo(0, SbEvents[SB_EVENT_SOLVER_SETUP], &setup));
-  PetscCall(SNESGetKSP(t.run->snes, &ksp));
+  PetscCall(SNESGetKSP(t.run->solve.snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
-  if (!strcmp(t.run->solver, "cg_two_level"))
+  if (!strcmp(t.run->solve.solver, "cg_two_level"))
     PetscCall(find_solved(pc, size, &most, &total));
   PetscCall(perf_fact("ranks", size));
   PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
   PetscCall(perf_fact("unknowns", 3. * (double)t.model->space->Nnode));
-  PetscCall(perf_sample("iterations", "1", (double)t.run->linear_total));
+  PetscCall(perf_sample("iterations", "1", (double)t.run->counters.linear));
   PetscCall(print_counts("", (Counts){after.messages - before.messages, after.bytes - before.bytes,
                                       after.reductions - before.reductions,
                                       after.gathered - before.gathered}));

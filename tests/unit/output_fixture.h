@@ -61,29 +61,29 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   const SbSpace space = scene->model->space;
   SbStep step = {.step = k,
                  .t = (PetscReal)k * dt,
-                 .dt = k == run->step0 ? 0. : dt,
-                 .t_end = run->t_end,
+                 .dt = k == run->clock.step0 ? 0. : dt,
+                 .t_end = run->clock.t_end,
                  .step_end = 10,
                  .last = last};
   PetscScalar *u, *v, *a;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArray(run->U, &u));
-  PetscCall(VecGetArray(run->V, &v));
-  PetscCall(VecGetArray(run->A, &a));
+  PetscCall(VecGetArray(run->state.U, &u));
+  PetscCall(VecGetArray(run->state.V, &v));
+  PetscCall(VecGetArray(run->state.A, &a));
   for (PetscInt i = 0; i < space->nnode_owned; i++)
     motion(space->node_x + 3 * i, step.t, u + 3 * i, v + 3 * i, a + 3 * i);
-  PetscCall(VecRestoreArray(run->U, &u));
-  PetscCall(VecRestoreArray(run->V, &v));
-  PetscCall(VecRestoreArray(run->A, &a));
-  step.U = run->U;
-  step.V = run->V;
-  step.A = run->A;
-  if (run->want_residual && !run->reaction)
-    PetscCall(VecDuplicate(run->U, &run->reaction));
-  if (run->want_residual)
-    PetscCall(VecSet(run->reaction, 0.5));
-  step.R = run->reaction;
+  PetscCall(VecRestoreArray(run->state.U, &u));
+  PetscCall(VecRestoreArray(run->state.V, &v));
+  PetscCall(VecRestoreArray(run->state.A, &a));
+  step.U = run->state.U;
+  step.V = run->state.V;
+  step.A = run->state.A;
+  if (run->monitors.want_residual && !run->state.reaction)
+    PetscCall(VecDuplicate(run->state.U, &run->state.reaction));
+  if (run->monitors.want_residual)
+    PetscCall(VecSet(run->state.reaction, 0.5));
+  step.R = run->state.reaction;
   step.energies = (SbEnergies){.kinetic = 100. + k,
                                .strain = 200. + k,
                                .load_work = 300. + k,
@@ -91,13 +91,13 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
                                .volume = 0.008,
                                .min_J = 1. / 3.,
                                .ninverted = 7};
-  run->energies = step.energies;
+  run->state.energies = step.energies;
   step.newton = 2;
   step.linear = 30;
   step.wall = 0.01 * (PetscReal)k;
-  run->steps_total = k;
-  for (PetscInt m = 0; m < run->nmonitor; m++)
-    PetscCall(run->monitor[m].fn(run, &step, run->monitor[m].ctx));
+  run->counters.steps = k;
+  for (PetscInt m = 0; m < run->monitors.n; m++)
+    PetscCall(run->monitors.list[m].fn(run, &step, run->monitors.list[m].ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

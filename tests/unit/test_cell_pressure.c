@@ -102,11 +102,11 @@ static PetscErrorCode test_scene(void)
     "-body_b_poisson 0.25 -body_c_young 2000 -body_c_poisson 0.4 -time newmark -ts_dt 0.1 "
     "-ts_max_time 1",
     &scene));
-  PetscCall(test_fill(scene.model, squeeze, scene.run->U));
+  PetscCall(test_fill(scene.model, squeeze, scene.run->state.U));
   PetscCall(PetscMalloc1(scene.model->mesh->ncell_owned, &p));
-  PetscCall(SbSpaceGetLocalRead(scene.model->space, scene.run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(scene.model->space, scene.run->state.U, &u));
   SbSpaceCellState(scene.model->space, u, NULL, NULL, NULL, p);
-  PetscCall(SbSpaceRestoreLocalRead(scene.model->space, scene.run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(scene.model->space, scene.run->state.U, &u));
   for (PetscInt c = 0; c < scene.model->mesh->ncell_owned; c++) {
     const PetscInt b = scene.model->mesh->cell_body[c];
 

@@ -36,8 +36,8 @@ static PetscErrorCode open_scene(const char *options, const char *element, const
   PetscCall(test_options(text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
   PetscCall(test_scene_run(t));
-  t->run->saddle = (PetscBool)(how == FACTORED);
-  t->run->saddle_choice = how == FACTORED ? 1 : 0;
+  t->run->solve.saddle = (PetscBool)(how == FACTORED);
+  t->run->solve.saddle_choice = how == FACTORED ? 1 : 0;
   PetscCall(SbModelSetUp(t->model));
   SB_CHECK(!t->model->space->constraints, "a scene that constrains nothing has no memory for it");
   PetscCall(SbSpaceCreateConstraints(t->model->space, (PetscBool)(how != PROJECTED), nonsymmetric));
@@ -88,17 +88,17 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   Vec x, y, z;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelTangent(t->model, 1, 0, 0, 1, t->run->U, NULL, t->run->J));
-  PetscCall(VecDuplicate(t->run->U, &x));
+  PetscCall(SbModelTangent(t->model, 1, 0, 0, 1, t->run->state.U, NULL, t->run->solve.J));
+  PetscCall(VecDuplicate(t->run->state.U, &x));
   PetscCall(VecDuplicate(x, &y));
   PetscCall(VecDuplicate(x, &z));
   PetscCall(fill(x, 1));
   PetscCall(fill(y, 2));
   PetscCall(SbSpaceProjectAdmissible(s, x));
   PetscCall(SbSpaceProjectAdmissible(s, y));
-  PetscCall(MatMult(t->run->operator, y, z));
+  PetscCall(MatMult(t->run->solve.system, y, z));
   PetscCall(VecDot(x, z, &xAy));
-  PetscCall(MatMult(t->run->operator, x, z));
+  PetscCall(MatMult(t->run->solve.system, x, z));
   PetscCall(VecDot(y, z, &yAx));
   PetscCall(VecDot(x, z, &xAx));
   SB_CHECK(xAx > 0, "%s: not positive", what);
@@ -141,16 +141,16 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
   SB_CHECK(SbSpaceIsConstrained(s) && s->constraints->tilted == (mu > 0), "there are constraints");
   if (mu <= 0)
     PetscCall(check_operator(&t, solver));
-  PetscCall(VecZeroEntries(t.run->U));
-  PetscCall(SNESGetKSP(t.run->snes, &ksp));
+  PetscCall(VecZeroEntries(t.run->state.U));
+  PetscCall(SNESGetKSP(t.run->solve.snes, &ksp));
   PetscCall(SbSolverUpdateSymmetry(ksp, s));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0], "%s: %s", solver, t.run->stop_reason);
+  SB_CHECK(!t.run->clock.stop_reason[0], "%s: %s", solver, t.run->clock.stop_reason);
 
   /* displacement of the end, and its constraint force */
-  PetscCall(VecDuplicate(t.run->U, &R));
-  PetscCall(SbModelResidual(t.model, 1, t.run->U, NULL, NULL, PETSC_FALSE, R));
-  PetscCall(SbSpaceGetLocalRead(s, t.run->U, &u));
+  PetscCall(VecDuplicate(t.run->state.U, &R));
+  PetscCall(SbModelResidual(t.model, 1, t.run->state.U, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(SbSpaceGetLocalRead(s, t.run->state.U, &u));
   PetscCall(VecGetArrayRead(R, &r));
   SbConstraintsComputeForces(s, u, r);
   for (PetscInt k = 0; k < s->constraints->n; k++) {
@@ -167,7 +167,7 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
     if (at_end(s, i, 0))
       total[0] += r[3 * i + 2];
   PetscCall(VecRestoreArrayRead(R, &r));
-  PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t.run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(&total[0], &total[1], 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
 
   /* supports of DG carry their force elsewhere; then only the directions count */
@@ -184,9 +184,9 @@ static PetscErrorCode compare(const TestScene *t, const TestScene *other, PetscR
   PetscReal size, difference;
 
   PetscFunctionBeginUser;
-  PetscCall(VecNorm(other->run->U, NORM_INFINITY, &size));
-  PetscCall(VecAXPY(t->run->U, -1., other->run->U));
-  PetscCall(VecNorm(t->run->U, NORM_INFINITY, &difference));
+  PetscCall(VecNorm(other->run->state.U, NORM_INFINITY, &size));
+  PetscCall(VecAXPY(t->run->state.U, -1., other->run->state.U));
+  PetscCall(VecNorm(t->run->state.U, NORM_INFINITY, &difference));
   SB_CHECK(size > 1e-4 && difference < tolerance * size, "%s: differs by %g of %g", what,
            difference, size);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -253,22 +253,22 @@ static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiff
   }
   PetscCall(SbSpaceAssembleConstraints(t.model->space));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0], "%s: %s", solver, t.run->stop_reason);
-  SB_CHECK(t.run->linear_total < most, "%s: %d iterations", solver, (int)t.run->linear_total);
+  SB_CHECK(!t.run->clock.stop_reason[0], "%s: %s", solver, t.run->clock.stop_reason);
+  SB_CHECK(t.run->counters.linear < most, "%s: %d iterations", solver, (int)t.run->counters.linear);
   SB_CHECK(!t.model->space->constraints->added == (how != BESIDE), "%s: anchors", solver);
 
   /* K has no negative eigenvalue in the null space of the constraints; all of -K are negative */
   if (negative) {
-    PetscCall(SbSolverCountNegativeEigenvalues(t.run->snes, t.model->space, &count));
+    PetscCall(SbSolverCountNegativeEigenvalues(t.run->solve.snes, t.model->space, &count));
     SB_CHECK(count == 0, "%" PetscInt_FMT " negative eigenvalues", count);
-    PetscCall(MatScale(t.run->J, -1.));
-    PetscCall(SNESGetKSP(t.run->snes, &ksp));
+    PetscCall(MatScale(t.run->solve.J, -1.));
+    PetscCall(SNESGetKSP(t.run->solve.snes, &ksp));
     PetscCall(KSPGetPC(ksp, &pc));
-    PetscCall(VecDuplicate(t.run->U, &z));
+    PetscCall(VecDuplicate(t.run->state.U, &z));
     PetscCall(PCSetUp(pc));
-    PetscCall(PCApply(pc, t.run->U, z));
+    PetscCall(PCApply(pc, t.run->state.U, z));
     PetscCall(VecDestroy(&z));
-    PetscCall(SbSolverCountNegativeEigenvalues(t.run->snes, t.model->space, &count));
+    PetscCall(SbSolverCountNegativeEigenvalues(t.run->solve.snes, t.model->space, &count));
     SB_CHECK(count == 3 * t.model->space->Nnode - t.model->space->constraints->nexact,
              "%" PetscInt_FMT " negative eigenvalues", count);
   }

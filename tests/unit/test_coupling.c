@@ -213,11 +213,11 @@ static PetscErrorCode solve(TestScene *t, const char *element, PetscReal force[3
 
   PetscFunctionBeginUser;
   PetscCall(SbRunSolve(t->run));
-  SB_CHECK(!t->run->stop_reason[0], "%s: %s", element, t->run->stop_reason);
+  SB_CHECK(!t->run->clock.stop_reason[0], "%s: %s", element, t->run->clock.stop_reason);
 
   /* the two forces: opposite and equal, without a moment */
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &stage.u));
   for (PetscInt e = 0; e < m->neffect; e++)
     if (m->effect[e]->ops.couplings)
       PetscCall((*m->effect[e]->ops.force)(m->effect[e], s, &stage, f));
@@ -232,19 +232,19 @@ static PetscErrorCode solve(TestScene *t, const char *element, PetscReal force[3
       sum[6 + k] += moment[k];
     }
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &stage.u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &stage.u));
   PetscCall(PetscFree(f));
 
   /* supports react with the same forces; all else is in equilibrium */
-  PetscCall(VecDuplicate(t->run->U, &F));
-  PetscCall(SbModelResidual(m, 1., t->run->U, NULL, NULL, PETSC_FALSE, F));
+  PetscCall(VecDuplicate(t->run->state.U, &F));
+  PetscCall(SbModelResidual(m, 1., t->run->state.U, NULL, NULL, PETSC_FALSE, F));
   PetscCall(VecGetArrayRead(F, &r));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     if (s->node_body[i / 3] == 0 && s->fixed[i / 3])
       sum[9 + i % 3] += r[i];
   PetscCall(VecRestoreArrayRead(F, &r));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 12, MPIU_REAL, MPI_SUM, s->comm));
-  PetscCall(SbModelResidual(m, 1., t->run->U, NULL, NULL, PETSC_TRUE, F));
+  PetscCall(SbModelResidual(m, 1., t->run->state.U, NULL, NULL, PETSC_TRUE, F));
   PetscCall(VecNorm(F, NORM_2, &norm));
   PetscCall(VecDestroy(&F));
   size = PetscSqrtReal(SbDot3(sum, sum));

@@ -12,7 +12,7 @@ static PetscReal difference(TestScene *scene, PetscReal t)
   const SbSpace space = scene->model->space;
   const PetscScalar *state[3];
   PetscReal worst = 0.;
-  Vec vec[3] = {scene->run->U, scene->run->V, scene->run->A};
+  Vec vec[3] = {scene->run->state.U, scene->run->state.V, scene->run->state.A};
 
   for (int k = 0; k < 3; k++)
     (void)VecGetArrayRead(vec[k], &state[k]);
@@ -36,8 +36,8 @@ static PetscErrorCode test_round_trip(void)
   PetscFunctionBeginUser;
   PetscCall(
     test_scene_open_in(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
-  SB_CHECK(scene.run->want_energies, "works and losses are part of the state");
-  scene.run->energy_start = 1. / 7.;
+  SB_CHECK(scene.run->monitors.want_energies, "works and losses are part of the state");
+  scene.run->state.energy_start = 1. / 7.;
   for (PetscInt k = 0; k <= 9; k++)
     PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
@@ -50,13 +50,14 @@ static PetscErrorCode test_round_trip(void)
   SB_CHECK(!fixture_exists(dir, "checkpoint.tmp"), "a temporary file is left");
   PetscCall(test_open_in(dir, &scene,
                          HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir));
-  SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
-           (int)scene.run->step0, scene.run->t0);
+  SB_CHECK(scene.run->clock.step0 == 5 && scene.run->clock.t0 == 5 * 0.1,
+           "restart at step %d, t = %.17g", (int)scene.run->clock.step0, scene.run->clock.t0);
   SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", difference(&scene, 0.5));
-  SB_CHECK(scene.run->energy_start == 1. / 7. && scene.run->energies.load_work == 305. &&
-             scene.run->energies.prescribed_work == 400.,
-           "running totals: %.17g %g %g", scene.run->energy_start, scene.run->energies.load_work,
-           scene.run->energies.prescribed_work);
+  SB_CHECK(scene.run->state.energy_start == 1. / 7. &&
+             scene.run->state.energies.load_work == 305. &&
+             scene.run->state.energies.prescribed_work == 400.,
+           "running totals: %.17g %g %g", scene.run->state.energy_start,
+           scene.run->state.energies.load_work, scene.run->state.energies.prescribed_work);
   SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
            "a checkpoint of what is computed again is still there");
   PetscCall(test_scene_close(&scene));
@@ -116,12 +117,12 @@ static PetscErrorCode test_next_step(void)
     PetscCall(
       test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
     PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
-    PetscCall(TSSetTimeStep(scene.run->ts, 0.025));
+    PetscCall(TSSetTimeStep(scene.run->solve.ts, 0.025));
     PetscCall(fixture_step(&scene, 1, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
     PetscCall(
       test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", cases[i].more));
-    PetscCall(TSGetTimeStep(scene.run->ts, &dt));
+    PetscCall(TSGetTimeStep(scene.run->solve.ts, &dt));
     SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, dt, cases[i].dt);
     PetscCall(test_scene_close(&scene));
   }
@@ -145,7 +146,7 @@ static PetscErrorCode test_hash(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     PetscCall(
       test_open_in(dir, &scene, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh));
-    hash[i] = ((SbOutput)scene.run->output)->mesh_hash;
+    hash[i] = ((SbOutput)scene.run->monitors.output)->mesh_hash;
     SB_CHECK((hash[i] == hash[0]) == (cases[i].same != PETSC_FALSE), "hash of '%s'", cases[i].mesh);
     PetscCall(test_scene_close(&scene));
   }

@@ -32,8 +32,8 @@ static PetscErrorCode check_back(PetscInt step)
   PetscCall(
     fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none -restart latest", NULL, &scene));
   g = scene.model->body[0].in_memory;
-  SB_CHECK(scene.run->step0 == step, "goes on from step %d, not %d", (int)scene.run->step0,
-           (int)step);
+  SB_CHECK(scene.run->clock.step0 == step, "goes on from step %d, not %d",
+           (int)scene.run->clock.step0, (int)step);
   SB_CHECK(g && g->step == GIVEN_STEP && g->mass == GIVEN_MASS && g->bound == GIVEN_BOUND,
            "numbers of the mesh");
   if (g && !test_rank) {

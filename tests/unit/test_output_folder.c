@@ -78,7 +78,7 @@ static PetscErrorCode test_fields(void)
   SB_CHECK_ERROR(SbFieldFind("-output_fields", "von_mizes", &found), PETSC_ERR_USER,
                  "-output_fields|'von_mizes'|von_mises");
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J,J,stress", &scene));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   SB_CHECK(out->nfield == 3 && !strcmp(out->field[2]->name, "body"),
            "a field named twice: %d fields", (int)out->nfield);
   SB_CHECK(out->sigma && out->J && !out->psi, "storage for cell quantities that nobody asked for");
@@ -86,7 +86,7 @@ static PetscErrorCode test_fields(void)
 
   // a static run has no velocity
   PetscCall(test_scene_open_in(dir, HELD " -time static -quiet", &scene));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   SB_CHECK(out->nfield == 4 && !strcmp(out->field[2]->name, "von_mises"),
            "a static run has %d fields", (int)out->nfield);
   PetscCall(test_scene_close(&scene));

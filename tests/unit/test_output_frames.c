@@ -128,8 +128,10 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
   for (PetscInt k = 0; k <= 3; k++)
     PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
   PetscCall(fixture_fields(dir, &h));
-  PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
-  PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, tolerance));
+  PetscCall(
+    check_values((SbOutput)scene.run->monitors.output, &h, "/step/0000/000002", 0.2, tolerance));
+  PetscCall(
+    check_values((SbOutput)scene.run->monitors.output, &h, "/step/0000/000003", 0.3, tolerance));
   PetscCall(SbH5Close(&h));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 4, "%d times in fields.xmf", (int)count(xmf, "<Time "));
@@ -153,8 +155,8 @@ static PetscErrorCode test_reaction(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER " -output_fields reaction", &scene));
-  out = (SbOutput)scene.run->output;
-  SB_CHECK(scene.run->want_residual, "the residual is not asked for");
+  out = (SbOutput)scene.run->monitors.output;
+  SB_CHECK(scene.run->monitors.want_residual, "the residual is not asked for");
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
   PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc2(3 * out->point.n, &x, 3 * out->point.n, &r));
@@ -187,7 +189,7 @@ static PetscErrorCode check_sets(const char *more)
   PetscCall(test_open_in(
     dir, &scene,
     HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s", more));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
   PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half,
@@ -239,7 +241,7 @@ static PetscErrorCode test_two_bodies(void)
       EULER,
     &scene));
   PetscCall(fixture_fields(dir, &h));
-  PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));
+  PetscCall(check_mesh((SbOutput)scene.run->monitors.output, &h, 0.016));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -364,7 +366,7 @@ static PetscErrorCode test_restart(void)
     PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir));
-  SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
+  SB_CHECK(scene.run->clock.step0 == 4, "restart at step %d", (int)scene.run->clock.step0);
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
            (int)count(xmf, "<Time "));
@@ -380,8 +382,8 @@ static PetscErrorCode test_restart(void)
   PetscCall(fixture_fields(dir, &h));
   SB_CHECK(H5Lexists(h.file, "/step/0000/000005", H5P_DEFAULT) <= 0,
            "the old step 5 is still there");
-  PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, 1e-6));
-  PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0001/000005", 0.5, 1e-6));
+  PetscCall(check_values((SbOutput)scene.run->monitors.output, &h, "/step/0000/000003", 0.3, 1e-6));
+  PetscCall(check_values((SbOutput)scene.run->monitors.output, &h, "/step/0001/000005", 0.5, 1e-6));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -394,8 +396,8 @@ static PetscErrorCode test_nothing(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(
     dir, BOX EULER "-output_fields none -output_history false -progress false", &scene));
-  SB_CHECK(scene.run->nmonitor == 0, "%d monitors", (int)scene.run->nmonitor);
-  SB_CHECK(!scene.run->want_energies && !scene.run->want_residual,
+  SB_CHECK(scene.run->monitors.n == 0, "%d monitors", (int)scene.run->monitors.n);
+  SB_CHECK(!scene.run->monitors.want_energies && !scene.run->monitors.want_residual,
            "energies or residual are asked for");
   PetscCall(test_scene_close(&scene));
   SB_CHECK(!fixture_exists(dir, "fields.h5") && !fixture_exists(dir, "history.csv"),

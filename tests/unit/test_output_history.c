@@ -48,7 +48,7 @@ static PetscErrorCode test_values(void)
     HELD EULER
     "-output_fields none -probes tip,near -probe_tip_at 0.4,0.1,0.2 -probe_near_at 0.29,0.04,0.12",
     &scene));
-  SB_CHECK(scene.run->want_energies && scene.run->want_residual,
+  SB_CHECK(scene.run->monitors.want_energies && scene.run->monitors.want_residual,
            "energies and residual are not asked for");
   for (PetscInt k = 0; k <= 3; k++)
     PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
@@ -100,7 +100,7 @@ static PetscErrorCode test_tie(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(
     dir, BOX EULER "-output_fields none -probes p -probe_p_at 0.05,0.05,0.05", &scene));
-  probe = ((SbOutput)scene.run->output)->probe;
+  probe = ((SbOutput)scene.run->monitors.output)->probe;
   mesh = scene.model->mesh;
   for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
     PetscBool corner = PETSC_TRUE; // of the first small cube

@@ -35,7 +35,7 @@ static PetscErrorCode test_affine(const char *more)
   PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   for (PetscInt k = 0; k <= 2; k++)
     PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 2)));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   SB_CHECK(out->point.N == (more[0] ? 4 * (48 + 72 + 48) : 30 + 36 + 27), "%d points",
            (int)out->point.N);
   PetscCall(fixture_fields(dir, &h));
@@ -118,11 +118,11 @@ static PetscErrorCode test_mean(PetscBool discontinuous)
   PetscCall(test_scene_open_in(
     dir, discontinuous ? BODIES EULER FIELDS " -output_discontinuous" : BODIES EULER FIELDS,
     &scene));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   mesh = scene.model->mesh;
-  PetscCall(test_fill(scene.model, bumps, scene.run->U));
+  PetscCall(test_fill(scene.model, bumps, scene.run->state.U));
   PetscCall(PetscMalloc1(3 * out->point.nowned, &value));
-  PetscCall(SbPointsValues(scene.run, out, scene.run->U, value));
+  PetscCall(SbPointsValues(scene.run, out, scene.run->state.U, value));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     PetscReal mean = 0.;
     PetscReal sum = 0.;
@@ -169,9 +169,9 @@ static PetscErrorCode test_reactions(const char *more)
   PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
   s = scene.model->space;
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   PetscCall(PetscMalloc1(3 * out->point.nowned, &r));
-  PetscCall(SbPointsForces(scene.run, out, PETSC_TRUE, scene.run->reaction, r));
+  PetscCall(SbPointsForces(scene.run, out, PETSC_TRUE, scene.run->state.reaction, r));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const PetscReal *x = s->mesh->x + 3 * (out->discontinuous ? s->mesh->cell[i] : i);
 
@@ -220,7 +220,7 @@ static PetscErrorCode test_probes(const char *fields)
     BODIES EULER
     "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
     fields));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   for (PetscInt k = 0; k <= 1; k++)
     PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 1)));
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -282,7 +282,7 @@ static PetscErrorCode test_nothing(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
-  out = (SbOutput)scene.run->output;
+  out = (SbOutput)scene.run->monitors.output;
   SB_CHECK(!out->points.V && !out->points.valence,
            "something is kept for vertex fields that nobody asked for");
   SB_CHECK(out->node.sf == out->point.sf, "P1 has an order of nodes of its own");

@@ -135,9 +135,9 @@ static PetscErrorCode test_early_end(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(
     dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
-  SB_CHECK(scene.run->nmonitor == 2, "%d monitors without progress", (int)scene.run->nmonitor);
-  PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup",
-                         sizeof(scene.run->stop_reason)));
+  SB_CHECK(scene.run->monitors.n == 2, "%d monitors without progress", (int)scene.run->monitors.n);
+  PetscCall(PetscStrncpy(scene.run->clock.stop_reason, "the \"solver\" gave\nup",
+                         sizeof(scene.run->clock.stop_reason)));
   CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
   SB_CHECK(test_rank || strstr(summary, "stopped    the \"solver\""), "summary:\n%s", summary);
   PetscCall(fixture_read(dir, "run.json", &json));

@@ -38,7 +38,7 @@ static PetscErrorCode check_symmetry(const char *nu)
                                                           "-solver cg_pbjacobi",
               nu));
   PetscCall(SbSpaceCreateMatrix(t.model->space, SB_MATRIX_BAIJ, &A));
-  PetscCall(SbModelTangent(t.model, 0., 0., 0., 1., t.run->U, NULL, A));
+  PetscCall(SbModelTangent(t.model, 0., 0., 0., 1., t.run->state.U, NULL, A));
   PetscCall(MatCreateVecs(A, &x, &y));
   PetscCall(VecDuplicate(x, &Mx));
   PetscCall(VecDuplicate(x, &My));
@@ -76,10 +76,10 @@ static PetscErrorCode solve(const char *options, const char *solver, PetscInt *i
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "%s -solver %s", options, solver));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0] && !strcmp(t.run->solver, solver), "%s: %s, %s", options,
-           t.run->solver, t.run->stop_reason);
-  *iterations = t.run->linear_total;
-  PetscCall(VecNorm(t.run->U, NORM_2, size));
+  SB_CHECK(!t.run->clock.stop_reason[0] && !strcmp(t.run->solve.solver, solver), "%s: %s, %s",
+           options, t.run->solve.solver, t.run->clock.stop_reason);
+  *iterations = t.run->counters.linear;
+  PetscCall(VecNorm(t.run->state.U, NORM_2, size));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -224,12 +224,12 @@ static PetscErrorCode run_scene(const char *options, const char *solver, Result 
   PetscCall(test_open(&scene, "%s -solver %s%s", options, solver,
                       strcmp(solver, "pressure") ? "" : " -ksp_type richardson"));
   result->its = 0;
-  PetscCall(SNESMonitorSet(scene.run->snes, find_most, &result->its, NULL));
+  PetscCall(SNESMonitorSet(scene.run->solve.snes, find_most, &result->its, NULL));
   PetscCall(SbRunSolve(scene.run));
-  result->ok = (PetscBool)!scene.run->stop_reason[0];
-  PetscCall(find_most(scene.run->snes, 0, 0., &result->its));
-  PetscCall(VecDuplicate(scene.run->U, &result->U));
-  PetscCall(VecCopy(scene.run->U, result->U));
+  result->ok = (PetscBool)!scene.run->clock.stop_reason[0];
+  PetscCall(find_most(scene.run->solve.snes, 0, 0., &result->its));
+  PetscCall(VecDuplicate(scene.run->state.U, &result->U));
+  PetscCall(VecCopy(scene.run->state.U, result->U));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

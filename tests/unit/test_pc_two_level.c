@@ -297,15 +297,15 @@ static PetscErrorCode test_solution(const char *scene, PetscBool simple, const c
 
     PetscCall(test_open(&t, "%s -ksp_rtol 1e-11 -time static %s", scene, solvers[k]));
     PetscCall(SbRunSolve(t.run));
-    SB_CHECK(!t.run->stop_reason[0], "%s: %s", what, t.run->stop_reason);
-    PetscCall(VecNorm(t.run->U, NORM_2, &norm[k]));
+    SB_CHECK(!t.run->clock.stop_reason[0], "%s: %s", what, t.run->clock.stop_reason);
+    PetscCall(VecNorm(t.run->state.U, NORM_2, &norm[k]));
     if (k) {
       char text[4096];
       PetscBool took_over;
       KSP ksp;
       PC pc;
 
-      PetscCall(SNESGetKSP(t.run->snes, &ksp));
+      PetscCall(SNESGetKSP(t.run->solve.snes, &ksp));
       PetscCall(KSPGetPC(ksp, &pc));
       PetscCall(test_pc_view(pc, sizeof(text), text));
       took_over = (PetscBool)!strstr(text, "type: icc");
@@ -313,10 +313,10 @@ static PetscErrorCode test_solution(const char *scene, PetscBool simple, const c
                took_over ? "the diagonal" : "incomplete Cholesky");
     }
     if (!k) {
-      PetscCall(VecDuplicate(t.run->U, &exact));
-      PetscCall(VecCopy(t.run->U, exact));
+      PetscCall(VecDuplicate(t.run->state.U, &exact));
+      PetscCall(VecCopy(t.run->state.U, exact));
     } else {
-      PetscCall(VecAXPY(exact, -1., t.run->U));
+      PetscCall(VecAXPY(exact, -1., t.run->state.U));
       PetscCall(VecNorm(exact, NORM_2, &difference));
     }
     PetscCall(test_scene_close(&t));

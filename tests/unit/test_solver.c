@@ -21,12 +21,12 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, BAR "%s", options));
-  SB_CHECK(t.run->solver_reason[0], "no reason for the solver %s", t.run->solver);
+  SB_CHECK(t.run->solve.solver_reason[0], "no reason for the solver %s", t.run->solve.solver);
   PetscCall(SbRunSolve(t.run));
-  PetscCall(test_value_at(t.model, t.run->U, at, value));
-  PetscCall(PetscStrncpy(stop, t.run->stop_reason, 512));
+  PetscCall(test_value_at(t.model, t.run->state.U, at, value));
+  PetscCall(PetscStrncpy(stop, t.run->clock.stop_reason, 512));
   *z = value[2];
-  *iterations = t.run->linear_total;
+  *iterations = t.run->counters.linear;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,7 +90,7 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
     KSPConvergedReason reason;
     PetscReal residual;
 
-    PetscCall(SbModelTangent(t.model, 0., 0., shift[k], 1., t.run->U, NULL, A));
+    PetscCall(SbModelTangent(t.model, 0., 0., shift[k], 1., t.run->state.U, NULL, A));
     if (k == 4)
       PetscCall(MatZeroEntries(A));
     PetscCall(solve(ksp, A, &reason, &residual));
@@ -121,8 +121,8 @@ static PetscErrorCode check_choice(const char *element, const char *nu, PetscBoo
               "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_young 1e6 -body_a_poisson %s "
               "-body_a_element %s -body_a_material corotated -ts_dt 0.02 -solver auto",
               nu, element));
-  SB_CHECK((PetscBool)!strcmp(t.run->solver, "rotated") == turns, "%s, nu %s: auto took %s",
-           element, nu, t.run->solver);
+  SB_CHECK((PetscBool)!strcmp(t.run->solve.solver, "rotated") == turns, "%s, nu %s: auto took %s",
+           element, nu, t.run->solve.solver);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -139,14 +139,15 @@ static PetscErrorCode check_meeting(const char *solver, const char *most, PetscB
               "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
               "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
               solver, most));
-  SB_CHECK((PetscBool)!strcmp(t.run->solver, strcmp(solver, "auto") ? solver : "rotated") == turns,
-           "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver,
-           t.run->solver_reason);
-  SB_CHECK(turns || !strcmp(t.run->solver, "cg_two_level"), "with many ranks %s was taken",
-           t.run->solver);
+  SB_CHECK((PetscBool)!strcmp(t.run->solve.solver, strcmp(solver, "auto") ? solver : "rotated") ==
+             turns,
+           "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solve.solver,
+           t.run->solve.solver_reason);
+  SB_CHECK(turns || !strcmp(t.run->solve.solver, "cg_two_level"), "with many ranks %s was taken",
+           t.run->solve.solver);
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == 1, "%s: %s", t.run->solver,
-           t.run->stop_reason);
+  SB_CHECK(!t.run->clock.stop_reason[0] && t.run->counters.steps == 1, "%s: %s",
+           t.run->solve.solver, t.run->clock.stop_reason);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -166,12 +167,12 @@ static PetscErrorCode swing(const char *element, const char *options, PetscReal 
     "0.04 -ts_max_time 0.24 -snes_rtol 1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
     element, options));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0], "%s, %s: %s", element, options, t.run->stop_reason);
-  PetscCall(test_value_at(t.model, t.run->U, at, x));
+  SB_CHECK(!t.run->clock.stop_reason[0], "%s, %s: %s", element, options, t.run->clock.stop_reason);
+  PetscCall(test_value_at(t.model, t.run->state.U, at, x));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "swing, %s, %s: %.9f, %" PetscInt_FMT " Newton, %" PetscInt_FMT
                         " linear iterations\n",
-                        element, options, x[2], t.run->newton_total, t.run->linear_total));
+                        element, options, x[2], t.run->counters.newton, t.run->counters.linear));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -28,12 +28,12 @@ static PetscErrorCode run(const char *options, const char *more, Outcome *o)
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "%s %s", options, more));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(test_value_at(t.model, t.run->U, at, o->tip));
-  o->newton = t.run->newton_total;
-  o->linear = t.run->linear_total;
-  o->rejected = t.run->rejected_total;
-  PetscCall(PetscStrncpy(o->solver, t.run->solver, sizeof(o->solver)));
-  PetscCall(PetscStrncpy(o->stop, t.run->stop_reason, sizeof(o->stop)));
+  PetscCall(test_value_at(t.model, t.run->state.U, at, o->tip));
+  o->newton = t.run->counters.newton;
+  o->linear = t.run->counters.linear;
+  o->rejected = t.run->counters.rejected;
+  PetscCall(PetscStrncpy(o->solver, t.run->solve.solver, sizeof(o->solver)));
+  PetscCall(PetscStrncpy(o->stop, t.run->clock.stop_reason, sizeof(o->stop)));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -122,7 +122,7 @@ static PetscErrorCode choose(const char *path, const char *solver, const char *b
                       "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
                       "-time static -body_a_material linear %s -solver %s",
                       path, body, solver));
-  PetscCall(PetscStrncpy(name, t.run->solver, SB_NAME_MAX));
+  PetscCall(PetscStrncpy(name, t.run->solve.solver, SB_NAME_MAX));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -164,7 +164,8 @@ static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, STATIC "-body_a_tangent %s -solver direct", tangent));
   PetscCall(SbDirectPackage(t.model->comm, 3 * t.model->space->Nnode, definite, &package));
-  SB_CHECK(!strcmp(t.run->solver, package), "%s: %s, not %s", tangent, t.run->solver, package);
+  SB_CHECK(!strcmp(t.run->solve.solver, package), "%s: %s, not %s", tangent, t.run->solve.solver,
+           package);
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(t.model->material[0]->tangent == SB_TANGENT_EXACT, "%s: the tangent was filtered",
            tangent);

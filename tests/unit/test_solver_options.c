@@ -86,8 +86,8 @@ static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code,
     *code = SbRunSolve(t.run);
   PetscCall(PetscPopErrorHandler());
   if (!*code) {
-    PetscCall(VecNorm(t.run->U, NORM_2, x));
-    PetscCall(PetscStrncpy(stop, t.run->stop_reason, 512));
+    PetscCall(VecNorm(t.run->state.U, NORM_2, x));
+    PetscCall(PetscStrncpy(stop, t.run->clock.stop_reason, 512));
   }
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -309,8 +309,9 @@ static PetscErrorCode check_said(void)
   PetscCall(SbHasPackage("umfpack", &has));
   if (has) {
     PetscCall(test_scene_open(STATIC "-pc_factor_mat_solver_type umfpack ", &t));
-    SB_CHECK(!strcmp(t.run->solver, "umfpack") && strstr(t.run->solver_parts, "lu of umfpack"),
-             "%s, %s", t.run->solver, t.run->solver_parts);
+    SB_CHECK(!strcmp(t.run->solve.solver, "umfpack") &&
+               strstr(t.run->solve.solver_parts, "lu of umfpack"),
+             "%s, %s", t.run->solve.solver, t.run->solve.solver_parts);
     PetscCall(test_scene_close(&t));
   }
   PetscCall(test_scene_open(
@@ -318,16 +319,16 @@ static PetscErrorCode check_said(void)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_asm_type", &set));
   SB_CHECK(!set, "-pc_asm_type is set without -pc_type asm");
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(t.run->stop_reason[0] && t.run->rejected_total == 1, "%d steps are rejected, '%s'",
-           (int)t.run->rejected_total, t.run->stop_reason);
+  SB_CHECK(t.run->clock.stop_reason[0] && t.run->counters.rejected == 1,
+           "%d steps are rejected, '%s'", (int)t.run->counters.rejected, t.run->clock.stop_reason);
   PetscCall(test_scene_close(&t));
 
   // PETSc 3.18: CG ends as converged if the preconditioner maps its residual to zero, as a matrix
   // of updates does before its first update.
   PetscCall(test_scene_open(STATIC "-body_a_material linear -ksp_type cg -pc_type lmvm ", &t));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(VecNorm(t.run->U, NORM_INFINITY, &largest));
-  SB_CHECK(t.run->stop_reason[0] || largest > 0., "the zero displacement is an answer");
+  PetscCall(VecNorm(t.run->state.U, NORM_INFINITY, &largest));
+  SB_CHECK(t.run->clock.stop_reason[0] || largest > 0., "the zero displacement is an answer");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -63,9 +63,9 @@ static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal
   PetscCall(test_scene_close(&t));
   PetscCall(
     test_open(&t, "%s -ts_dt %.17g -ts_max_time %.17g", text, factor * dt, 400.001 * factor * dt));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &before));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &after));
   *ratio = (after.kinetic + after.strain) / before.kinetic;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);

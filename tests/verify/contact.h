@@ -27,11 +27,11 @@ static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEf
   PetscFunctionBeginUser;
   if (R)
     PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
   if (R && m->space->constraints)
     SbConstraintsComputeForces(m->space, stage.u, r);
   PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
   if (R)
     PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCallMPI(
@@ -63,7 +63,7 @@ static inline PetscErrorCode contact_column(SbRun run, PetscReal t, const char *
                                             const char *column, PetscReal *value)
 {
   PetscFunctionBeginUser;
-  PetscCall(contact_column_of(run, t, run->reaction, effect, column, value));
+  PetscCall(contact_column_of(run, t, run->state.reaction, effect, column, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,9 +108,9 @@ static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressu
   PetscFunctionBeginUser;
   *worst = 0;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &u));
   SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &u));
   for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
     *worst = PetscMax(*worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? pressure : 0)) / pressure);
   PetscCall(PetscFree(sigma));
@@ -125,8 +125,8 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
   Vec F;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(run->U, &F));
-  PetscCall(SbContactSetForce(&run->model->contacts, t, run->U, F));
+  PetscCall(VecDuplicate(run->state.U, &F));
+  PetscCall(SbContactSetForce(&run->model->contacts, t, run->state.U, F));
   PetscCall(contact_body_sums(run->model, F, PETSC_FALSE, force));
   PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -329,8 +329,8 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
 
     if (!f->contact)
       continue;
-    if (run->reaction)
-      PetscCall(contact_columns(run, step->t, run->reaction, f, value));
+    if (run->state.reaction)
+      PetscCall(contact_columns(run, step->t, run->state.reaction, f, value));
     for (PetscInt c = 0; c < f->ncolumn; c++) {
       PetscCall(record_put(r, f->name, "_", f->column[c], value[c]));
       if (!strcmp(f->column[c], "energy"))
@@ -376,7 +376,7 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
 static inline PetscErrorCode record_add(TestScene *t, Record *r)
 {
   PetscFunctionBeginUser;
-  t->run->want_energies = PETSC_TRUE;
+  t->run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t->run, record_step, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -387,9 +387,9 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
   PetscFunctionBeginUser;
   PetscCall(record_add(t, r));
   PetscCall(verify_solve(t, verify_title));
-  r->newton = t->run->newton_total;
-  r->steps = t->run->steps_total;
-  r->rejected = t->run->rejected_total;
+  r->newton = t->run->counters.newton;
+  r->steps = t->run->counters.steps;
+  r->rejected = t->run->counters.rejected;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -149,10 +149,10 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
   Vec R;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(run->U, &R));
-  PetscCall(SbModelResidual(m, 1, run->U, run->V, run->A, PETSC_FALSE, R));
+  PetscCall(VecDuplicate(run->state.U, &R));
+  PetscCall(SbModelResidual(m, 1, run->state.U, run->state.V, run->state.A, PETSC_FALSE, R));
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
   for (PetscInt i = 0; i < m->neffect; i++) {
     SbEffect e = m->effect[i];
 
@@ -161,7 +161,7 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
     if (!strcmp(e->name, "high"))
       PetscCall((*e->ops.history)(e, m->space, &stage, r, pull));
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(VecDestroy(&R));
   *reaction = pull[2];
@@ -193,7 +193,7 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   test_print("  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
              "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
              p->name, c->element, (int)c->cells, d, values[CONTACTS], *force,
-             4 * values[NORMAL] / P, values[DEEPEST] / d, (int)t.run->newton_total);
+             4 * values[NORMAL] / P, values[DEEPEST] / d, (int)t.run->counters.newton);
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
   SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", values[DEEPEST], d);

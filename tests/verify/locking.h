@@ -46,8 +46,8 @@ static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(4, 5)
   cost->seconds = locking_clock() - start;
   cost->cells = t->model->mesh->Ncell;
   cost->unknowns = 3 * t->model->space->Nnode;
-  cost->newton = t->run->newton_total;
-  cost->linear = t->run->linear_total;
+  cost->newton = t->run->counters.newton;
+  cost->linear = t->run->counters.linear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,7 +65,7 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
       verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
   PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
   PetscCall(locking_run(&t, cost, more, "%s -body_a_mesh %s", scene, file[0] ? file : mesh));
-  PetscCall(manufactured_errors(t.model, t.run->U, error));
+  PetscCall(manufactured_errors(t.model, t.run->state.U, error));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,8 +92,8 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
     "-body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects clamp,gravity "
     "-effect_clamp_type fixed -effect_clamp_on root -effect_gravity_vector 0,0,-9.81 -time static",
     mesh, nu));
-  PetscCall(verify_value_at(t.model, t.run->U, end, u));
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(verify_value_at(t.model, t.run->state.U, end, u));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   value[0] = u[2];
   value[1] = e.strain;
   PetscCall(test_scene_close(&t));
@@ -120,7 +120,7 @@ static inline PetscErrorCode locking_cook(const char *mesh, PetscReal nu, const 
   for (int k = 0; k < 2; k++) {
     PetscReal u[3];
 
-    PetscCall(verify_value_at(t.model, t.run->U, at[k], u));
+    PetscCall(verify_value_at(t.model, t.run->state.U, at[k], u));
     value[k] = u[1];
   }
   PetscCall(test_scene_close(&t));
@@ -229,7 +229,7 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
     "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
     "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
     mesh, nu));
-  PetscCall(locking_shell_errors(t.model, t.run->U, nu, e));
+  PetscCall(locking_shell_errors(t.model, t.run->state.U, nu, e));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -278,7 +278,7 @@ static inline PetscErrorCode locking_beam(PetscInt n, PetscReal mu, const char *
     "-effect_root_type fixed -effect_root_on arc -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_gravity_vector 0,-2,0 -time static",
     mesh, 2.8 * mu, half, PetscSqrtReal(0.0025 + half * half)));
-  PetscCall(verify_value_at(t.model, t.run->U, tip, u));
+  PetscCall(verify_value_at(t.model, t.run->state.U, tip, u));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -302,8 +302,8 @@ static inline PetscErrorCode locking_swing(PetscInt n, PetscReal nu, const char 
     "-ts_dt 0.01 "
     "-ts_max_time 0.3",
     (int)n, nu));
-  PetscCall(verify_value_at(t.model, t.run->U, end, value));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
+  PetscCall(verify_value_at(t.model, t.run->state.U, end, value));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &e));
   value[3] = e.strain;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -327,8 +327,8 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
     "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
     "-time static -static_steps 16 -ksp_max_it 20",
     (int)n, nu));
-  PetscCall(verify_value_at(t.model, t.run->U, edge, value));
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(verify_value_at(t.model, t.run->state.U, edge, value));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   value[3] = e.strain;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -355,7 +355,7 @@ static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *
     "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type fixed "
     "-effect_clamp_on top -effect_gravity_vector 0,0,-9.81 -time static -static_steps 4",
     mesh, nu));
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   value[0] = e.max_displacement;
   value[1] = (e.volume - t.model->body[0].volume) / t.model->body[0].volume;
   value[2] = e.min_J;

@@ -70,8 +70,8 @@ static inline PetscErrorCode pour_furthest(TestScene *t, const PetscReal bowl[3]
   Vec X;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(t->run->U, &X));
-  PetscCall(VecCopy(t->run->U, X));
+  PetscCall(VecDuplicate(t->run->state.U, &X));
+  PetscCall(VecCopy(t->run->state.U, X));
   PetscCall(VecGetArray(X, &x));
   for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++)
     x[i] += m->space->node_x[i] - bowl[i % 3];

@@ -173,13 +173,13 @@ static inline PetscErrorCode verify_turn(TestScene *t, const PetscReal axis[3], 
 
   PetscFunctionBeginUser;
   verify_rotation(axis, angle, R);
-  PetscCall(VecGetArray(t->run->U, &u));
+  PetscCall(VecGetArray(t->run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     verify_apply(R, s->node_x + 3 * i, u + 3 * i);
     for (int k = 0; k < 3; k++)
       u[3 * i + k] += moved[k] - s->node_x[3 * i + k];
   }
-  PetscCall(VecRestoreArray(t->run->U, &u));
+  PetscCall(VecRestoreArray(t->run->state.U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,7 +202,7 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 {
   PetscFunctionBeginUser;
   PetscCall(SbRunSolve(t->run));
-  SB_CHECK(!t->run->stop_reason[0], "%s: %s", what, t->run->stop_reason);
+  SB_CHECK(!t->run->clock.stop_reason[0], "%s: %s", what, t->run->clock.stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -217,14 +217,14 @@ static inline PetscErrorCode verify_newton(TestScene *t,
   Vec X;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(t->run->U, &X));
-  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
+  PetscCall(VecDuplicate(t->run->state.U, &X));
+  PetscCall(SNESSetTolerances(t->run->solve.snes, 0., 0., 0., 1, SB_UNLIMITED));
   for (int k = 0; k < 2; k++) {
     PetscCall(test_fill(t->model, ripple, X));
-    PetscCall(VecAYPX(X, k ? 0.1 * size : size, t->run->U));
+    PetscCall(VecAYPX(X, k ? 0.1 * size : size, t->run->state.U));
     PetscCall(SbModelPrescribe(t->model, 1., X));
-    PetscCall(SNESSolve(t->run->snes, NULL, X));
-    PetscCall(VecAXPY(X, -1., t->run->U));
+    PetscCall(SNESSolve(t->run->solve.snes, NULL, X));
+    PetscCall(VecAXPY(X, -1., t->run->state.U));
     PetscCall(VecNorm(X, NORM_INFINITY, &error[k]));
   }
   *order = PetscLog10Real(error[0] / error[1]);

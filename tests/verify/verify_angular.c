@@ -130,7 +130,7 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
               "1e-11 -snes_rtol "
               "1e-12",
               element, element, dt));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &w));
   PetscCall(verify_solve(&t, "angular"));
   test_print(

@@ -32,8 +32,8 @@ static PetscErrorCode motion(const char *options, Record *r, PetscInt *n, PetscR
     PetscCall(record_add(&t, r));
   PetscCall(verify_solve(&t, options));
   *n = 3 * verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, &u));
-  PetscCall(verify_gather(t.model, t.run->V, &v));
+  PetscCall(verify_gather(t.model, t.run->state.U, &u));
+  PetscCall(verify_gather(t.model, t.run->state.V, &v));
   PetscCall(PetscMalloc1(2 * *n, value));
   PetscCall(PetscArraycpy(*value, u, *n));
   PetscCall(PetscArraycpy(*value + *n, v, *n));

@@ -33,8 +33,8 @@ static PetscErrorCode solve(const char *options, Bar *bar)
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "-bodies a -time static %s", options));
   PetscCall(verify_solve(&t, bar->what));
-  PetscCall(test_value_at(t.model, t.run->U, bar->end, bar->u));
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(test_value_at(t.model, t.run->state.U, bar->end, bar->u));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   bar->strain = e.strain;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,10 +70,10 @@ static PetscErrorCode hanging_error(PetscInt n, const char *more, PetscReal *err
               (int)n, HANG_E, HANG_NU, more, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
               0.5 * HANG_NU * HANG_W / HANG_E));
   PetscCall(verify_solve(&t, "hanging bar"));
-  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(VecDuplicate(t.run->state.U, &U));
   PetscCall(test_fill(t.model, hanging_exact, U));
   PetscCall(VecNorm(U, NORM_INFINITY, &size));
-  PetscCall(VecAXPY(U, -1., t.run->U));
+  PetscCall(VecAXPY(U, -1., t.run->state.U));
   PetscCall(VecNorm(U, NORM_INFINITY, error));
   *error /= size;
   PetscCall(VecDestroy(&U));

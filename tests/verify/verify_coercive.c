@@ -76,7 +76,7 @@ static PetscErrorCode spectrum(TestScene *t, PetscInt *count, PetscReal **w)
   PetscCall(PetscBLASIntCast(*count, &n));
   PetscCall(PetscBLASIntCast(40 * *count, &lwork));
   PetscCall(SbSpaceCreateMatrix(t->model->space, SB_MATRIX_AIJ, &K));
-  PetscCall(SbModelTangent(t->model, 0., 0., 0., 1., t->run->U, NULL, K));
+  PetscCall(SbModelTangent(t->model, 0., 0., 0., 1., t->run->state.U, NULL, K));
   PetscCall(MatConvert(K, MATDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(PetscMalloc1(*count, w));
   PetscCall(PetscMalloc2(*count, &d, lwork, &work));
@@ -166,11 +166,11 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
               element, law));
   m = t.model->material[0];
   eps = ratio * SbMaterialShearModulus(m) / (3. * SbMaterialBulkModulus(m));
-  PetscCall(VecGetArray(t.run->U, &u));
+  PetscCall(VecGetArray(t.run->state.U, &u));
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++)
     u[i] = -eps * t.model->space->node_x[i];
-  PetscCall(VecRestoreArray(t.run->U, &u));
-  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->U, SB_STEPS_OF_LOAD, NULL));
+  PetscCall(VecRestoreArray(t.run->state.U, &u));
+  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->state.U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(spectrum(&t, &n, &w));
   *smallest = w[0] / w[n - 1];
   PetscCall(PetscFree(w));

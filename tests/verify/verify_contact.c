@@ -343,10 +343,10 @@ static PetscErrorCode check_bounds(void)
   PetscCall(test_open(
     &free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
   free.model->load = 1;
-  PetscCall(VecDuplicate(free.run->U, &U));
-  PetscCall(solve_bounded(free.model, free.run->J, floor, U));
+  PetscCall(VecDuplicate(free.run->state.U, &U));
+  PetscCall(solve_bounded(free.model, free.run->solve.J, floor, U));
   PetscCall(VecNorm(U, NORM_INFINITY, &size));
-  PetscCall(VecAXPY(U, -1, t.run->U));
+  PetscCall(VecAXPY(U, -1, t.run->state.U));
   PetscCall(VecNorm(U, NORM_INFINITY, &difference));
   VERIFY_MORE(record_last(&r, "floor_contacts"), 2, "nodes that touch");
   VERIFY_LESS(difference, 1e-6 * size, "difference from SNESVI, m");

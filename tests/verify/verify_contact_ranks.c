@@ -44,8 +44,8 @@ static PetscErrorCode solve(MPI_Comm comm, const char *element, Motion *motion)
     0.003 * STEPS, element));
   PetscCall(record_solve(&t, &motion->r));
   motion->n = verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, &motion->u));
-  PetscCall(verify_gather(t.model, t.run->V, &motion->v));
+  PetscCall(verify_gather(t.model, t.run->state.U, &motion->u));
+  PetscCall(verify_gather(t.model, t.run->state.V, &motion->v));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

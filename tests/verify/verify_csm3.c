@@ -64,7 +64,7 @@ static PetscErrorCode swing(const char *element, PetscInt across, PetscReal h, P
     "-effect_plane_on all -effect_plane_components z -effect_gravity_vector 0,-2,0 -time newmark "
     "-ts_dt %g -ts_max_time %g",
     mesh, element, half, PetscSqrtReal(0.0025 + half * half), h, seconds));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &s));
   PetscCall(verify_solve(&t, "CSM3"));
   result[0] = s.low[1];
@@ -76,8 +76,8 @@ static PetscErrorCode swing(const char *element, PetscInt across, PetscReal h, P
                         "%.4f Hz; %d steps, %d Newton "
                         "iterations, %d rejected; %.1e of the energy is the integrator's\n",
                         element, (int)across, h, 1e3 * s.low[1], 1e3 * s.high[1], 1e3 * s.low[0],
-                        1e3 * s.high[0], result[2], (int)t.run->steps_total,
-                        (int)t.run->newton_total, (int)t.run->rejected_total, result[3]));
+                        1e3 * s.high[0], result[2], (int)t.run->counters.steps,
+                        (int)t.run->counters.newton, (int)t.run->counters.rejected, result[3]));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,7 +31,7 @@ static PetscErrorCode affine_error(TestScene *t, const PetscReal A[9], PetscReal
   PetscReal most[2] = {0., 0.};
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(t->run->U, &u));
+  PetscCall(VecGetArrayRead(t->run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscReal *x = s->node_x + 3 * i;
     PetscReal y[3];
@@ -42,7 +42,7 @@ static PetscErrorCode affine_error(TestScene *t, const PetscReal A[9], PetscReal
       most[1] = PetscMax(most[1], PetscAbsReal(y[k] - x[k]));
     }
   }
-  PetscCall(VecRestoreArrayRead(t->run->U, &u));
+  PetscCall(VecRestoreArrayRead(t->run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, t->model->comm));
   *error = most[0] / most[1];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -123,7 +123,7 @@ static PetscErrorCode check_equilibrium(const char *mesh)
                       "-effect_p_on skin -effect_p_value 10 -effect_p_follower no -time "
                       "euler_implicit -ts_dt 0.1" VERIFY_BODY("a", "%s", "linear", "1e3", "0.45"),
                       mesh));
-  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(VecDuplicate(t.run->state.U, &U));
   PetscCall(residual(&t, U, &size));
   PetscCall(test_fill(t.model, shrink, U));
   PetscCall(residual(&t, U, &most));
@@ -137,7 +137,7 @@ static PetscErrorCode check_equilibrium(const char *mesh)
     PetscCall(test_open(
       &t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
       mesh, laws[law]));
-    PetscCall(VecDuplicate(t.run->U, &U));
+    PetscCall(VecDuplicate(t.run->state.U, &U));
     PetscCall(residual(&t, U, &still));
     PetscCall(test_fill(t.model, turn, U));
     PetscCall(residual(&t, U, &most));
@@ -168,7 +168,7 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
     "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
       "a", "%s", "linear", "1e3", "0.3"),
     mass, mesh));
-  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(VecDuplicate(t.run->state.U, &U));
   PetscCall(VecDuplicate(U, &V));
   PetscCall(VecDuplicate(U, &F));
   PetscCall(VecZeroEntries(U));
@@ -226,7 +226,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(verify_solve(&t, "sphere"));
 
   /* error at the vertices with equal weights; both meshes have the same vertices */
-  PetscCall(VecGetArrayRead(t.run->U, &u));
+  PetscCall(VecGetArrayRead(t.run->state.U, &u));
   for (PetscInt i = 0; i < t.model->space->nnode_owned; i++) {
     const PetscReal *x = t.model->space->node_x + 3 * i;
     const PetscReal r = PetscSqrtReal(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
@@ -238,7 +238,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
       sum[0] += PetscSqr(u[3 * i + k] - exact * x[k] / r);
     sum[1] += PetscSqr(exact);
   }
-  PetscCall(VecRestoreArrayRead(t.run->U, &u));
+  PetscCall(VecRestoreArrayRead(t.run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, t.model->comm));
   *error = PetscSqrtReal(sum[0] / sum[1]);
   test_print("  sphere, nu %g, %s, %5d %s tets: error %.3e\n", nu, element,
@@ -246,10 +246,10 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
 
   /* energy of the error: missing strain energy; the exact one is half the work of the pressure on
      the wall displacement */
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &energies));
   missing = 0.25 * PETSC_PI * (1. - 2. * nu + 4. * (1. + nu)) / 7. - energies.strain;
   PetscCall(SbSpaceEstimateCreate(t.model, &est));
-  PetscCall(SbSpaceEstimateCompute(est, 1., t.run->U, t.run->V, t.run->A));
+  PetscCall(SbSpaceEstimateCompute(est, 1., t.run->state.U, t.run->state.V, t.run->state.A));
   guess = PetscSqrtReal(est->body2[0]);
   test_print("    in energy %.3e J^(1/2), estimated %.2f times that\n",
              PetscSqrtReal(PetscAbsReal(missing)), guess / PetscSqrtReal(PetscAbsReal(missing)));
@@ -343,7 +343,7 @@ static PetscErrorCode check_ranks(void)
       volume[r] = t.model->body[0].volume;
       PetscCall(verify_solve(&t, "ranks"));
       n = verify_numbers(t.model);
-      PetscCall(verify_gather(t.model, t.run->U, &value[r]));
+      PetscCall(verify_gather(t.model, t.run->state.U, &value[r]));
       PetscCall(test_scene_close(&t));
     }
     test_print("  %s: one rank and all differ by %.1e\n", solver[k],

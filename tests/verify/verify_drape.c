@@ -60,7 +60,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                             DROP};
     PetscReal u[3];
 
-    PetscCall(test_value_at(t.model, t.run->U, x, u));
+    PetscCall(test_value_at(t.model, t.run->state.U, x, u));
     depth[at[k][2]] = PetscMin(depth[at[k][2]], -u[2]);
   }
   PetscCall(test_scene_close(&t));

@@ -262,7 +262,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen,
   PetscCall(SbRunAddMonitor(t.run, watch, seen));
   PetscCall(verify_solve(&t, "bars"));
   PetscCall(contact_values(t.run, values));
-  PetscCall(test_value_at(t.model, t.run->U, middle, u));
+  PetscCall(test_value_at(t.model, t.run->state.U, middle, u));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

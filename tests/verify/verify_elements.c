@@ -36,7 +36,7 @@ static PetscErrorCode reaction(const TestScene *t, PetscInt body, PetscReal sum[
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateVec(s, &R));
-  PetscCall(SbModelResidual(t->model, 1., t->run->U, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(SbModelResidual(t->model, 1., t->run->state.U, NULL, NULL, PETSC_FALSE, R));
   PetscCall(VecGetArrayRead(R, &r));
   PetscCall(PetscArrayzero(sum, 6));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -83,7 +83,7 @@ static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
   PetscCall(reaction(&t, 0, sum));
   for (int k = 0; k < 6; k++)
     SB_CHECK_NEAR(sum[k], balance[k], 1e-8, kinds[kind][0]);
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   *strain = e.strain;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,7 +137,7 @@ static PetscErrorCode check_drive(int kind)
     "-solver direct" EXACT,
     kinds[kind][1]));
   PetscCall(verify_solve(&t, kinds[kind][0]));
-  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &e));
   PetscCall(reaction(&t, 0, sum));
 
   // Rounding: stresses of 1e-16 E on 0.1 x 0.1 m, strains of 1e-16; plus Newton's tolerance.
@@ -153,7 +153,7 @@ static PetscErrorCode check_drive(int kind)
     PetscReal away = 0.;
 
     verify_rotation((const PetscReal[3]){1, 2, 3}, 40. * PETSC_PI / 180., R);
-    PetscCall(VecGetArrayRead(t.run->U, &x));
+    PetscCall(VecGetArrayRead(t.run->state.U, &x));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       const PetscReal r[3] = {s->node_x[3 * i] - 0.1, s->node_x[3 * i + 1], s->node_x[3 * i + 2]};
       const PetscReal move[3] = {1, 0, 0.5};
@@ -163,7 +163,7 @@ static PetscErrorCode check_drive(int kind)
       for (int k = 0; k < 3; k++)
         away = PetscMax(away, PetscAbsReal(x[3 * i + k] - (move[k] + y[k] - r[k])));
     }
-    PetscCall(VecRestoreArrayRead(t.run->U, &x));
+    PetscCall(VecRestoreArrayRead(t.run->state.U, &x));
     SB_CHECK(away < 1e-9, "%s: a node is %g m from where the drive takes it", kinds[kind][0], away);
   }
   PetscCall(test_scene_close(&t));
@@ -249,7 +249,7 @@ static PetscErrorCode check_flight(int kind, const char *mass)
               kinds[kind][1], mass));
   PetscCall(SbRunAddMonitor(t.run, watch_flight, &f));
   PetscCall(verify_solve(&t, kinds[kind][0]));
-  SB_CHECK(t.run->steps_total > 5, "%d steps", (int)t.run->steps_total);
+  SB_CHECK(t.run->counters.steps > 5, "%d steps", (int)t.run->counters.steps);
   for (int k = 0; k < 3; k++)
     SB_CHECK_NEAR(f.start[k], 2 * (k + 1), 1e-12, "momentum at the start");
 
@@ -278,10 +278,10 @@ static PetscErrorCode swing(int kind, const char *time, PetscReal energy[2])
                       "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp "
                       "-effect_clamp_type fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
                       kinds[kind][1], time));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &e));
   energy[0] = e.kinetic + e.strain;
   PetscCall(verify_solve(&t, kinds[kind][0]));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &e));
   energy[0] = (e.kinetic + e.strain) / energy[0];
   energy[1] = e.strain;
   PetscCall(test_scene_close(&t));
@@ -319,7 +319,7 @@ static PetscErrorCode check_pressure(int kind)
                       "-time euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
                       kinds[kind][1]));
   PetscCall(verify_solve(&t, kinds[kind][0]));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &e));
   for (int k = 0; k < 3; k++)
     SB_CHECK_NEAR(e.momentum[k], 0, 1e-10, kinds[kind][0]);
 

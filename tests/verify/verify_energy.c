@@ -58,9 +58,9 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
     element, 0.003 * (double)steps));
   PetscCall(SbRunAddMonitor(t.run, watch_drift, &d));
   PetscCall(verify_solve(&t, "drift"));
-  SB_CHECK(PetscAbsInt(t.run->steps_total - steps) <= 1, "%d steps", (int)t.run->steps_total);
+  SB_CHECK(PetscAbsInt(t.run->counters.steps - steps) <= 1, "%d steps", (int)t.run->counters.steps);
   test_print("  drift of Newmark, %s, over %d steps: %.1e of the energy (%.0f s)\n", element,
-             (int)t.run->steps_total, d.largest, MPI_Wtime() - begin);
+             (int)t.run->counters.steps, d.largest, MPI_Wtime() - begin);
 
   /* rounding of one step if all signs are equal: 1e-15 for P1, more for elements with more unknowns
      (4.4e-15 on one machine, below 4e-15 on others) */
@@ -116,16 +116,17 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
     "-effect_clamp_type fixed -effect_clamp_on xmin -time euler_implicit -ts_dt %.17g "
     "-ts_max_time %.17g" TIGHT,
     element, h, 100. * h));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_decay, &d));
   PetscCall(verify_solve(&t, "decay"));
-  e = &t.run->energies;
+  e = &t.run->state.energies;
   test_print(
     "  implicit Euler, %s, h %g s: energy left %.3e of the start, account off by %.1e of it\n",
-    element, h, (e->kinetic + e->strain) / t.run->energy_start,
-    PetscAbsReal(e->integrator_loss - d.loss) / t.run->energy_start);
+    element, h, (e->kinetic + e->strain) / t.run->state.energy_start,
+    PetscAbsReal(e->integrator_loss - d.loss) / t.run->state.energy_start);
   SB_CHECK(d.ups == 0, "%s, h %g: energy rises in %d of 100 steps", element, h, (int)d.ups);
-  SB_CHECK_NEAR(e->integrator_loss, d.loss, 1e-12 * t.run->energy_start, "loss of implicit Euler");
+  SB_CHECK_NEAR(e->integrator_loss, d.loss, 1e-12 * t.run->state.energy_start,
+                "loss of implicit Euler");
   PetscCall(VecDestroy(&d.U));
   PetscCall(VecDestroy(&d.V));
   PetscCall(test_scene_close(&t));
@@ -152,9 +153,9 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
     "-effect_wind_on xmax "
     "-effect_wind_vector 0;500*t;0 -time %s -ts_dt %.17g -ts_max_time 0.5" TIGHT,
     element, law, preset, h));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "account"));
-  e = &t.run->energies;
+  e = &t.run->state.energies;
   *loss = e->integrator_loss /
           (PetscAbsReal(e->load_work) + PetscAbsReal(e->prescribed_work) + e->damping_loss);
   test_print("  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic "
@@ -215,14 +216,14 @@ static PetscErrorCode check_swing(const char *element)
     "0,0,-9.81 "
     "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.005 -ts_max_time 1",
     element));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_swing, &w));
   PetscCall(verify_solve(&t, "swing"));
   test_print("  swing, %s: strain energy up to %.2f J, given %.1e J, lost %.1e J\n", element,
-             w.largest, -w.least, t.run->energies.integrator_loss);
+             w.largest, -w.least, t.run->state.energies.integrator_loss);
   SB_CHECK(-w.least < 5e-3 * w.largest, "%s: %g J were given", element, -w.least);
-  SB_CHECK(t.run->energies.integrator_loss < 0.02 * w.largest, "%s: %g J were lost", element,
-           t.run->energies.integrator_loss);
+  SB_CHECK(t.run->state.energies.integrator_loss < 0.02 * w.largest, "%s: %g J were lost", element,
+           t.run->state.energies.integrator_loss);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -242,9 +243,9 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
                       "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 "
                       "-body_a_angular_velocity 1,2,6 -time %s -ts_dt %.17g -ts_max_time 0.1" TIGHT,
                       element, law, preset, h));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &before));
   PetscCall(verify_solve(&t, preset));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &after));
   change[0] = change[1] = 0.;
   for (int k = 0; k < 3; k++) {
     change[0] += PetscSqr(after.momentum[k] - before.momentum[k]);
@@ -302,10 +303,10 @@ static PetscErrorCode check_gain(const char *what, PetscReal chord, const char *
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(text, &t));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_gain, &gain));
   PetscCall(verify_solve(&t, what));
-  given = t.run->energies.prescribed_work + t.run->energies.load_work;
+  given = t.run->state.energies.prescribed_work + t.run->state.energies.load_work;
   test_print("  %s: gain %.1e of the work %g J\n", what, gain / given, given);
   SB_CHECK(given > 0. && gain < 0.1 * chord * given, "%s: gain %g J, work %g J", what, gain, given);
   PetscCall(test_scene_close(&t));

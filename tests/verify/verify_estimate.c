@@ -328,11 +328,11 @@ static PetscErrorCode report(const Case *c, TestScene *t, PetscReal error2)
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceEstimateCreate(t->model, &est));
-  PetscCall(
-    SbSpaceEstimateCompute(est, strcmp(c->problem, "wave") ? 1. : 2., run->U, run->V, run->A));
+  PetscCall(SbSpaceEstimateCompute(est, strcmp(c->problem, "wave") ? 1. : 2., run->state.U,
+                                   run->state.V, run->state.A));
   ratio = PetscSqrtReal(est->body2[0] / error2);
   if (stiff) {
-    PetscCall(jump_estimate(t->model, run->U, &other));
+    PetscCall(jump_estimate(t->model, run->state.U, &other));
     PetscCall(PetscSNPrintf(others, sizeof(others), "| %.2f | %.2f |",
                             ratio / PetscSqrtReal(est->factor[0]),
                             PetscSqrtReal(jump * other / error2)));
@@ -357,7 +357,7 @@ static PetscErrorCode check_exact(const Case *c, const char *scene, const char *
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "%s -body_a_mesh %s -body_a_element %s", scene, mesh, c->element));
   PetscCall(verify_solve(&t, c->problem));
-  PetscCall(exact_error(t.model, t.run->U, c->nu, exact, &error2));
+  PetscCall(exact_error(t.model, t.run->state.U, c->nu, exact, &error2));
   PetscCall(report(c, &t, error2));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -469,14 +469,14 @@ static PetscErrorCode check_finer(const Reference *r)
   PetscFunctionBeginUser;
   PetscCall(
     open_problem(r->problem, &(Case){r->problem->name, r->fine.element, r->fine.n, r->nu}, &t));
-  PetscCall(stress_get(t.model, t.run->U, &stress));
+  PetscCall(stress_get(t.model, t.run->state.U, &stress));
   PetscCall(test_scene_close(&t));
   for (const Level *l = r->levels; l->element; l++) {
     const Case c = {r->problem->name, l->element, l->n, r->nu};
     PetscReal error2 = 0.;
 
     PetscCall(open_problem(r->problem, &c, &t));
-    PetscCall(finer_error(t.model, t.run->U, &stress, &error2));
+    PetscCall(finer_error(t.model, t.run->state.U, &stress, &error2));
     PetscCall(report(&c, &t, error2));
     PetscCall(test_scene_close(&t));
   }

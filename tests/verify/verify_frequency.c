@@ -35,7 +35,7 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(modes_factor(m, 0., t->run->U, &ksp));
+  PetscCall(modes_factor(m, 0., t->run->state.U, &ksp));
   PetscCall(VecDuplicate(X, &Y));
   PetscCall(VecDuplicate(X, &Z));
   PetscCall(test_fill(m, bend, X));
@@ -80,11 +80,11 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   PetscCall(
     test_open(&t, BAR "-body_a_element %s -effects clamp -time newmark -ts_dt %g -ts_max_time %g",
               (int)n, element, h, h * (PetscReal)steps));
-  PetscCall(lowest_mode(&t, t.run->U, &w));
+  PetscCall(lowest_mode(&t, t.run->state.U, &w));
   *frequency = w / (2. * PETSC_PI);
-  PetscCall(test_value_at(t.model, t.run->U, end, u0));
+  PetscCall(test_value_at(t.model, t.run->state.U, end, u0));
   PetscCall(verify_solve(&t, "release"));
-  PetscCall(test_value_at(t.model, t.run->U, end, u));
+  PetscCall(test_value_at(t.model, t.run->state.U, end, u));
   angle = 2. * PetscAtanReal(0.5 * w * h) * (PetscReal)steps;
   error = PetscAbsReal(u[2] - u0[2] * PetscCosReal(angle)) / PetscAbsReal(u0[2]);
   test_print("    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n",

@@ -50,7 +50,7 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
     "-effect_high_displacement %s -effect_floor_type contact -effect_floor_response projected "
     "-effect_floor_on meet -effect_floor_obstacle plane:0,0,1,0",
     path, element, young, POISSON, 3 * d, far));
-  t.run->want_residual = PETSC_TRUE;
+  t.run->monitors.want_residual = PETSC_TRUE;
   PetscCall(verify_solve(&t, "plane"));
   PetscCall(contact_column(t.run, 1, "floor", "force_z", &force));
   PetscCall(contact_column(t.run, 1, "floor", "contacts", &contacts));
@@ -58,7 +58,7 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
   test_print("  sphere on a rigid plane, %s, %d^3 cells: %g points touch, force %.4f of the "
              "formula's, the drive pushes with %.4f, %d solves\n",
              element, (int)cells, contacts, 4 * force / P, -4 * reaction / P,
-             (int)t.run->newton_total);
+             (int)t.run->counters.newton);
   SB_CHECK_NEAR(4 * force / P, 1, tolerance, "force of the plane against that of Hertz");
   SB_CHECK_NEAR(-reaction, force, 1e-3 * force, "force of the drive against that of the plane");
   PetscCall(test_scene_close(&t));

@@ -50,7 +50,7 @@ static PetscErrorCode check(const char *element, const Inclusion *in)
   PetscCall(verify_solve(&t, in->name));
   s = t.model->space;
   SB_CHECK_NEAR(t.model->mass, 2000., 2000. * 1e-13, "mass of both halves");
-  PetscCall(VecGetArrayRead(t.run->U, &u));
+  PetscCall(VecGetArrayRead(t.run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscReal x = s->node_x[3 * i];
     const PetscReal exact = near * PetscMin(x, 0.5) + far * PetscMax(0., x - 0.5);
@@ -59,7 +59,7 @@ static PetscErrorCode check(const char *element, const Inclusion *in)
     for (int k = 1; k < 3; k++)
       worst = PetscMax(worst, PetscAbsReal(u[3 * i + k]));
   }
-  PetscCall(VecRestoreArrayRead(t.run->U, &u));
+  PetscCall(VecRestoreArrayRead(t.run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, t.model->comm));
   test_print("%s, %s: error %.1e of the largest displacement\n", element, in->name,
              worst / largest);

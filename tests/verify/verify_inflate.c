@@ -178,7 +178,7 @@ static PetscErrorCode inner_stretch(TestScene *t, PetscInt k, PetscReal *stretch
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceFindSet(s, "inside", "verify_inflate", &inside));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &u));
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     const PetscInt node = s->cell_node[i];
     PetscReal rest = 0.;
@@ -194,7 +194,7 @@ static PetscErrorCode inner_stretch(TestScene *t, PetscInt k, PetscReal *stretch
     sum[0] += PetscSqrtReal(now / rest);
     sum[1] += 1.;
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
   *stretch = sum[0] / sum[1];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,14 +235,16 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
   test_print(
     "  %s, %s: %d load steps, %d Newton and %d linear iterations; stretch %.4f, there p %.5f "
     "(classical %.5f), applied %.5f: %+.2f %%; order %.2f\n",
-    name, solver, (int)t.run->steps_total, (int)t.run->newton_total, (int)t.run->linear_total,
-    stretch, closed_form(k, PETSC_FALSE, stretch), closed_form(k, PETSC_TRUE, stretch), p,
-    100. * (closed_form(k, PETSC_FALSE, stretch) / p - 1.), order);
+    name, solver, (int)t.run->counters.steps, (int)t.run->counters.newton,
+    (int)t.run->counters.linear, stretch, closed_form(k, PETSC_FALSE, stretch),
+    closed_form(k, PETSC_TRUE, stretch), p, 100. * (closed_form(k, PETSC_FALSE, stretch) / p - 1.),
+    order);
   SB_CHECK(stretch > 1.35, "%s: stretch %g only", name, stretch);
   *wrong = closed_form(k, PETSC_FALSE, stretch) / p - 1.;
   SB_CHECK_NEAR(order, 2., 0.15, "order of Newton's method");
-  SB_CHECK(t.run->steps_total == 4 && t.run->newton_total <= 40, "%s, %s: %d steps, %d iterations",
-           name, solver, (int)t.run->steps_total, (int)t.run->newton_total);
+  SB_CHECK(t.run->counters.steps == 4 && t.run->counters.newton <= 40,
+           "%s, %s: %d steps, %d iterations", name, solver, (int)t.run->counters.steps,
+           (int)t.run->counters.newton);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

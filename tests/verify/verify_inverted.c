@@ -31,17 +31,18 @@ static PetscErrorCode check_stops(const char *time, PetscReal shortest)
   for (int refuse = 0; refuse < 2; refuse++) {
 
     PetscCall(test_open(&s, "%s%s", text, refuse ? "reject" : "accept"));
-    s.run->want_energies = PETSC_TRUE;
+    s.run->monitors.want_energies = PETSC_TRUE;
     PetscCall(test_scene_solve(&s));
-    e = s.run->energies;
+    e = s.run->state.energies;
     if (refuse) {
-      SB_CHECK(strstr(s.run->stop_reason, "inverted") && !e.ninverted && e.min_J > 0.,
-               "%s: %d inverted, '%s'", time, (int)e.ninverted, s.run->stop_reason);
-      SB_CHECK(s.run->t_now < 2. / 3 && s.run->t_now > 2. / 3 - 1.01 * shortest,
-               "%s: stops at %.6g", time, s.run->t_now);
+      SB_CHECK(strstr(s.run->clock.stop_reason, "inverted") && !e.ninverted && e.min_J > 0.,
+               "%s: %d inverted, '%s'", time, (int)e.ninverted, s.run->clock.stop_reason);
+      SB_CHECK(s.run->clock.t < 2. / 3 && s.run->clock.t > 2. / 3 - 1.01 * shortest,
+               "%s: stops at %.6g", time, s.run->clock.t);
     } else {
-      SB_CHECK(!s.run->stop_reason[0] && e.ninverted && PetscAbsReal(s.run->t_now - 1.) < 1e-6,
-               "%s: t %.6g, '%s'", time, s.run->t_now, s.run->stop_reason);
+      SB_CHECK(!s.run->clock.stop_reason[0] && e.ninverted &&
+                 PetscAbsReal(s.run->clock.t - 1.) < 1e-6,
+               "%s: t %.6g, '%s'", time, s.run->clock.t, s.run->clock.stop_reason);
     }
     PetscCall(test_scene_close(&s));
   }
@@ -66,13 +67,13 @@ static PetscErrorCode check_mirrored(void)
     PRESS
     "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted reject",
     &s));
-  s.run->want_energies = PETSC_TRUE;
-  PetscCall(test_fill(s.model, mirror, s.run->U));
-  PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e));
+  s.run->monitors.want_energies = PETSC_TRUE;
+  PetscCall(test_fill(s.model, mirror, s.run->state.U));
+  PetscCall(SbModelEnergies(s.model, s.run->state.U, s.run->state.V, &e));
   SB_CHECK(e.ninverted == s.model->mesh->Ncell, "%d tets are inverted at first", (int)e.ninverted);
   PetscCall(test_scene_solve(&s));
-  SB_CHECK(!s.run->stop_reason[0] && s.run->t_now == 1., "stops at %g s: %s", s.run->t_now,
-           s.run->stop_reason);
+  SB_CHECK(!s.run->clock.stop_reason[0] && s.run->clock.t == 1., "stops at %g s: %s",
+           s.run->clock.t, s.run->clock.stop_reason);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -65,8 +65,8 @@ static PetscErrorCode compare(const char *what, const char *name, SbErrorSource 
   PetscCall(verify_solve(&reference, what));
   PetscCall(test_open(&t, "%s %s -ledger yes", scene, coarse));
   PetscCall(verify_solve(&t, what));
-  PetscCall(
-    distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(distance(reference.model, reference.run->state.U, reference.run->state.V,
+                     t.run->state.U, t.run->state.V, &error));
   PetscCall(test_ledger(t.run, source, &estimate, &stored));
 
   /* the remainder of Newton's method is partly that of its linear solves */
@@ -221,14 +221,15 @@ static PetscErrorCode spectator(const char *options)
       i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
     PetscCall(verify_solve(&t[i], "spectator"));
   }
-  SB_CHECK(!t[0].ledger && !t[0].run->post_solve.fn && !t[0].run->ncolumn,
+  SB_CHECK(!t[0].ledger && !t[0].run->monitors.post_solve.fn && !t[0].run->monitors.ncolumn,
            "a run without -ledger has one");
-  SB_CHECK(t[1].run->ncolumn == SB_ERROR_COUNT, "%d columns", (int)t[1].run->ncolumn);
-  PetscCall(VecAXPY(t[1].run->U, -1., t[0].run->U));
-  PetscCall(VecNorm(t[1].run->U, NORM_INFINITY, &difference));
+  SB_CHECK(t[1].run->monitors.ncolumn == SB_ERROR_COUNT, "%d columns",
+           (int)t[1].run->monitors.ncolumn);
+  PetscCall(VecAXPY(t[1].run->state.U, -1., t[0].run->state.U));
+  PetscCall(VecNorm(t[1].run->state.U, NORM_INFINITY, &difference));
   SB_CHECK(difference == 0., "with a ledger displacements differ by %g m: %s", difference, options);
-  SB_CHECK(t[0].run->linear_total == t[1].run->linear_total, "with a ledger iterations differ: %s",
-           options);
+  SB_CHECK(t[0].run->counters.linear == t[1].run->counters.linear,
+           "with a ledger iterations differ: %s", options);
   for (int i = 0; i < 2; i++)
     PetscCall(test_scene_close(&t[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -250,12 +251,12 @@ static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
     &t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g",
     accuracy));
   PetscCall(verify_solve(&t, "dial"));
-  PetscCall(
-    distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(distance(reference.model, reference.run->state.U, reference.run->state.V,
+                     t.run->state.U, t.run->state.V, &error));
   PetscCall(test_ledger(t.run, SB_ERROR_TIME, &form, &stored));
-  *steps = t.run->steps_total;
+  *steps = t.run->counters.steps;
   test_print("  -accuracy %g: %d steps, %d iterations, error %.2e\n", accuracy, (int)*steps,
-             (int)t.run->linear_total, error / PetscSqrtReal(stored));
+             (int)t.run->counters.linear, error / PetscSqrtReal(stored));
   SB_CHECK(error < accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g", accuracy,
            error / PetscSqrtReal(stored));
   SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good",
@@ -307,7 +308,7 @@ static PetscErrorCode gaps(void)
 
     PetscCall(test_open(&t, "%s -accuracy %g", plate, asked[i]));
     PetscCall(verify_solve(&t, "plate"));
-    PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
+    PetscCall(SbModelEnergies(t.model, t.run->state.U, NULL, &energies));
     error =
       PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
     test_print("  plate, -accuracy %g: force off by %.1e, width %.1e m\n", asked[i], error,
@@ -321,8 +322,8 @@ static PetscErrorCode gaps(void)
 
     PetscCall(test_open(&t, "%s -accuracy %g", ball, asked[i]));
     PetscCall(verify_solve(&t, "ball"));
-    PetscCall(
-      distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+    PetscCall(distance(reference.model, reference.run->state.U, reference.run->state.V,
+                       t.run->state.U, t.run->state.V, &error));
     PetscCall(test_ledger(t.run, SB_ERROR_SPACE, &mesh, &stored));
     test_print("  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n", asked[i],
                error / PetscSqrtReal(stored), mesh / PetscSqrtReal(stored));

@@ -139,11 +139,12 @@ static PetscErrorCode solve(const char *element, PetscInt nx, PetscInt ny, Frame
     -f->full * width / WIDTH));
   PetscCall(SbRunAddMonitor(t.run, watch, f));
   PetscCall(verify_solve(&t, "frame"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s, %d cells through the depth: %d steps, %d rejected, %d Newton iterations\n", element,
-    (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total));
-  SB_CHECK(t.run->t_now == 1., "the path ended at the load factor %g", t.run->t_now);
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  %s, %d cells through the depth: %d steps, %d rejected, %d Newton iterations\n",
+                element, (int)ny, (int)t.run->counters.steps, (int)t.run->counters.rejected,
+                (int)t.run->counters.newton));
+  SB_CHECK(t.run->clock.t == 1., "the path ended at the load factor %g", t.run->clock.t);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

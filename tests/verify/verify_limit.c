@@ -40,13 +40,14 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
                       steps, more));
   PetscCall(SbRunSolve(t.run));
   test_print("  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n", load, steps, more,
-             t.run->t_now, (int)t.run->steps_total, t.run->softening, t.run->stop_reason);
-  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit",
-           t.run->t_now);
-  SB_CHECK_NEAR(t.run->t_now, reached, 1e-3 / steps, "load factor reached");
-  SB_CHECK(t.run->steps_total <= steps + 60, "%d steps", (int)t.run->steps_total);
-  SB_CHECK((t.run->stop_reason[0] == 0) == (reached == 1.), "%s", t.run->stop_reason);
-  SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", t.run->softening);
+             t.run->clock.t, (int)t.run->counters.steps, t.run->solve.softening,
+             t.run->clock.stop_reason);
+  SB_CHECK(reached == 1. || t.run->clock.t < reached + 1e-9, "load factor %g beyond the limit",
+           t.run->clock.t);
+  SB_CHECK_NEAR(t.run->clock.t, reached, 1e-3 / steps, "load factor reached");
+  SB_CHECK(t.run->counters.steps <= steps + 60, "%d steps", (int)t.run->counters.steps);
+  SB_CHECK((t.run->clock.stop_reason[0] == 0) == (reached == 1.), "%s", t.run->clock.stop_reason);
+  SB_CHECK(reached == 1. || t.run->solve.softening > 30., "softening %g", t.run->solve.softening);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -65,13 +66,14 @@ static PetscErrorCode check_follower_end(const char *element)
                       load, element));
   PetscCall(SbRunSolve(t.run));
   test_print("  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n", load, element,
-             t.run->t_now, (int)t.run->steps_total, (int)t.run->newton_total, t.run->stop_reason);
+             t.run->clock.t, (int)t.run->counters.steps, (int)t.run->counters.newton,
+             t.run->clock.stop_reason);
 
   /* below the limit by the least increment; the iterations are bounded by twice those of the
      slowest element */
-  SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
-  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, t.run->softening);
-  SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
+  SB_CHECK_NEAR(t.run->clock.t, reached, 1e-3, "load factor");
+  SB_CHECK(t.run->solve.softening > 10., "%s: softening %g", element, t.run->solve.softening);
+  SB_CHECK(t.run->counters.newton < 280, "%s: %d iterations", element, (int)t.run->counters.newton);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,12 +95,12 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
   PetscCall(verify_solve(&t, "curl"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
-    element, nu, pressure, (int)t.run->newton_total, (int)t.run->linear_total,
-    (int)t.run->rejected_total));
-  SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           t.run->t_now, (int)t.run->rejected_total);
-  SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element,
-           (int)t.run->newton_total);
+    element, nu, pressure, (int)t.run->counters.newton, (int)t.run->counters.linear,
+    (int)t.run->counters.rejected));
+  SB_CHECK(t.run->clock.t == 1. && !t.run->counters.rejected, "%s: load factor %g, %d rejected",
+           element, t.run->clock.t, (int)t.run->counters.rejected);
+  SB_CHECK(t.run->counters.newton <= iterations, "%s: %d Newton iterations", element,
+           (int)t.run->counters.newton);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,21 +125,21 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
               "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
               "-body_a_element %s",
               nu, element));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "pull"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element, nu,
-    (int)t.run->newton_total, (int)t.run->rejected_total, t.run->energies.strain));
-  SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           t.run->t_now, (int)t.run->rejected_total);
+    (int)t.run->counters.newton, (int)t.run->counters.rejected, t.run->state.energies.strain));
+  SB_CHECK(t.run->clock.t == 1. && !t.run->counters.rejected, "%s: load factor %g, %d rejected",
+           element, t.run->clock.t, (int)t.run->counters.rejected);
 
   /* 1.5 times the measured number */
-  SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element,
-           (int)t.run->newton_total);
+  SB_CHECK(t.run->counters.newton < 250, "%s: %d Newton iterations", element,
+           (int)t.run->counters.newton);
 
   /* P1 is too stiff by 6 % */
-  SB_CHECK_NEAR(t.run->energies.strain, energy, 0.08 * energy, "strain energy");
+  SB_CHECK_NEAR(t.run->state.energies.strain, energy, 0.08 * energy, "strain energy");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,7 +175,7 @@ static PetscErrorCode open_branch(const char *dir, PetscBool follower, const cha
                           follower ? "-effect_press_type pressure -effect_press_value %.17g" : DEAD,
                           follower ? 0.2 : -0.2));
   PetscCall(test_open_in(dir, t, CUBE "-static_steps 10 %s %s", load, more));
-  t->run->want_energies = PETSC_TRUE;
+  t->run->monitors.want_energies = PETSC_TRUE;
   *b = (Branch){.load = 0.2};
   PetscCall(SbRunAddMonitor(t->run, watch, b));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -190,11 +192,12 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscCall(open_branch(NULL, follower, more, &b, &t));
   PetscCall(verify_solve(&t, "branch"));
   test_print("  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n",
-             more, (int)t.run->steps_total, (int)t.run->rejected_total, b.top, b.s, b.error);
+             more, (int)t.run->counters.steps, (int)t.run->counters.rejected, b.top, b.s, b.error);
 
   /* tolerance of the residual: 1e-8 of the load */
   SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, b.error);
-  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, t.run->t_now);
+  SB_CHECK((t.run->clock.t == 1.) == !follower, "%s: the path ended at %.17g", more,
+           t.run->clock.t);
   SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, b.s);
   SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, b.top);
   PetscCall(test_scene_close(&t));
@@ -211,15 +214,16 @@ static PetscErrorCode check_drive(void)
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, CUBE ARC "-static_steps 10 -effect_press_type prescribed_displacement "
                                    "-effect_press_displacement 0;0;-0.5"));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(verify_solve(&t, "prescribed_displacement"));
-  test_print("  drive: %d steps, %d Newton iterations, s %.12f\n", (int)t.run->steps_total,
-             (int)t.run->newton_total, b.s);
-  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g",
-           b.s, t.run->t_now);
-  SB_CHECK(t.run->rejected_total == 0 && t.run->newton_total <= 5 * t.run->steps_total,
-           "%d Newton iterations in %d steps", (int)t.run->newton_total, (int)t.run->steps_total);
+  test_print("  drive: %d steps, %d Newton iterations, s %.12f\n", (int)t.run->counters.steps,
+             (int)t.run->counters.newton, b.s);
+  SB_CHECK(t.run->clock.t == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g",
+           b.s, t.run->clock.t);
+  SB_CHECK(t.run->counters.rejected == 0 && t.run->counters.newton <= 5 * t.run->counters.steps,
+           "%d Newton iterations in %d steps", (int)t.run->counters.newton,
+           (int)t.run->counters.steps);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,7 +252,7 @@ static PetscErrorCode check_restart(const char *first, const char *checkpoint, P
   PetscCall(SbRunSolve(t.run));
   test_print("  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first, checkpoint,
              whole.s, b.s, b.error);
-  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", b.error);
+  SB_CHECK(t.run->counters.steps > 1 && b.error < 1e-8 * b.load, "%g E off the branch", b.error);
   SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", b.s);
   SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", b.s, whole.s);
   PetscCall(test_scene_close(&t));

@@ -45,12 +45,12 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
               "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
               poisson, (int)steps, extra));
   *o = (Outcome){0};
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SNESMonitorSet(t.run->snes, keep, o, NULL));
+  t.run->monitors.want_energies = PETSC_TRUE;
+  PetscCall(SNESMonitorSet(t.run->solve.snes, keep, o, NULL));
   PetscCall(verify_solve(&t, "bend"));
-  o->iterations = t.run->newton_total;
-  o->rejected = t.run->rejected_total;
-  o->strain = t.run->energies.strain;
+  o->iterations = t.run->counters.newton;
+  o->rejected = t.run->counters.rejected;
+  o->strain = t.run->state.energies.strain;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -146,8 +146,8 @@ static PetscErrorCode check_come_back(void)
       "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
       k ? "pressure" : "direct"));
     PetscCall(verify_solve(&t, "come back"));
-    iterations[k] = t.run->newton_total;
-    SB_CHECK(t.run->rejected_total == 0, "%d rejected steps", (int)t.run->rejected_total);
+    iterations[k] = t.run->counters.newton;
+    SB_CHECK(t.run->counters.rejected == 0, "%d rejected steps", (int)t.run->counters.rejected);
     PetscCall(test_scene_close(&t));
   }
   test_print("  come back: %d iterations with loose solves, %d with exact ones\n",

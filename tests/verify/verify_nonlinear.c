@@ -51,11 +51,11 @@ static PetscErrorCode check_order(const char *element, const char *law, const ch
     element, law, tangent,
     strcmp(element, "p1") ? "-effect_air_follower false -body_a_young 1e6" : ""));
   PetscCall(verify_solve(&t, law));
-  PetscCall(test_value_at(t.model, t.run->U, end, at));
+  PetscCall(test_value_at(t.model, t.run->state.U, end, at));
   PetscCall(verify_newton(&t, ripple, 1e-3, error, &order));
   test_print("  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes "
              "%.1e, %.1e: order %.2f\n",
-             element, law, tangent, (int)t.run->newton_total, error[0], error[1], order);
+             element, law, tangent, (int)t.run->counters.newton, error[0], error[1], order);
   SB_CHECK_NEAR(order, expected, 0.1, "order of Newton's method");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -125,7 +125,7 @@ static PetscErrorCode follow(const char *element, const char *law, int steps, Pe
               "-static_steps %d %s " TIGHT,
     element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
     strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_path, path));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_scene_close(&t));
@@ -188,11 +188,11 @@ static PetscErrorCode swing(const char *options, Result *r)
   PetscCall(test_open(&t, BAR CLAMP "-effects gravity,clamp %s", options));
   PetscCall(SbRunAddMonitor(t.run, watch_step, r));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(test_value_at(t.model, t.run->U, end, r->u));
-  r->steps = t.run->steps_total;
-  r->rejected = t.run->rejected_total;
-  r->newton = t.run->newton_total;
-  PetscCall(PetscStrncpy(r->reason, t.run->stop_reason, sizeof(r->reason)));
+  PetscCall(test_value_at(t.model, t.run->state.U, end, r->u));
+  r->steps = t.run->counters.steps;
+  r->rejected = t.run->counters.rejected;
+  r->newton = t.run->counters.newton;
+  PetscCall(PetscStrncpy(r->reason, t.run->clock.stop_reason, sizeof(r->reason)));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -85,21 +85,22 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   trace->bytes = after - before;
   trace->n = verify_numbers(t.model);
   trace->v = NULL;
-  PetscCall(verify_gather(t.model, t.run->U, &trace->u));
-  if (t.run->V)
-    PetscCall(verify_gather(t.model, t.run->V, &trace->v));
+  PetscCall(verify_gather(t.model, t.run->state.U, &trace->u));
+  if (t.run->state.V)
+    PetscCall(verify_gather(t.model, t.run->state.V, &trace->v));
   if (!strstr(options, "-effects")) {
     const SbModel m = t.model;
 
     SB_CHECK(!m->neffect && !m->nprescribe && !m->nforce && !m->ntangent && !m->naccept &&
                !m->nhistory,
              "a scene without effects has entries in its lists");
-    SB_CHECK(!m->space->nfixed && !t.run->damped && !t.run->nmonitor && !t.run->output &&
-               !t.run->loads && !t.run->reaction,
+    SB_CHECK(!m->space->nfixed && !t.run->solve.damped && !t.run->monitors.n &&
+               !t.run->monitors.output && !t.run->state.loads && !t.run->state.reaction,
              "something else exists");
   }
   if (strstr(options, "static"))
-    SB_CHECK(!t.run->V && !t.run->A && !t.run->ts, "a static run has an integrator");
+    SB_CHECK(!t.run->state.V && !t.run->state.A && !t.run->solve.ts,
+             "a static run has an integrator");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

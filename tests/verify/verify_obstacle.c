@@ -42,7 +42,7 @@ static PetscErrorCode fall_on(const char *obstacle, PetscReal *u[], PetscInt *n,
               obstacle));
   PetscCall(record_solve(&t, r));
   *n = 3 * verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, u));
+  PetscCall(verify_gather(t.model, t.run->state.U, u));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,7 +49,7 @@ static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w,
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(force, sizeof(PetscReal) * 2 * BODIES * (BODIES + 1) * 3));
   n[0] = n[1] = 0;
-  PetscCall(SbContactSetPoints(&run->model->contacts, t, run->U, &list));
+  PetscCall(SbContactSetPoints(&run->model->contacts, t, run->state.U, &list));
   for (PetscInt i = 0; i < list.n; i++) {
     const SbContactPoint *p = &list.point[i];
 
@@ -129,7 +129,7 @@ static PetscErrorCode check_heap(const char *more)
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, HEAP "%s", more));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_heap, &w));
   PetscCall(verify_solve(&t, more));
   counts[0] = w.places;
@@ -205,7 +205,7 @@ static PetscErrorCode check_fold(void)
            "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact -effect_meet_self yes "
            "-effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time 0.085",
     path));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_fold, most));
   PetscCall(verify_solve(&t, "fold"));
   test_print("  fold: up to %d contacts with %g N\n", (int)most[0], most[1]);

@@ -199,7 +199,7 @@ static PetscErrorCode errors(TestScene *t, const PetscReal F[9], const PetscReal
   PetscFunctionBeginUser;
   error[0] = error[1] = 0.;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &cell));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &u));
   SbSpaceCellState(s, u, cell, NULL, NULL, NULL);
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3];
@@ -218,7 +218,7 @@ static PetscErrorCode errors(TestScene *t, const PetscReal F[9], const PetscReal
       size[1] = PetscMax(size[1], PetscAbsReal(sigma[k]));
     }
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &u));
   PetscCall(PetscFree(cell));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, error, 2, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, size, 2, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
@@ -306,7 +306,7 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   test_print(
     "  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n",
     p->element, shapes[p->shape], law, nu, pulled ? "tractions" : "moved",
-    t.model->body[0].min_dihedral, error[0], error[1], (int)t.run->newton_total);
+    t.model->body[0].min_dihedral, error[0], error[1], (int)t.run->counters.newton);
   SB_CHECK(error[0] <= (nu > 0.4 && strcmp(p->element, "p1") ? 1e-9 : 1e-10),
            "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, nu,
            error[0]);

@@ -59,7 +59,7 @@ static PetscErrorCode check_derivatives(const char *mesh, const char *law, const
                       "-bodies a -body_a_mesh %s" BODY
                       "-body_a_element p2 -body_a_volume %s %s -time euler_implicit -ts_dt 0.1",
                       mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
-  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(VecDuplicate(t.run->state.U, &U));
   PetscCall(VecDuplicate(U, &D));
   PetscCall(VecDuplicate(U, &AD));
   for (int k = 0; k < 3; k++)

@@ -76,9 +76,9 @@ static PetscErrorCode patch(void)
   PetscCall(verify_solve(&t, "patch"));
   s = t.model->space;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
-  PetscCall(SbSpaceGetLocalRead(s, t.run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t.run->state.U, &u));
   SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t.run->state.U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
     mean += sigma[6 * c + 2] / (PetscReal)s->mesh->Ncell;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mean, 1, MPIU_REAL, MPI_SUM, t.model->comm));

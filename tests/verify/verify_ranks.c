@@ -21,12 +21,13 @@ static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_on(comm, NULL, options, &t));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, options));
-  *state = (State){.n = verify_numbers(t.model), .steps = t.run->steps_total, .e = t.run->energies};
-  PetscCall(verify_gather(t.model, t.run->U, &state->u));
-  if (t.run->V)
-    PetscCall(verify_gather(t.model, t.run->V, &state->v));
+  *state = (State){
+    .n = verify_numbers(t.model), .steps = t.run->counters.steps, .e = t.run->state.energies};
+  PetscCall(verify_gather(t.model, t.run->state.U, &state->u));
+  if (t.run->state.V)
+    PetscCall(verify_gather(t.model, t.run->state.V, &state->v));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -126,26 +126,26 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
   PetscFunctionBeginUser;
   PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element p1 %s %s", element,
                       mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
-  PetscCall(test_fill(p.a.model, linear, p.a.run->U));
-  PetscCall(test_fill(p.a.model, quadratic, p.a.run->V));
-  PetscCall(test_fill(p.a.model, linear, p.a.run->A));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->state.U));
+  PetscCall(test_fill(p.a.model, quadratic, p.a.run->state.V));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->state.A));
   PetscCall(make_second(&p, fixture_cone));
   SB_CHECK(!p.outcome[0].message[0], "%s: %s", element, p.outcome[0].message);
   SB_CHECK(p.b.model->body[0].ncell == p.a.model->body[0].nfacet && p.a.model->body[0].ncell == 96,
            "%s: %d tets, then %d", element, (int)p.a.model->body[0].ncell,
            (int)p.b.model->body[0].ncell);
-  PetscCall(difference(p.b.model, linear, p.b.run->U, &worst));
+  PetscCall(difference(p.b.model, linear, p.b.run->state.U, &worst));
   SB_CHECK(worst < 1e-13, "%s: a linear displacement is wrong by %g m", element, worst);
-  PetscCall(difference(p.b.model, linear, p.b.run->A, &worst));
+  PetscCall(difference(p.b.model, linear, p.b.run->state.A, &worst));
   if (!strcmp(element, "p2") && !mesh) {
     PetscReal wrong;
 
-    PetscCall(difference(p.b.model, quadratic, p.b.run->V, &wrong));
+    PetscCall(difference(p.b.model, quadratic, p.b.run->state.V, &wrong));
     SB_CHECK(wrong < 1e-13, "a quadratic velocity is wrong by %g m/s", wrong);
   }
   SB_CHECK(worst < 1e-13, "%s: a linear acceleration is wrong by %g m/s^2", element, worst);
-  PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
-  PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
+  PetscCall(SbModelEnergies(p.a.model, p.a.run->state.U, p.a.run->state.V, &e[0]));
+  PetscCall(SbModelEnergies(p.b.model, p.b.run->state.U, p.b.run->state.V, &e[1]));
   SB_CHECK_NEAR(e[1].strain, e[0].strain, 1e-12 * e[0].strain,
                 "strain energy of a linear displacement");
   SB_CHECK_NEAR(e[1].volume, e[0].volume, 1e-13 * e[0].volume, "volume now");
@@ -203,12 +203,12 @@ static PetscErrorCode check_same(const char *element, const char *mesh)
   PetscFunctionBeginUser;
   PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element %s %s %s", element,
                       element, mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
-  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
-  PetscCall(test_fill(p.a.model, linear, p.a.run->V));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->state.U));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->state.V));
   PetscCall(make_second(&p, fixture_cone));
   for (int body = 0; body < 2; body++) {
-    PetscCall(bits_of(p.a.model, p.a.run->U, body, (PetscBool)!body, &a));
-    PetscCall(bits_of(p.b.model, p.b.run->U, body, (PetscBool)!body, &b));
+    PetscCall(bits_of(p.a.model, p.a.run->state.U, body, (PetscBool)!body, &a));
+    PetscCall(bits_of(p.b.model, p.b.run->state.U, body, (PetscBool)!body, &b));
     SB_CHECK(a == b, "%s: displacements of %s have changed", element,
              body ? "a body that is as it was" : "the surface");
   }
@@ -226,14 +226,14 @@ static PetscErrorCode check_momenta(const char *more)
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&p.a, TWO EULER "%s", more));
-  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
-  PetscCall(test_fill(p.a.model, curved, p.a.run->V));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->state.U));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->state.V));
   PetscCall(make_second(&p, fixture_cone));
-  PetscCall(SbBodyMomenta(p.a.model, p.a.run->U, p.a.run->V, before));
-  PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, after));
-  PetscCall(SbBodySetMomenta(p.b.model, p.b.run->U, p.b.run->V, named,
+  PetscCall(SbBodyMomenta(p.a.model, p.a.run->state.U, p.a.run->state.V, before));
+  PetscCall(SbBodyMomenta(p.b.model, p.b.run->state.U, p.b.run->state.V, after));
+  PetscCall(SbBodySetMomenta(p.b.model, p.b.run->state.U, p.b.run->state.V, named,
                              (const PetscReal(*)[6])before, &speed));
-  PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, corrected));
+  PetscCall(SbBodyMomenta(p.b.model, p.b.run->state.U, p.b.run->state.V, corrected));
   for (int b = 0; b < 2; b++) {
     PetscReal moved = 0;
 
@@ -273,11 +273,11 @@ static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
     PetscCall(curved_mesh_write(n, n, curved_wobble, PETSC_TRUE, mesh));
   PetscCall(
     test_open(&p.a, TWO EULER "-body_a_mesh %s %s", mesh, bent ? "-body_a_element p2" : ""));
-  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->state.U));
   PetscCall(make_second(&p, SbMesherDefault));
   SB_CHECK(!p.outcome[0].message[0], "%d cells: %s", n, p.outcome[0].message);
-  PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
-  PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
+  PetscCall(SbModelEnergies(p.a.model, p.a.run->state.U, p.a.run->state.V, &e[0]));
+  PetscCall(SbModelEnergies(p.b.model, p.b.run->state.U, p.b.run->state.V, &e[1]));
   *part = PetscAbsReal(e[1].strain - e[0].strain) / e[0].strain;
   PetscCall(close_pair(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -314,19 +314,19 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
                       "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
                       "-remesh_times 0.02,0.03 -remesh_bodies a %s",
                       element, more));
-  s.run->want_energies = PETSC_TRUE;
+  s.run->monitors.want_energies = PETSC_TRUE;
   mass = 900 * s.model->body[0].volume;
   SbRemeshSetMesher(s.remesh, fixture_cone, &calls);
   PetscCall(test_scene_solve(&s));
   PetscCallMPI(MPI_Bcast(&calls, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  SB_CHECK(calls == 2 && !s.run->stop_reason[0], "%s %s: meshed %d times; %s", more, element, calls,
-           s.run->stop_reason);
-  SB_CHECK_NEAR(s.run->t_now, 0.05, 1e-10, "end");
-  SB_CHECK(explicit || (s.run->steps_total == 5 && s.run->step_now == 5),
-           "%d steps, the last one is %d", (int)s.run->steps_total, (int)s.run->step_now);
-  e = s.run->energies;
-  sum = e.kinetic + e.strain + e.integrator_loss + e.remesh_loss - s.run->energy_start;
-  scale = s.run->energy_start;
+  SB_CHECK(calls == 2 && !s.run->clock.stop_reason[0], "%s %s: meshed %d times; %s", more, element,
+           calls, s.run->clock.stop_reason);
+  SB_CHECK_NEAR(s.run->clock.t, 0.05, 1e-10, "end");
+  SB_CHECK(explicit || (s.run->counters.steps == 5 && s.run->clock.step == 5),
+           "%d steps, the last one is %d", (int)s.run->counters.steps, (int)s.run->clock.step);
+  e = s.run->state.energies;
+  sum = e.kinetic + e.strain + e.integrator_loss + e.remesh_loss - s.run->state.energy_start;
+  scale = s.run->state.energy_start;
   SB_CHECK_NEAR(sum, 0, 1e-12 * scale, "account");
   SB_CHECK(e.remesh_loss != 0 && PetscAbsReal(e.remesh_loss) < 0.2 * scale,
            "remesh_loss %g of %g J", e.remesh_loss, scale);
@@ -347,8 +347,8 @@ static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *
   if (s.remesh)
     SbRemeshSetMesher(s.remesh, mesher, NULL);
   PetscCall(test_scene_solve(&s));
-  PetscCall(VecNorm(s.run->U, NORM_2, norm));
-  SB_CHECK(s.run->steps_total == 5, "%d steps", (int)s.run->steps_total);
+  PetscCall(VecNorm(s.run->state.U, NORM_2, norm));
+  SB_CHECK(s.run->counters.steps == 5, "%d steps", (int)s.run->counters.steps);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -366,7 +366,7 @@ static PetscErrorCode check_sets(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(text, &p.a));
-  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->state.U));
   PetscCall(make_second(&p, fixture_cone));
   for (int i = 0; i < 2; i++) {
     const SbModel m = i ? p.b.model : p.a.model;

@@ -177,9 +177,9 @@ static PetscErrorCode penetration(SbRun run, const char *name, PetscReal *depth)
   PetscFunctionBeginUser;
   *depth = -1.;
   PetscCall(PetscCalloc1(e->ncolumn, &values));
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
   PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
   for (PetscInt k = 0; k < e->ncolumn; k++)
     if (!strcmp(e->column[k], name))
       *depth = values[k];
@@ -212,12 +212,12 @@ static PetscErrorCode check_run(const char *scene, PetscBool pair, PetscReal end
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(scene, &s));
-  s.run->want_energies = PETSC_TRUE;
+  s.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(test_scene_solve(&s));
-  e = s.run->energies;
-  scale = s.run->energy_start;
-  SB_CHECK(!s.run->stop_reason[0] && PetscAbsReal(s.run->t_now - end) < 1e-9,
-           "'%s' ends at %g s: %s", scene, s.run->t_now, s.run->stop_reason);
+  e = s.run->state.energies;
+  scale = s.run->state.energy_start;
+  SB_CHECK(!s.run->clock.stop_reason[0] && PetscAbsReal(s.run->clock.t - end) < 1e-9,
+           "'%s' ends at %g s: %s", scene, s.run->clock.t, s.run->clock.stop_reason);
   SB_CHECK(s.model->body[0].in_memory && e.remesh_loss != 0., "'%s' was not re-meshed", scene);
   SB_CHECK(PetscAbsReal(e.remesh_loss) < 0.1 * scale, "'%s': %g of %g J by re-meshing", scene,
            e.remesh_loss, scale);
@@ -228,7 +228,7 @@ static PetscErrorCode check_run(const char *scene, PetscBool pair, PetscReal end
   if (pair)
     PetscCall(penetration(s.run, "penetration", &depth));
   else
-    PetscCall(below(s.model, s.run->U, &depth));
+    PetscCall(below(s.model, s.run->state.U, &depth));
   SB_CHECK(depth >= 0. && depth < (strstr(scene, " dg") ? 4e-3 : 1e-3), "'%s': %g m deep", scene,
            depth);
   drift = PetscMax(PetscAbsReal(e.momentum[0]),
@@ -300,20 +300,20 @@ static PetscErrorCode check_held(const char *more)
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&s, BEAM "-ts_dt 0.005 -ts_max_time 0.06 -remesh_times 0.03 %s", more));
-  s.run->want_energies = PETSC_TRUE;
+  s.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(test_scene_solve(&s));
-  SB_CHECK_NEAR(s.run->t_now, 0.06, 1e-9, "end");
-  SB_CHECK(!s.run->stop_reason[0] && s.model->body[0].in_memory, "%s: %s", more,
-           s.run->stop_reason);
-  PetscCall(VecGetArrayRead(s.run->U, &u));
+  SB_CHECK_NEAR(s.run->clock.t, 0.06, 1e-9, "end");
+  SB_CHECK(!s.run->clock.stop_reason[0] && s.model->body[0].in_memory, "%s: %s", more,
+           s.run->clock.stop_reason);
+  PetscCall(VecGetArrayRead(s.run->state.U, &u));
   for (PetscInt i = 0; i < s.model->space->nnode_owned; i++)
     for (int k = 0; k < 3; k++)
       worst =
         PetscMax(worst, s.model->space->fixed[i] & (1 << k) ? PetscAbsReal(u[3 * i + k]) : 0.);
-  PetscCall(VecRestoreArrayRead(s.run->U, &u));
+  PetscCall(VecRestoreArrayRead(s.run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
-  SB_CHECK(worst == 0. && s.run->energies.max_displacement > 0.01, "%s: the support gives by %g m",
-           more, worst);
+  SB_CHECK(worst == 0. && s.run->state.energies.max_displacement > 0.01,
+           "%s: the support gives by %g m", more, worst);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -327,12 +327,12 @@ static PetscErrorCode ledger_run(const char *more, PetscReal error[2], PetscInt 
   PetscFunctionBeginUser;
   PetscCall(test_open(&s, BEAM "-ts_dt 0.005 -ts_max_time 0.08 -ledger %s", more));
   PetscCall(test_scene_solve(&s));
-  SB_CHECK(!s.run->stop_reason[0], "%s: %s", more, s.run->stop_reason);
+  SB_CHECK(!s.run->clock.stop_reason[0], "%s: %s", more, s.run->clock.stop_reason);
   PetscCall(test_ledger(s.run, SB_ERROR_TIME, &error[0], &stored));
   PetscCall(test_ledger(s.run, SB_ERROR_SPACE, &error[1], &stored));
   for (int k = 0; k < 2; k++)
     error[k] /= PetscSqrtReal(stored);
-  *steps = s.run->steps_total;
+  *steps = s.run->counters.steps;
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -379,13 +379,13 @@ static PetscErrorCode check_failed(const char *iterations, PetscBool first)
   SbRemeshSetMesher(s.remesh, fixture_cone, &calls);
   PetscCall(test_scene_solve(&s));
   PetscCallMPI(MPI_Bcast(&calls, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  SB_CHECK(s.run->stop_reason[0] && s.run->t_now < 1., "a run with %s iterations comes to its end",
-           iterations);
-  SB_CHECK(first == !calls && first == !s.run->step_now, "%s iterations: %d re-meshings, %d steps",
-           iterations, calls, (int)s.run->step_now);
+  SB_CHECK(s.run->clock.stop_reason[0] && s.run->clock.t < 1.,
+           "a run with %s iterations comes to its end", iterations);
+  SB_CHECK(first == !calls && first == !s.run->clock.step,
+           "%s iterations: %d re-meshings, %d steps", iterations, calls, (int)s.run->clock.step);
   SB_CHECK(first || (s.model->body[0].in_memory && s.model->body[0].in_memory->step > 0),
            "no new mesh");
-  SB_CHECK(first || s.model->load > s.run->t_now, "the attempt has its own load factor");
+  SB_CHECK(first || s.model->load > s.run->clock.t, "the attempt has its own load factor");
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

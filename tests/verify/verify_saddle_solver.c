@@ -20,13 +20,13 @@ static PetscErrorCode solve(const char *scene, const char *more, PetscReal **u, 
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "%s %s", scene, more));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, more));
   *n = 3 * verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, u));
-  *e = t.run->energies;
-  test_print("  %s: %d solves, %d iterations\n", more, (int)t.run->newton_total,
-             (int)t.run->linear_total);
+  PetscCall(verify_gather(t.model, t.run->state.U, u));
+  *e = t.run->state.energies;
+  test_print("  %s: %d solves, %d iterations\n", more, (int)t.run->counters.newton,
+             (int)t.run->counters.linear);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -150,10 +150,10 @@ static PetscErrorCode bend(const char *more, PetscReal *strain, PetscInt *newton
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, BENT "%s", more));
-  t.run->want_energies = PETSC_TRUE;
+  t.run->monitors.want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, more));
-  *strain = t.run->energies.strain;
-  *newton = t.run->newton_total;
+  *strain = t.run->state.energies.strain;
+  *newton = t.run->counters.newton;
   test_print("  bent, %s: %.9g J, %d iterations\n", more, *strain, (int)*newton);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -206,8 +206,8 @@ int main(int argc, char **argv)
                                                        "-ksp_max_it 5 -time_max_halvings 1",
                             &t));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(strstr(t.run->stop_reason, "DIVERGED_ITS"), "five iterations: \"%s\"",
-           t.run->stop_reason);
+  SB_CHECK(strstr(t.run->clock.stop_reason, "DIVERGED_ITS"), "five iterations: \"%s\"",
+           t.run->clock.stop_reason);
   PetscCall(test_scene_close(&t));
   if (test_size == 1) {
     PetscCall(compare("prescribed_displacement", DRIVE EXACT, 3, drive, 10 * SETTLED));

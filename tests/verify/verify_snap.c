@@ -124,11 +124,11 @@ static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny
   PetscCall(verify_solve(&t, "toggle"));
   test_print("  %s, %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
              "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
-             element, (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total,
-             (int)t.run->newton_total, g.top, g.bottom, g.last[1], g.last[0], g.error);
+             element, (int)nx, (int)ny, (int)t.run->counters.steps, (int)t.run->counters.rejected,
+             (int)t.run->counters.newton, g.top, g.bottom, g.last[1], g.last[0], g.error);
   SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", g.last[1]);
   SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", g.top, g.bottom);
-  SB_CHECK(t.run->bifurcations == 0, "bifurcation");
+  SB_CHECK(t.run->counters.bifurcations == 0, "bifurcation");
   *error = g.error / g.full;
   *top = g.top;
   PetscCall(test_scene_close(&t));

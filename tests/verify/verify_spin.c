@@ -39,9 +39,9 @@ static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *er
   PetscFunctionBeginUser;
   *error = 0.;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &u));
   SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
     *error = PetscMax(*error, PetscAbsReal(sigma[6 * c] / modulus - (PetscCosReal(angle) - 1.)));
   PetscCall(PetscFree(sigma));
@@ -65,7 +65,7 @@ static PetscErrorCode check_turned(const char *element, const char *law)
                       "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.4 "
                       "-body_a_density 1000",
                       element, law, E));
-  PetscCall(VecDuplicate(t.run->U, &F));
+  PetscCall(VecDuplicate(t.run->state.U, &F));
   for (int k = 1; k <= 24; k++) {
     const PetscReal angle = k * PETSC_PI / 12.;
     PetscReal size;
@@ -74,7 +74,7 @@ static PetscErrorCode check_turned(const char *element, const char *law)
     if (linear) {
       PetscCall(linear_stress(&t, angle, &size));
     } else {
-      PetscCall(SbModelResidual(t.model, 0., t.run->U, NULL, NULL, PETSC_TRUE, F));
+      PetscCall(SbModelResidual(t.model, 0., t.run->state.U, NULL, NULL, PETSC_TRUE, F));
       PetscCall(VecNorm(F, NORM_INFINITY, &size));
       size /= E;
     }
@@ -160,7 +160,7 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
   test_print("  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the "
              "recurrence; end %.5f rad/s, law %.5f\n",
              element, law, E, w0 * h, (int)steps, s.worst, s.d / h, wt);
-  SB_CHECK(t.run->steps_total == steps, "%d steps were taken", (int)t.run->steps_total);
+  SB_CHECK(t.run->counters.steps == steps, "%d steps were taken", (int)t.run->counters.steps);
   SB_CHECK(s.worst <= tolerance, "%s, %s, E %g: turns are off by %g", element, law, E, s.worst);
   SB_CHECK_NEAR(s.d / h, wt, near * wt, "w(t)");
   PetscCall(test_scene_close(&t));
@@ -195,11 +195,11 @@ static PetscErrorCode check_rod(const char *element, const char *law)
     element, law, E, rho, w));
   PetscCall(nearest_node(t.model, left, left));
   PetscCall(nearest_node(t.model, right, right));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &before));
   PetscCall(verify_solve(&t, "rod"));
-  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
-  PetscCall(test_value_at(t.model, t.run->U, left, a));
-  PetscCall(test_value_at(t.model, t.run->U, right, b));
+  PetscCall(SbModelEnergies(t.model, t.run->state.U, t.run->state.V, &after));
+  PetscCall(test_value_at(t.model, t.run->state.U, left, a));
+  PetscCall(test_value_at(t.model, t.run->state.U, right, b));
   for (int k = 0; k < 3; k++) {
     rest += PetscSqr(right[k] - left[k]);
     longer += PetscSqr(right[k] + b[k] - left[k] - a[k]);

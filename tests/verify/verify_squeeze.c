@@ -35,9 +35,9 @@ static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
   PetscFunctionBeginUser;
   *integral = 0;
   PetscCall(PetscMalloc2(6 * s->mesh->ncell_owned, &sigma, s->mesh->ncell_owned, &J));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->state.U, &u));
   SbSpaceCellState(s, u, sigma, J, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->state.U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
     const PetscReal V = SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * c) / 6;
 
@@ -80,7 +80,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
     path, element, young, poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
   PetscCall(record_solve(&t, &r));
   PetscCall(stress_trace(&t, &trace));
-  work = t.run->energies.prescribed_work;
+  work = t.run->state.energies.prescribed_work;
   PetscCall(test_scene_close(&t));
   force = -record_last(&r, "top_force_z");
   for (PetscInt i = 1; i < r.n; i++) {
@@ -223,7 +223,8 @@ static PetscErrorCode check_waves(const char *element)
     "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.003 -ts_max_time 0.2",
     element));
   PetscCall(record_solve(&t, &r));
-  VERIFY_LESS(-t.run->energies.integrator_loss, 0.06, "energy given, J, of 0.25 J when pressed");
+  VERIFY_LESS(-t.run->state.energies.integrator_loss, 0.06,
+              "energy given, J, of 0.25 J when pressed");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

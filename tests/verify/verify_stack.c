@@ -113,7 +113,7 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
     bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, friction, friction, end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at));
   PetscCall(record_solve(&t, &r));
-  PetscCall(VecAXPY(at.U, -1, t.run->U));
+  PetscCall(VecAXPY(at.U, -1, t.run->state.U));
   PetscCall(VecNorm(at.U, NORM_INFINITY, &drift));
   PetscCall(VecDestroy(&at.U));
 

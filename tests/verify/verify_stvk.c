@@ -60,7 +60,7 @@ static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
       "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
       mesh, nu));
     PetscCall(verify_solve(&t, "Cook"));
-    PetscCall(test_value_at(t.model, t.run->U, corner, u));
+    PetscCall(test_value_at(t.model, t.run->state.U, corner, u));
     test_print("    Cook, %d x %d cells: %.6g %.6g\n", (int)n[0], (int)n[1], u[0], u[1]);
     PetscCall(test_scene_close(&t));
     v[k] = u[1];

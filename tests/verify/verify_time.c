@@ -43,11 +43,11 @@ static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, Pe
     "-effect_hold_on base -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
     young, nu, rho, v0, h, h * n, options));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options,
-           t.run->stop_reason);
-  PetscCall(test_value_at(t.model, t.run->U, apex, value));
+  SB_CHECK(!t.run->clock.stop_reason[0] && t.run->counters.steps == n, "%s: %s", options,
+           t.run->clock.stop_reason);
+  PetscCall(test_value_at(t.model, t.run->state.U, apex, value));
   *u = value[2];
-  PetscCall(test_value_at(t.model, t.run->V, apex, value));
+  PetscCall(test_value_at(t.model, t.run->state.V, apex, value));
   *v = value[2];
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -116,12 +116,12 @@ static PetscErrorCode check_free_fall(const char *element, const char *preset, P
                       "-snes_rtol 1e-10",
                       element, preset));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(t.run->steps_total == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset,
-           t.run->steps_total);
+  SB_CHECK(t.run->counters.steps == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset,
+           t.run->counters.steps);
   for (int k = 0; k < 2; k++) {
     const PetscReal at[3] = {0.2 * k, 0.1 * k, 0.05};
 
-    PetscCall(test_value_at(t.model, t.run->U, at, value));
+    PetscCall(test_value_at(t.model, t.run->state.U, at, value));
     SB_CHECK_NEAR(value[2], expected, 1e-7 * PetscAbsReal(expected), preset);
   }
   PetscCall(test_scene_close(&t));
@@ -144,10 +144,10 @@ static PetscErrorCode bend(const char *element, const char *options, PetscInt n,
     "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver direct %s",
     element, T / (PetscReal)n, T, options));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options,
-           t.run->stop_reason);
-  PetscCall(test_value_at(t.model, t.run->U, end, value));
-  PetscCall(test_value_at(t.model, t.run->V, end, value + 3));
+  SB_CHECK(!t.run->clock.stop_reason[0] && t.run->counters.steps == n, "%s: %s", options,
+           t.run->clock.stop_reason);
+  PetscCall(test_value_at(t.model, t.run->state.U, end, value));
+  PetscCall(test_value_at(t.model, t.run->state.V, end, value + 3));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

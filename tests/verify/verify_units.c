@@ -120,9 +120,9 @@ static PetscErrorCode check(const char *element, const char *law, const char *ti
     PetscCall(scenario(element, law, time, seconds, &units[i], text));
     PetscCall(test_scene_open(text, &t));
     PetscCall(verify_solve(&t, units[i].what));
-    steps = t.run->steps_total;
+    steps = t.run->counters.steps;
     n = verify_numbers(t.model);
-    PetscCall(verify_gather(t.model, t.run->U, &u));
+    PetscCall(verify_gather(t.model, t.run->state.U, &u));
     PetscCall(test_scene_close(&t));
 
     /* displacements in m, rotated back */
@@ -201,17 +201,17 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
     PetscCall(test_scene_open(text, &t));
     PetscCall(verify_solve(&t, q->what));
     n = 3 * verify_numbers(t.model);
-    PetscCall(verify_gather(t.model, t.run->U, &u));
+    PetscCall(verify_gather(t.model, t.run->state.U, &u));
     for (PetscInt k = 0; k < n; k++)
       u[k] /= q->m;
     difference = first ? verify_difference(n, first, u) : 0.;
     if (!first)
-      newton = t.run->newton_total;
-    test_print("%s %s %d iterations, %.1e", first ? ";" : "", q->what, (int)t.run->newton_total,
+      newton = t.run->counters.newton;
+    test_print("%s %s %d iterations, %.1e", first ? ";" : "", q->what, (int)t.run->counters.newton,
                difference);
-    SB_CHECK(t.run->newton_total == newton && t.run->rejected_total == 0,
+    SB_CHECK(t.run->counters.newton == newton && t.run->counters.rejected == 0,
              "%s, %s: %d iterations, not %d; %d rejected steps", what, q->what,
-             (int)t.run->newton_total, (int)newton, (int)t.run->rejected_total);
+             (int)t.run->counters.newton, (int)newton, (int)t.run->counters.rejected);
     SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what,
              difference);
     if (first)

@@ -93,11 +93,11 @@ static PetscErrorCode run(const char *options, Trace *trace)
   trace->live -= before;
   trace->neffect = t.model->neffect;
   trace->bare = (PetscBool)(!t.model->space->constraints && !t.model->space->jump &&
-                            !t.model->space->nfixed && !t.run->nmonitor);
+                            !t.model->space->nfixed && !t.run->monitors.n);
   trace->n = 3 * verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, &trace->u));
-  if (t.run->V)
-    PetscCall(verify_gather(t.model, t.run->V, &trace->v));
+  PetscCall(verify_gather(t.model, t.run->state.U, &trace->u));
+  if (t.run->state.V)
+    PetscCall(verify_gather(t.model, t.run->state.V, &trace->v));
   PetscCall(test_scene_close(&t));
   PetscCall(count_events(trace->events));
   for (PetscInt i = 0; i < nevent; i++)

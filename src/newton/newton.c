@@ -1,0 +1,252 @@
+/*
+  Newton's method as a minimisation.
+
+  The solution u of a step of an implicit integrator, or of a load step, is a stationary point of
+  the incremental potential
+
+    E(u) = a_M/2 |u - u^|_M^2 + psi(u) - f . u + D(u) + B(u)
+
+  (inertia about the predictor u^, strain, loads, Rayleigh damping, barriers); the residual F(u) is
+  its gradient. An iteration solves K p = -F (direction.c) and steps by s p with sufficient decrease
+  of E (search.c). Armijo's rule and the references: Nocedal and Wright, Numerical Optimization,
+  2006.
+
+  Barriers. The first iterate is free of intersections (approach.c), and a step is at most as long
+  as collision detection allows. Stiff gaps dominate the residual, so that the length of the last
+  step decides. Friction is lagged: in each of the first iterations it takes the normal forces of
+  the iterate, then at the solution, and the method goes on from there until they stay.
+*/
+#include "newton_impl.h"
+
+#define STAGNANT 0.05    /* fraction of a step that counts as stagnation */
+#define STAGNANT_STEPS 5 /* such steps in a row after which a load step is halved */
+#define PATIENCE 50      /* barriers: iterations between checks of progress */
+#define WORTH \
+  0.01           /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
+#define EARLY 10 /* iterations in which friction is not lagged: normal forces are updated in each */
+
+/* The first iterate, and its residual. */
+static PetscErrorCode begin(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+
+  PetscFunctionBeginUser;
+  snes->reason = SNES_CONVERGED_ITERATING;
+  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = 0;
+  n->known = n->full = n->unstable = n->filtered = PETSC_FALSE;
+  n->kind = SB_HESSIAN_PROJECTED;
+  n->shift = n->fall = n->fall_checked = 0.;
+  if (p->barrier)
+    PetscCall(SbNewtonApproach(snes));
+  n->filtered = PETSC_FALSE;
+  if (snes->reason)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->linearise)
+    PetscCall((*p->linearise)(p->ctx, snes->vec_sol, NULL, 1.));
+  PetscCall(SNESComputeFunction(snes, snes->vec_sol, snes->vec_func));
+  PetscCall(VecNorm(snes->vec_func, NORM_2, &snes->norm));
+  n->initial = snes->norm;
+  PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
+  PetscCall(SbSNESConverged(snes, 0, 0., 0., snes->norm));
+  n->tolerance = snes->ttol = PetscMax(snes->ttol, p->warm_start ? n->tolerance : 0.);
+  PetscCall(SNESMonitor(snes, 0, snes->norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the step s Y was the last: by the residual, or with barriers by its length. */
+static PetscErrorCode check_convergence(SNES snes, PetscReal s)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+  PetscReal longest, enough;
+
+  PetscFunctionBeginUser;
+  if (!n->nblock) {
+    PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
+
+    /* the residual's rounding may exceed the tolerance */
+    if (!snes->reason && n->rounding)
+      snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall((*p->barrier->step_tolerance)(p->ctx, &enough));
+  PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
+  PetscCall(PetscInfo(
+    snes, "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
+    snes->iter, (double)longest, (double)enough));
+  if (s >= 1. && longest <= enough)
+    snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether there is too little progress to go on. A collapse takes hundreds of descent steps, and
+   halving saves none: the patient go on while E decreases enough. */
+static void check_progress(SNES snes, PetscReal s)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+  const PetscInt iterations = snes->iter - n->first;
+  const PetscBool check = (PetscBool)(iterations % PATIENCE == 0);
+  PetscBool worth;
+
+  n->fall -= n->change;
+  worth = (PetscBool)(n->fall - n->fall_checked > WORTH * PetscAbsReal(n->fall));
+  if (!snes->reason && iterations >= snes->max_its && (!n->patient || (check && !worth)))
+    snes->reason = SNES_DIVERGED_MAX_IT;
+  if (check)
+    n->fall_checked = n->fall;
+
+  /* very short load steps */
+  if (!p->barrier && p->dt == 0. && !n->provisional.n)
+    n->stagnant = s < STAGNANT ? n->stagnant + 1 : 0;
+  if (!snes->reason && n->stagnant == STAGNANT_STEPS)
+    snes->reason = SNES_DIVERGED_LINE_SEARCH;
+}
+
+/* Lagged friction takes the normal forces of this iterate: in each of the first ones, then at the
+   end, which it may undo. */
+static PetscErrorCode update_friction(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+  const PetscBool solved = (PetscBool)(snes->reason > 0);
+  const PetscBool early = (PetscBool)(!snes->reason && snes->iter <= EARLY);
+  PetscBool again;
+
+  PetscFunctionBeginUser;
+  if (!solved && !early)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall((*p->barrier->update_friction)(p->ctx, snes->vec_sol, solved, &again));
+  if (!again)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  snes->reason = SNES_CONVERGED_ITERATING;
+  n->first = snes->iter;
+  n->known = PETSC_FALSE;
+  PetscCall(SNESComputeFunction(snes, snes->vec_sol, snes->vec_func));
+  PetscCall(VecNorm(snes->vec_func, NORM_2, &snes->norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESSolve_Newton(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+  const Vec X = snes->vec_sol;
+  const Vec Y = snes->vec_sol_update;
+  PetscReal slope, s;
+  PetscBool interrupted = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin(snes));
+  while (!snes->reason) {
+    const PetscInt linear = snes->linear_its;
+
+    if (p->interrupted)
+      PetscCall((*p->interrupted)(p->ctx, &interrupted));
+    if (interrupted) {
+      snes->reason = SNES_DIVERGED_MAX_IT;
+      break;
+    }
+
+    /* direction, largest safe step, line search */
+    PetscCall(SbNewtonFindDirection(snes, &slope));
+    s = 1.;
+    if (p->barrier && !snes->reason)
+      PetscCall((*p->barrier->max_step)(p->ctx, X, Y, &s, NULL));
+    if (!snes->reason)
+      PetscCall(SbNewtonSearch(snes, slope, &s));
+    if (snes->reason)
+      break;
+
+    /* a full step: the next tangent is exact */
+    n->full = (PetscBool)(s >= 1.);
+    n->filtered = (PetscBool)(n->filtered && !n->full);
+    n->kind = s < 1. ? SB_HESSIAN_PROJECTED : SB_HESSIAN_EXACT;
+
+    /* convergence */
+    snes->iter++;
+    PetscCall(VecNorm(X, NORM_2, &snes->xnorm));
+    PetscCall(VecNorm(Y, NORM_2, &snes->ynorm));
+    snes->ynorm *= s;
+    PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
+    PetscCall(check_convergence(snes, s));
+    PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
+    check_progress(snes, s);
+    if (p->barrier)
+      PetscCall(update_friction(snes));
+  }
+  if (p->linearise)
+    PetscCall((*p->linearise)(p->ctx, NULL, NULL, 0.));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESSetUp_Newton(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const PetscBool barrier = (PetscBool)(n->problem->barrier != NULL);
+  Vec *w;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESSetUpMatrices(snes));
+  PetscCall(SNESSetWorkVecs(snes, barrier ? 13 : 6));
+  w = snes->work;
+  n->provisional.X = w[0];
+  n->provisional.Y = w[1];
+  n->from.elastic = w[2];
+  n->to = (Iterate){.x = w[3], .r = w[4], .elastic = w[5]};
+  if (barrier) {
+    n->rhs = w[6];
+    n->from.contact = w[7];
+    n->to.contact = w[8];
+    n->best = (Iterate){.x = w[9], .r = w[10], .elastic = w[11], .contact = w[12]};
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESDestroy_Newton(SNES snes)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(snes->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonCreate(SNES snes)
+{
+  Newton *n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&n));
+  snes->data = n;
+  snes->ops->setup = SNESSetUp_Newton;
+  snes->ops->solve = SNESSolve_Newton;
+  snes->ops->destroy = SNESDestroy_Newton;
+  snes->usesksp = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, is));
+  if (*is)
+    *is = ((const Newton *)snes->data)->unstable;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonSetProblem(SNES snes, const SbNewtonProblem *problem)
+{
+  PetscBool ours, given;
+  Newton *n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, &ours));
+  if (!ours)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  n = (Newton *)snes->data;
+  PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix,
+                                "-snes_max_it", &given));
+  n->patient = (PetscBool)(problem->barrier && !given);
+  n->problem = problem;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

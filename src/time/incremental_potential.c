@@ -1,0 +1,293 @@
+/*
+  The incremental potential of a step, as Newton's method (src/newton) minimises it: what its
+  function and Jacobian do not tell is here, from the model.
+
+  Strain is that of a stage between the start of the step and the iterate X, with methods that
+  evaluate forces there: with w its fraction of the step, the residual is divided by w, and the
+  energy is psi(u_0 + w (X - u_0)) / w^2. Barrier contact is evaluated at X, with the weight that
+  the integrator gives its force.
+
+  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the
+  step, as if it were an unknown of its own (src/fem/quadratic.c). Time steps are short enough
+  without.
+
+  Barrier contact is solved when the last step is a full one, and below a part of the way of the
+  fastest body in a time step (static: of the size of the smallest body), and below a part of the
+  barrier's width.
+*/
+#include "sbsolver.h"
+#include "time_impl.h"
+
+#define SETTLED 1e-4  /* largest last step, over SbContactSet.speed times dt */
+#define STICKING 1e-2 /* factor on it with friction, whose forces depend on such small slips */
+#define SETTLED_STATIC \
+  1e-7 /* the same tolerance in a static run, over the size of the smallest body */
+#define SETTLED_LEAST 1e-8 /* least tolerance in time steps of full length, over that size */
+#define SETTLED_GAP \
+  1e-2 /* largest change of gaps in the last iteration, over the barrier's width */
+
+/* What Newton's method minimises; owned by the run. */
+struct _p_SbPotential {
+  SbRun run; /* borrowed */
+  SbNewtonProblem problem;
+  SbNewtonBarrier barrier;
+
+  /* the last linear system with barrier contact */
+  SbContactSystem system; /* owned; NULL before the first contact */
+  SbBlocks blocks;        /* Hessian of the barriers; owned */
+  PetscInt nblock;        /* number of its blocks, all ranks */
+};
+
+static PetscErrorCode energy(void *ctx, Vec X, SbNewtonEnergy *value, Vec strain, Vec contact)
+{
+  const SbRun run = ((SbPotential)ctx)->run;
+  const SbModel m = run->model;
+  const Vec stage = run->solve.stage.U;
+  const PetscReal part = run->solve.stage.part;
+
+  PetscFunctionBeginUser;
+
+  /* strain at the stage */
+  if (stage)
+    PetscCall(VecAXPBYPCZ(stage, 1. - part, part, 0., run->solve.stage.start, X));
+  PetscCall(SbModelStrainEnergy(m, stage ? stage : X, strain, &value->strain, &value->ninverted));
+  if (stage && part != 1.) {
+    value->strain /= PetscSqr(part);
+    PetscCall(VecScale(strain, 1. / part));
+  }
+
+  /* contact at X */
+  value->contact = 0.;
+  if (m->contacts.npotential) {
+    PetscReal gaps;
+
+    PetscCall(VecZeroEntries(contact));
+    PetscCall(
+      SbContactSetGradient(&m->contacts, X, run->solve.barrier_weight, PETSC_TRUE, &gaps, contact));
+    value->contact = run->solve.barrier_weight * gaps;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode filter(void *ctx, PetscBool filtered, PetscBool required)
+{
+  const SbModel m = ((SbPotential)ctx)->run->model;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelProjectTangent(m, filtered));
+  if (required)
+    m->space->tentative = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode negative_eigenvalues(void *ctx, PetscInt *n)
+{
+  const SbRun run = ((SbPotential)ctx)->run;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSolverCountNegativeEigenvalues(run->solve.snes, run->model->space, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode linearise(void *ctx, Vec X, Vec Y, PetscReal s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceLinearisePressure(((SbPotential)ctx)->run->model->space, X, Y, -1., s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode interrupted(void *ctx, PetscBool *is)
+{
+  const SbRun run = ((SbPotential)ctx)->run;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunStopAsked(run, run->clock.step, run->clock.t, PETSC_TRUE));
+  *is = run->clock.stopped;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode max_step(void *ctx, Vec X, Vec Y, PetscReal *part, PetscInt *nactive)
+{
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactSetMaxStep(&((SbPotential)ctx)->run->model->contacts, X, Y, part, &n));
+  if (nactive)
+    *nactive = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode advance(void *ctx, PetscReal fraction)
+{
+  PetscFunctionBeginUser;
+  SbContactSetAdvance(&((SbPotential)ctx)->run->model->contacts, fraction);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode prescribed_part(void *ctx, Vec D)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceZeroPrescribed(((SbPotential)ctx)->run->model->space, PETSC_FALSE, D));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode inverted(void *ctx, Vec X, PetscReal *psi, PetscInt *n)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbModelStrainEnergy(((SbPotential)ctx)->run->model, X, NULL, psi, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hessian(void *ctx, Vec X, Vec F, SbContactHessian kind, Vec rhs,
+                              PetscInt *nblock)
+{
+  SbPotential q = (SbPotential)ctx;
+  const SbModel m = q->run->model;
+  const PetscReal weight = q->run->solve.barrier_weight;
+
+  PetscFunctionBeginUser;
+  q->blocks.n = 0;
+  PetscCall(SbContactSetHessian(&m->contacts, X, kind, &q->blocks, rhs));
+  PetscCall(VecAYPX(rhs, weight, F));
+  for (PetscInt k = 0; k < q->blocks.n; k++)
+    for (int i = 0; i < 9; i++)
+      q->blocks.block[k].H[i] *= weight;
+  PetscCallMPI(MPI_Allreduce(&q->blocks.n, &q->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
+  *nblock = q->nblock;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve(void *ctx, Mat P, Vec rhs, Vec Y, KSPConvergedReason *reason,
+                            PetscInt *iterations)
+{
+  SbPotential q = (SbPotential)ctx;
+  const SbRun run = q->run;
+
+  PetscFunctionBeginUser;
+  if (!q->system)
+    PetscCall(SbContactSystemCreate(run->model->space, run->solve.contact_choice, &q->system));
+  PetscCall(SbContactSystemSolve(q->system, P, &q->blocks, PETSC_TRUE, rhs, Y, reason, iterations));
+  if (*reason < 0)
+    PetscCall(SbSolverListContactFailed(run, *reason, *iterations));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode step_tolerance(void *ctx, PetscReal *longest)
+{
+  const SbPotential q = (SbPotential)ctx;
+  const SbModel m = q->run->model;
+  const PetscReal size = SbBodySmallest(m->nbody, m->body);
+  const PetscReal dt = q->problem.dt;
+  PetscReal width = PETSC_MAX_REAL;
+  PetscBool springs = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->contacts.npotential; e++) {
+    springs = (PetscBool)(springs || m->contacts.potential[e]->springs);
+    width = PetscMin(width, m->contacts.potential[e]->width);
+  }
+  *longest = m->dynamic ? SETTLED * m->contacts.speed * dt : SETTLED_STATIC * size;
+  if (springs)
+    *longest *= STICKING;
+  if (m->dynamic)
+    *longest = PetscMax(*longest, SETTLED_LEAST * size * dt / q->run->clock.dt);
+  *longest = PetscMin(*longest, SETTLED_GAP * width);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode update_friction(void *ctx, Vec X, PetscBool solved, PetscBool *again)
+{
+  PetscFunctionBeginUser;
+  PetscCall(
+    SbContactSetUpdateFriction(&((SbPotential)ctx)->run->model->contacts, X, solved, again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPotentialCreate(SbRun run)
+{
+  const SbModel m = run->model;
+  const SNES snes = run->solve.snes;
+  SNESType type;
+  PetscBool newton;
+  SbPotential q;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetType(snes, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, &newton));
+  PetscCheck(
+    newton || !m->contacts.npotential, m->comm, PETSC_ERR_USER_INPUT,
+    "-snes_type %s does not keep surfaces apart: with contact of response barrier leave it out",
+    type);
+  PetscCall(PetscNew(&q));
+  run->solve.potential = q;
+  q->run = run;
+  q->barrier = (SbNewtonBarrier){.max_step = max_step,
+                                 .advance = advance,
+                                 .prescribed_part = prescribed_part,
+                                 .inverted = inverted,
+                                 .hessian = hessian,
+                                 .solve = solve,
+                                 .step_tolerance = step_tolerance,
+                                 .update_friction = update_friction,
+                                 .mass = run->state.mass,
+                                 .total_mass = m->mass};
+  q->problem = (SbNewtonProblem){.energy = energy,
+                                 .filter = m->may_filter ? filter : NULL,
+                                 .negative_eigenvalues = negative_eigenvalues,
+                                 .linearise = m->dynamic ? NULL : linearise,
+                                 .interrupted = interrupted,
+                                 .barrier = m->contacts.npotential ? &q->barrier : NULL,
+                                 .ctx = q,
+                                 .nonsymmetric = (PetscBool)(run->solve.nonsymmetric.U != NULL)};
+
+  /* rounding of the strain energy of a rotated body: eps E V */
+  for (PetscInt b = 0; b < m->nbody; b++)
+    q->problem.rounding +=
+      4. * PETSC_MACHINE_EPSILON * SbMaterialYoungModulus(m->material[b]) * m->body[b].volume;
+  PetscCall(SbNewtonSetProblem(snes, &q->problem));
+  PetscCall(SbModelProjectTangent(m, (PetscBool)!newton));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPotentialBegin(SbPotential q, const SbSolvedStep *step, PetscBool warm)
+{
+  const SbModel m = q->run->model;
+
+  PetscFunctionBeginUser;
+  q->problem.dt = m->dynamic ? step->dt : 0.;
+  q->problem.warm_start = warm;
+  if (!m->contacts.npotential)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  q->barrier.start = step->U0;
+  q->nblock = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPotentialDestroy(SbPotential *potential)
+{
+  SbPotential q = *potential;
+
+  PetscFunctionBeginUser;
+  if (!q)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactSystemDestroy(&q->system));
+  PetscCall(PetscFree(q->blocks.block));
+  PetscCall(PetscFree(*potential));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved)
+{
+  const SbPotential q = run->solve.potential;
+  KSPConvergedReason reason;
+
+  PetscFunctionBeginUser;
+  *solved = (PetscBool)(q->nblock > 0);
+  if (!*solved)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactSystemSolve(q->system, run->solve.J, &q->blocks, PETSC_FALSE, B, X, &reason,
+                                 iterations));
+  if (reason < 0)
+    PetscCall(VecZeroEntries(X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
