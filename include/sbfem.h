@@ -67,8 +67,9 @@ struct _p_SbSpace {
   PetscInt *node_orig;
   PetscInt *node_body; /* [nnode] */
   uint64_t *node_set; /* [nnode] SB_SET_BIT(k) when constrained with set k; of a face its support */
-  PetscBool faces;    /* some body has its nodes at faces */
-  PetscBool vertices; /* all have them at vertices only: nodes are the mesh's vertices */
+  PetscBool view_displacement; /* -displacement_view is given */
+  PetscBool faces;             /* some body has its nodes at faces */
+  PetscBool vertices;          /* all have them at vertices only: nodes are the mesh's vertices */
   PetscInt
     *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
   PetscInt
@@ -131,6 +132,8 @@ extern const SbOption SbSpaceRows[];
 /* A zeroed vector with the layout of the unknowns (3 per node, with ghosts). Collective. Caller
    destroys. */
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
+/* -displacement_view: shows displacements U[nnode][3], m, with a viewer of PETSc. Collective. */
+PetscErrorCode SbSpaceViewDisplacement(SbSpace space, Vec U);
 /* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the
    same function. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);

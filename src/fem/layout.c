@@ -90,7 +90,7 @@ static PetscErrorCode create_section(MPI_Comm comm, PetscInt pStart, PetscInt pE
   PetscFunctionBeginUser;
   PetscCall(PetscSectionCreate(comm, section));
   PetscCall(PetscSectionSetNumFields(*section, 1));
-  PetscCall(PetscSectionSetFieldName(*section, 0, "displacement"));
+  PetscCall(PetscSectionSetFieldName(*section, 0, ""));
   PetscCall(PetscSectionSetFieldComponents(*section, 0, 3));
   PetscCall(PetscSectionSetChart(*section, pStart, pEnd));
   for (PetscInt p = pStart; p < pEnd; p++) {

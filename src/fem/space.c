@@ -18,6 +18,9 @@
 const SbOption SbSpaceRows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",
    "mass matrix: lumped at the nodes, or consistent with the basis"},
+  {"displacement_view", SB_OPTION_STRING, 1, "", "", "",
+   "a viewer of PETSc for the displacements at the end of the run, as -dm_view takes it: "
+   "hdf5:FILE, vtk:FILE.vtu, ascii"},
   {0},
 };
 
@@ -157,6 +160,23 @@ static PetscErrorCode tabulate_batches(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -displacement_view, before anything is computed. */
+static PetscErrorCode read_view(SbSpace s)
+{
+  char viewer[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionString(&SbRunScope, "displacement_view", sizeof(viewer), viewer));
+  s->view_displacement = (PetscBool)(viewer[0] != 0);
+  for (PetscInt b = 0; b < s->mesh->nbody; b++)
+    PetscCheck(
+      strncmp(viewer, "vtk", 3) || !s->element[b]->nodes_per[2], s->comm, PETSC_ERR_USER_INPUT,
+      "-displacement_view %s: body '%s' has its displacements at faces, which VTK files do "
+      "not have; take hdf5:FILE, or the fields of -output_fields",
+      viewer, s->mesh->body[b].name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
                              SbSpace *space)
 {
@@ -173,6 +193,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(SbOptionSecond(&SbRunScope, "mass", &s->consistent_mass));
   s->element = element;
   s->material = material;
+  PetscCall(read_view(s));
   PetscCall(SbLayoutNodes(s));
   s->nnode_cell = s->nnode;
   PetscCall(find_regions(s));

@@ -18,6 +18,23 @@ PetscErrorCode SbSpaceCreateVec(SbSpace s, Vec *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSpaceViewDisplacement(SbSpace s, Vec U)
+{
+  Vec X;
+
+  PetscFunctionBeginUser;
+  if (!s->view_displacement)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  // a vector of the DM: PETSc's viewers take the mesh from it
+  PetscCall(DMCreateGlobalVector(s->dm, &X));
+  PetscCall(PetscObjectSetName((PetscObject)X, "displacement"));
+  PetscCall(VecCopy(U, X));
+  PetscCall(VecViewFromOptions(X, NULL, "-displacement_view"));
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The storage of a ghosted vector continues after its owned entries. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
 {

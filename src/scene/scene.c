@@ -427,8 +427,8 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   char(*names)[SB_NAME_MAX];
   PetscInt n;
   PetscErrorCode ierr = PETSC_SUCCESS;
-  static const char *const keys[] = {"mass", "petscpartitioner_type", "mesh_reading", "mesh_report",
-                                     "validate"};
+  static const char *const keys[] = {"mass",         "displacement_view", "petscpartitioner_type",
+                                     "mesh_reading", "mesh_report",       "validate"};
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(model));

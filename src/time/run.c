@@ -305,6 +305,8 @@ PetscErrorCode SbRunSolve(SbRun run)
   else
     PetscCall(SbStaticSolve(run));
   run->counters.seconds_solve = MPI_Wtime() - run->clock.wall_start;
+  if (!run->clock.paused)
+    PetscCall(SbSpaceViewDisplacement(m->space, run->state.U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
