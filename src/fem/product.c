@@ -20,7 +20,7 @@
 
 typedef struct {
   Mat diagonal, other; /* parts of the matrix, borrowed; off-diagonal: NULL on one rank */
-  PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
+  PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ, and without rows */
   Mat symmetric;       /* the upper blocks: SBAIJ itself (borrowed), or a copy of BAIJ's (owned) */
   PetscScalar *upper;  /* values of `symmetric`, by rows */
   PetscObjectState copied; /* state of `diagonal` at the last copy */
@@ -169,7 +169,7 @@ static PetscErrorCode destroy_product(void *ctx)
   Product *p = SB_DESTROY_CTX(Product, ctx);
 
   PetscFunctionBeginUser;
-  if (p->full)
+  if (p->symmetric != p->diagonal)
     PetscCall(MatDestroy(&p->symmetric));
   PetscCall(VecScatterDestroy(&p->scatter));
   PetscCall(VecDestroy(&p->ghosts));

@@ -128,7 +128,7 @@ static PetscErrorCode order_points(SbRun run, SbOutput out)
     for (PetscInt i = 0; i < nedge; i++)
       number[3 * node[i]] = (PetscReal)key[i];
     PetscCall(SbSpaceUpdateGhosts(s, number));
-    PetscCall(PetscMalloc1(s->nnode, &out->edge_number));
+    PetscCall(PetscMalloc1(s->nnode + 1, &out->edge_number)); /* also without nodes not NULL */
     for (PetscInt i = 0; i < s->nnode; i++)
       out->edge_number[i] = (PetscInt)number[3 * i];
     PetscCall(PetscFree2(slice, number));

@@ -160,7 +160,7 @@ def any_ranks() -> None:
     text = run(BAR | {"body_bar_mesh": "box:0.1,0.1,0.1:1"}, ranks=8)
     tets = int(re.search(r"^bar +p1 +(\d+)", text, re.M)[1])
     check(tets < 8, f"{tets} tets are not fewer than ranks")
-    check(re.search(r"Petsc (Release|Development)", call([SUPPLE, "-version"])), "no PETSc")
+    check(re.search(r"(?:Petsc|PETSc) (?:Release|Development)", call([SUPPLE, "-version"])), "no PETSc")
 
 
 def packages() -> None:
