@@ -141,7 +141,7 @@ def main():
                 words = shlex.split(line.split("\n")[0], comments=True)
                 if words[0] == "make":
                     for word in words[1:]:
-                        check(f"{page.name}: {line}: no such target", "=" in word or word.startswith("-") or word in targets or word.startswith("meshes/"))
+                        check(f"{page.name}: {line}: no such target", "=" in word or word.startswith("-") or word in targets or word.startswith(("meshes/", "build/tests/", "bin/")))
                 elif guide and words[0].startswith(("bin/", ".venv/", "scripts/mpi", "scripts/render")):
                     run(page, line)
                     nrun += 1
