@@ -254,9 +254,9 @@ PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const
 
   Create  - an empty table; cell, m: somewhat more than the longest side of most boxes.
   Clear   - empties it, to be filled again.
-  Add     - the next set: boxes[n][6], m; those that do not meet the box `within` are left out
-  (NULL:
-            all are taken). Empty boxes and those with NaN coordinates take part in no pair.
+  Add     - the next set: boxes[n][6], m. near: only those that may meet boxes of earlier sets are
+            kept, so that pairs of two such sets are incomplete; such sets come last. Empty boxes
+            and those with NaN coordinates take part in no pair.
   Count   - boxes, entries (a box in a cell), cells in use.
 
   All pairs of boxes that meet, touching included, each once, in any order: those of the two sets
@@ -270,7 +270,7 @@ PetscErrorCode SbSpatialHashCreate(PetscReal cell, SbSpatialHash *hash);
 PetscErrorCode SbSpatialHashDestroy(SbSpatialHash *hash);
 PetscErrorCode SbSpatialHashClear(SbSpatialHash hash);
 PetscErrorCode SbSpatialHashAdd(SbSpatialHash hash, PetscInt n, const PetscReal (*box)[6],
-                                const PetscReal within[6]);
+                                PetscBool near);
 void SbSpatialHashCount(SbSpatialHash hash, PetscInt count[3]);
 typedef struct {
   int meeting;

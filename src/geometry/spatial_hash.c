@@ -24,6 +24,9 @@
   A pair may share several cells. It is given where the lower corner of the intersection of both
   boxes is, by the cell of the finer one of both: once.
 
+  Boxes that only matter near to others, as those of other ranks: they enter the cells where these
+  are. For this the cells around those in use are put into the table, too.
+
   Rounding: x -> floor(x / width) is monotonic, and widths are powers of two of each other, so two
   boxes that share a point share a cell. Boxes so far from the origin that a double cannot count the
   cells are on a level where it can. Not handled: boxes that all meet; their number of pairs is
@@ -58,6 +61,7 @@ struct _p_SbSpatialHash {
   PetscInt first_item[SB_HASH_SETS + 1]; /* of each set */
   PetscInt nitem, item_size;
   Item *item;      /* [nitem] by set */
+  PetscBool near;  /* a set of boxes near to earlier ones was added */
   uint64_t levels; /* bit l: some box is on level l */
   PetscInt nentry, cell_of_size, item_of_size, list_size;
   PetscInt *cell_of,
@@ -115,6 +119,7 @@ PetscErrorCode SbSpatialHashClear(SbSpatialHash h)
   h->nset = 0;
   h->nitem = h->nentry = h->ncell = h->npair = 0;
   h->levels = 0;
+  h->near = PETSC_FALSE;
 
   /* the stamps of all earlier fills are out of date; once in two billion fills they begin anew */
   if (h->stamp == PETSC_MAX_INT) {
@@ -182,6 +187,15 @@ static inline Slot *find_slot(SbSpatialHash h, const int64_t at[3], int level)
   }
 }
 
+/* The integers of the cell around c on a higher level. */
+static inline void around(const Cell *c, int level, int64_t at[3])
+{
+  const int shift = PetscMin(63, BITS * (level - c->level));
+
+  for (int k = 0; k < 3; k++)
+    at[k] = level == LEVELS - 1 ? 0 : c->at[k] >> shift;
+}
+
 /* The number of a cell, which is added if it is not in use. */
 static PetscErrorCode claim_cell(SbSpatialHash h, const int64_t at[3], int level, PetscInt *cell)
 {
@@ -206,29 +220,68 @@ static PetscErrorCode claim_cell(SbSpatialHash h, const int64_t at[3], int level
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the cells around those in use, on all higher levels, empty where they are new. */
+static PetscErrorCode claim_around(SbSpatialHash h)
+{
+  PetscInt above;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < h->ncell; c++) { /* the new ones, too */
+    const int level = h->cell[c].level + 1;
+    int64_t at[3];
+
+    if (level == LEVELS)
+      continue;
+    around(&h->cell[c], level, at);
+    PetscCall(claim_cell(h, at, level, &above));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a cell holds boxes, may hold those of lower levels, or lies within one that holds any. */
+static PetscBool is_near(SbSpatialHash h, const int64_t at[3], int level)
+{
+  const Cell c = {.at = {at[0], at[1], at[2]}, .level = level};
+
+  if (find_slot(h, at, level)->stamp == h->stamp)
+    return PETSC_TRUE;
+  for (int l = level + 1; l < LEVELS && h->levels >> l; l++) {
+    int64_t above[3];
+    const Slot *slot;
+
+    if (!(h->levels >> l & 1))
+      continue;
+    around(&c, l, above);
+    slot = find_slot(h, above, l);
+    if (slot->stamp == h->stamp && h->cell[slot->cell].n > 0)
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 PetscErrorCode SbSpatialHashAdd(SbSpatialHash h, PetscInt n, const PetscReal (*box)[6],
-                                const PetscReal within[6])
+                                PetscBool near)
 {
   PetscFunctionBeginUser;
   PetscCheck(h->nset < SB_HASH_SETS, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "A spatial hash takes at most %d sets of boxes", SB_HASH_SETS);
   h->first_item[h->nset++] = h->nitem;
   PetscCall(SbReserve(h->nitem + n, sizeof(*h->item), &h->item_size, &h->item));
+  if (near && n && !h->near)
+    PetscCall(claim_around(h));
+  h->near = (PetscBool)(h->near || (near && n));
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal *b = box[i];
+    const PetscInt nentry = h->nentry;
     int64_t low[3], high[3];
     int level;
 
-    /* empty boxes, NaN, and what meets nothing of interest */
+    /* empty boxes, and NaN */
     if (!(b[0] <= b[3] && b[1] <= b[4] && b[2] <= b[5]))
       continue;
-    if (within && !(b[0] <= within[3] && b[1] <= within[4] && b[2] <= within[5] &&
-                    within[0] <= b[3] && within[1] <= b[4] && within[2] <= b[5]))
-      continue;
 
-    /* into all cells that it overlaps */
+    /* into all cells that it overlaps, or those of them that may give a pair */
     level = level_of(h, b);
-    h->levels |= (uint64_t)1 << level;
     for (int k = 0; k < 3; k++) {
       low[k] = floor_of(in_cells(h, b[k], level));
       high[k] = floor_of(in_cells(h, b[3 + k], level));
@@ -240,6 +293,8 @@ PetscErrorCode SbSpatialHashAdd(SbSpatialHash h, PetscInt n, const PetscReal (*b
         for (int64_t x = low[0]; x <= high[0]; x++) {
           const int64_t at[3] = {x, y, z};
 
+          if (near && !is_near(h, at, level))
+            continue;
           PetscCall(claim_cell(h, at, level, &h->cell_of[h->nentry]));
           h->cell[h->cell_of[h->nentry]].n++;
           h->item_of[h->nentry++] =
@@ -247,6 +302,9 @@ PetscErrorCode SbSpatialHashAdd(SbSpatialHash h, PetscInt n, const PetscReal (*b
         }
       }
     }
+    if (h->nentry == nentry)
+      continue;
+    h->levels |= (uint64_t)1 << level;
     PetscCall(PetscArraycpy(h->item[h->nitem].box, b, 6));
     h->item[h->nitem++].number = i;
   }
@@ -361,6 +419,9 @@ PetscErrorCode SbHashPairsNext(SbHashPairs *pairs, PetscInt least, PetscInt *n,
     const Cell *c = &h->cell[pairs->cell];
     PetscInt own[SB_HASH_SETS + 1], other[SB_HASH_SETS + 1];
 
+    if (!c->n)
+      continue;
+
     /* within the cell */
     find_sets(h, c, own);
     for (int m = 0; m < pairs->nmeeting; m++)
@@ -368,14 +429,12 @@ PetscErrorCode SbHashPairsNext(SbHashPairs *pairs, PetscInt least, PetscInt *n,
 
     /* with the cells around it */
     for (int level = c->level + 1; level < LEVELS && h->levels >> level; level++) {
-      const int shift = PetscMin(63, BITS * (level - c->level));
-      const int64_t at[3] = {level == LEVELS - 1 ? 0 : c->at[0] >> shift,
-                             level == LEVELS - 1 ? 0 : c->at[1] >> shift,
-                             level == LEVELS - 1 ? 0 : c->at[2] >> shift};
+      int64_t at[3];
       const Slot *slot;
 
       if (!(h->levels >> level & 1))
         continue;
+      around(c, level, at);
       slot = find_slot(h, at, level);
       if (slot->stamp != h->stamp)
         continue;
