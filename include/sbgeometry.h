@@ -1,7 +1,7 @@
 /*
   sbgeometry.h - layer 1: distances, intersection, continuous collision detection, trees of boxes,
-  location: arrays in, arrays out. Not collective throughout; nothing here knows a mesh, a surface
-  or contact. Lengths in any unit, the same throughout a call.
+  spatial hash, location: arrays in, arrays out. Not collective throughout; nothing here knows a
+  mesh, a surface or contact. Lengths in any unit, the same throughout a call.
 */
 #pragma once
 #include "sbbase.h"
@@ -244,6 +244,48 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[]);
 void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
 PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const PetscReal x[],
                                         SbBoxTree *tree);
+
+/* spatial_hash.c: boxes that meet, by a hashed grid */
+
+/*
+  A hash table of the cells of an infinite grid, for boxes of up to SB_HASH_SETS sets: which of them
+  meet. Any number, size and place of boxes; quadratic only where all of them meet. Nothing is
+  allocated once a fill as large as the present one has been.
+
+  Create  - an empty table; cell, m: somewhat more than the longest side of most boxes.
+  Clear   - empties it, to be filled again.
+  Add     - the next set: boxes[n][6], m. near: only those that may meet boxes of earlier sets are
+            kept, so that pairs of two such sets are incomplete; such sets come last. Empty boxes
+            and those with NaN coordinates take part in no pair.
+  Count   - boxes, entries (a box in a cell), cells in use.
+
+  All pairs of boxes that meet, touching included, each once, in any order: those of the two sets
+  meeting[m] for each m < nmeeting; with the same set twice, those within it. Next returns at least
+  `least` of them, or the rest; 0: the end. `meeting` and the pairs are borrowed, the pairs until
+  the next call.
+*/
+#define SB_HASH_SETS 6
+typedef struct _p_SbSpatialHash *SbSpatialHash;
+PetscErrorCode SbSpatialHashCreate(PetscReal cell, SbSpatialHash *hash);
+PetscErrorCode SbSpatialHashDestroy(SbSpatialHash *hash);
+PetscErrorCode SbSpatialHashClear(SbSpatialHash hash);
+PetscErrorCode SbSpatialHashAdd(SbSpatialHash hash, PetscInt n, const PetscReal (*box)[6],
+                                PetscBool near);
+void SbSpatialHashCount(SbSpatialHash hash, PetscInt count[3]);
+typedef struct {
+  int meeting;
+  PetscInt a, b; /* numbers in their sets */
+} SbHashPair;
+typedef struct {
+  SbSpatialHash hash; /* borrowed */
+  int nmeeting;
+  const int (*meeting)[2];
+  PetscInt cell; /* the next one */
+} SbHashPairs;
+PetscErrorCode SbHashPairsBegin(SbSpatialHash hash, int nmeeting, const int meeting[][2],
+                                SbHashPairs *pairs);
+PetscErrorCode SbHashPairsNext(SbHashPairs *pairs, PetscInt least, PetscInt *n,
+                               const SbHashPair **pair);
 
 /* signed_distance.c */
 

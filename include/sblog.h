@@ -16,8 +16,10 @@ typedef enum {
   SB_EVENT_ENERGY,
   SB_EVENT_EFFECTS,
   SB_EVENT_CONTACT,
-  SB_EVENT_SEARCH,  /* for pairs of vertices, edges and triangles that may meet */
-  SB_EVENT_PROJECT, /* within solves: into the null space of the contact constraints */
+  SB_EVENT_SEARCH,      /* for pairs of vertices, edges and triangles that may meet */
+  SB_EVENT_SEARCH_HASH, /* within it: by the spatial hash */
+  SB_EVENT_SEARCH_TREE, /* within it: by trees of boxes */
+  SB_EVENT_PROJECT,     /* within solves: into the null space of the contact constraints */
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_CONTACT_SOLVE, /* systems with blocks of contact, without PETSc's KSPSolve */
   SB_EVENT_OUTPUT,

@@ -13,9 +13,10 @@ PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;
 PetscErrorCode SbLogInitialize(void)
 {
   static const char *const names[SB_EVENT_COUNT] = {
-    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp",   "SbMatrixSetUp", "SbResidual",
-    "SbTangent",  "SbEnergy",      "SbEffects",      "SbContact",     "SbSearch",
-    "SbProject",  "SbSolverSetUp", "SbContactSolve", "SbOutput",      "SbCheckpoint",
+    "SbMeshRead",   "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual",
+    "SbTangent",    "SbEnergy",      "SbEffects",    "SbContact",     "SbSearch",
+    "SbSearchHash", "SbSearchTree",  "SbProject",    "SbSolverSetUp", "SbContactSolve",
+    "SbOutput",     "SbCheckpoint",
   };
   static const char *const stages[3] = {"Setup", "Solve", "Output"};
   PetscLogStage *const numbers[3] = {&SbLogStageSetup, &SbLogStageSolve, &SbLogStageOutput};

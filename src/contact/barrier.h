@@ -41,6 +41,7 @@ typedef struct {
   PetscReal width, pressure; /* m, Pa; 0: by body */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
+  SbContactSearch search;
   PetscInt friction_solves;     /* most lagged-friction iterations of a step; 0: by default */
   PetscReal friction_tolerance; /* of the lag */
 } BarrierOptions;

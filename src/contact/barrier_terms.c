@@ -18,22 +18,6 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_active(const void *x, const void *y, void *unused)
-{
-  const SbContactPair *p = &((const Active *)x)->pair;
-  const SbContactPair *q = &((const Active *)y)->pair;
-
-  (void)unused;
-  if (p->side != q->side)
-    return p->side ? 1 : -1;
-  if (p->kind != q->kind)
-    return p->kind < q->kind ? -1 : 1;
-  for (int k = 0; k < 4; k++)
-    if (p->v[k] != q->v[k])
-      return p->v[k] < q->v[k] ? -1 : 1;
-  return 0;
-}
-
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->surface->space->nnode_owned;
@@ -68,9 +52,6 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
       SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));
     b->active.pair[b->active.n++] = a;
   }
-  if (b->active.n > 1)
-    PetscCall(
-      PetscTimSort(b->active.n, b->active.pair, sizeof(*b->active.pair), compare_active, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -59,6 +59,12 @@ static const SbOption rows[] = {
    "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the "
    "softer "
    "body"},
+  {"search", SB_OPTION_CHOICE, 1, "", "auto", "auto|hash|tree",
+   "response barrier: search for the pairs of features that may meet; both find the same. auto: "
+   "tree "
+   "against an obstacle, else hash. hash: the cells of an infinite grid in a hash table; tree: "
+   "trees of "
+   "boxes"},
   {"verify", SB_OPTION_BOOL, 1, "", "false", "",
    "response barrier: after each step, search for edges that intersect triangles; an intersection "
    "ends the "

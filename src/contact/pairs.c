@@ -3,10 +3,12 @@
   gaps, and the collision-free part of a motion.
 
   Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles
-  enclose the boxes of their vertices. Trees of boxes, which are refitted, give all pairs of a
-  vertex and a triangle, and of two edges, whose boxes are within the reach. They stay valid while
-  every vertex stays in its box: iterations that move little, as most do, need no search. A motion
-  with too many pairs is halved.
+  enclose the boxes of their vertices. All pairs of a vertex and a triangle, and of two edges, whose
+  boxes are within the reach, are given by a spatial hash (Teschner et al. 2003;
+  src/geometry/spatial_hash.c), into which a rank puts its own features and what may meet them, or
+  by trees of boxes, which are refitted (src/geometry/box_tree.c). Both give the same pairs, which
+  are ordered by number. They stay valid while every vertex stays in its box: iterations that move
+  little, as most do, need no search. A motion with too many pairs is halved.
 
   Safe part of a motion. Additive continuous collision detection (Li, Kaufman and Jiang,
   "Codimensional incremental potential contact", ACM TOG 40(4), 2021, section 5; src/geometry/ccd.c)
@@ -56,13 +58,15 @@ PetscReal SbContactPairGap(SbContactSurface m, const SbContactPair *pair, const 
   200 /* a motion with more pairs than CROWD (number of vertices + CROWD_LEAST) is halved */
 #define CROWD_LEAST 1000
 #define CHUNK 256 /* pairs of boxes at once */
+#define CELL 1.5  /* width of the hash's cells over the mean edge with the growth of its box */
 
-/* Features of one kind, those with a node of this rank or the others, with a tree over their
-   boxes. */
+/* Features of one kind, those with a node of this rank or the others, with a tree over their boxes
+   if trees search. */
 enum {
   VERTEX,
   TRIANGLE,
-  EDGE
+  EDGE,
+  OTHERS /* the same again, of others */
 };
 static const int corners[] = {1, 3, 2};
 struct SbContactFeatures {
@@ -161,7 +165,8 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbContactPairs *pairs)
+PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbContactSearch search,
+                                    SbContactPairs *pairs)
 {
   const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle,
                             m->nedge};
@@ -174,22 +179,25 @@ PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbConta
   p->reach = reach;
   p->most = PETSC_MAX_INT;
   p->margin = PetscMax(2. * reach, MARGIN * m->mean_edge);
-  PetscCall(PetscMalloc2(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter));
+  if (search == SB_SEARCH_HASH)
+    PetscCall(SbSpatialHashCreate(CELL * (m->mean_edge + 2. * p->margin + reach), &p->hash));
+  PetscCall(
+    PetscMalloc3(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter, 2 * m->nvertex, &p->first));
 
   /* features by kind, those of this rank first */
   PetscCall(PetscCalloc1(6, &p->features));
   for (int k = 0; k < 6; k++) {
     struct SbContactFeatures *f = &p->features[k];
 
-    PetscCall(PetscMalloc2(count[k / 2], &f->item, count[k / 2], &f->box));
-    for (PetscInt i = 0; i < count[k / 2]; i++) {
+    PetscCall(PetscMalloc2(count[k % OTHERS], &f->item, count[k % OTHERS], &f->box));
+    for (PetscInt i = 0; i < count[k % OTHERS]; i++) {
       PetscInt own;
-      const PetscInt *v = vertices_of(m, k / 2, i, &own);
+      const PetscInt *v = vertices_of(m, k % OTHERS, i, &own);
       PetscBool mine = PETSC_FALSE;
 
-      for (int a = 0; a < corners[k / 2]; a++)
+      for (int a = 0; a < corners[k % OTHERS]; a++)
         mine = (PetscBool)(mine || m->mine[v[a]]);
-      if (mine == (PetscBool)(k % 2 == 0))
+      if (mine == (PetscBool)(k < OTHERS))
         f->item[f->n++] = i;
     }
   }
@@ -207,8 +215,10 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
     PetscCall(SbBoxTreeDestroy(&f->tree));
     PetscCall(PetscFree2(f->item, f->box));
   }
+  PetscCall(SbSpatialHashDestroy(&(*pairs)->hash));
   PetscCall(PetscFree((*pairs)->features));
-  PetscCall(PetscFree2((*pairs)->box, (*pairs)->shorter));
+  PetscCall(PetscFree3((*pairs)->box, (*pairs)->shorter, (*pairs)->first));
+  PetscCall(PetscFree((*pairs)->other));
   PetscCall(PetscFree((*pairs)->pair));
   PetscCall(PetscFree(*pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -230,16 +240,126 @@ static PetscBool still_within(SbContactPairs p, const PetscReal x0[], const Pets
   return PETSC_TRUE;
 }
 
+/* The sets of features that meet: those of this rank among themselves, and with those of others. */
+#define NMEETING 5
+static const int meeting[NMEETING][2] = {{VERTEX, TRIANGLE},
+                                         {VERTEX, OTHERS + TRIANGLE},
+                                         {OTHERS + VERTEX, TRIANGLE},
+                                         {EDGE, EDGE},
+                                         {EDGE, OTHERS + EDGE}};
+
+/* Adds the pair of feature i and j of the sets of a meeting. */
+static inline PetscErrorCode add_meeting(SbContactPairs p, int q, PetscInt i, PetscInt j)
+{
+  return add_features(p, meeting[q][0] == EDGE ? SB_PAIR_EDGE_EDGE : SB_PAIR_VERTEX_TRIANGLE,
+                      p->features[meeting[q][0]].item[i], p->features[meeting[q][1]].item[j]);
+}
+
+/* Pairs of features whose boxes meet, by the hash. It holds this rank's features, and of the others
+   those that are near them. */
+static PetscErrorCode search_hash(SbContactPairs p)
+{
+  const SbHashPair *found;
+  PetscInt n;
+  SbHashPairs walk;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH_HASH], 0, 0, 0, 0));
+  PetscCall(SbSpatialHashClear(p->hash));
+  for (int k = 0; k < 2 * OTHERS; k++)
+    PetscCall(SbSpatialHashAdd(p->hash, p->features[k].n, (const PetscReal(*)[6])p->features[k].box,
+                               (PetscBool)(k >= OTHERS)));
+  PetscCall(SbHashPairsBegin(p->hash, NMEETING, meeting, &walk));
+  do {
+    PetscCall(SbHashPairsNext(&walk, CHUNK, &n, &found));
+    for (PetscInt k = 0; k < n; k++)
+      PetscCall(add_meeting(p, found[k].meeting, found[k].a, found[k].b));
+    p->ncandidate += n;
+    p->full = (PetscBool)(p->n > p->most);
+  } while (n && !p->full);
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH_HASH], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same by trees of boxes. */
+static PetscErrorCode search_trees(SbContactPairs p)
+{
+  PetscInt found[2 * CHUNK];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH_TREE], 0, 0, 0, 0));
+  for (int k = 0; k < 6; k++) {
+    struct SbContactFeatures *f = &p->features[k];
+
+    if (p->nsearch == 1)
+      PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
+    else
+      PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
+  }
+  for (int q = 0; q < NMEETING && !p->full; q++) {
+    SbBoxPairs walk;
+    PetscInt n;
+
+    SbBoxPairsBegin(&p->features[meeting[q][0]].tree, &p->features[meeting[q][1]].tree, 0., &walk);
+    while (!p->full && (n = SbBoxPairsNext(&walk, CHUNK, found)) > 0) {
+      for (PetscInt k = 0; k < n; k++)
+        PetscCall(add_meeting(p, q, found[2 * k], found[2 * k + 1]));
+      p->ncandidate += n;
+      p->full = (PetscBool)(p->n > p->most);
+    }
+  }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH_TREE], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether pair p comes before q of the same kind and first vertex. */
+static inline PetscBool before(const SbContactPair *p, const SbContactPair *q)
+{
+  for (int k = 1; k < 4; k++)
+    if (p->v[k] != q->v[k])
+      return (PetscBool)(p->v[k] < q->v[k]);
+  return PETSC_FALSE;
+}
+
+/* Orders the pairs by kind, then by vertices: by counting for the first one, which leaves a few for
+   each, by insertion for the others. */
+static PetscErrorCode order_pairs(SbContactPairs p)
+{
+  const PetscInt nvertex = p->mesh->nvertex;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(p->first, 2 * nvertex));
+  for (PetscInt i = 0; i < p->n; i++)
+    p->first[(p->pair[i].kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + p->pair[i].v[0]]++;
+  for (PetscInt k = 0; k < 2 * nvertex; k++) {
+    n += p->first[k];
+    p->first[k] = n - p->first[k];
+  }
+  PetscCall(SbReserve(p->size, sizeof(*p->other), &p->other_size, &p->other));
+  for (PetscInt i = 0; i < p->n; i++) {
+    const SbContactPair *pair = &p->pair[i];
+
+    p->other[p->first[(pair->kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + pair->v[0]]++] = *pair;
+  }
+  for (PetscInt i = 1; i < p->n; i++) {
+    const SbContactPair pair = p->other[i];
+    PetscInt k = i;
+
+    for (; k > 0 && p->other[k - 1].kind == pair.kind && p->other[k - 1].v[0] == pair.v[0] &&
+           before(&pair, &p->other[k - 1]);
+         k--)
+      p->other[k] = p->other[k - 1];
+    p->other[k] = pair;
+  }
+  PetscCall(PetscArraycpy(p->pair, p->other, p->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
-  /* this rank's features among themselves, and with those of others */
-  static const int meeting[5][2] = {{2 * VERTEX, 2 * TRIANGLE},
-                                    {2 * VERTEX, 2 * TRIANGLE + 1},
-                                    {2 * VERTEX + 1, 2 * TRIANGLE},
-                                    {2 * EDGE, 2 * EDGE},
-                                    {2 * EDGE, 2 * EDGE + 1}};
   const SbContactSurface m = p->mesh;
-  PetscInt found[2 * CHUNK];
+  PetscInt count[3] = {0, 0, 0};
 
   PetscFunctionBeginUser;
   p->full = PETSC_FALSE;
@@ -248,7 +368,7 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   p->known = PETSC_TRUE;
   p->nsearch++;
-  p->n = 0;
+  p->n = p->ncandidate = 0;
   for (PetscInt v = 0; v < m->nvertex; v++) {
     PetscReal *box = p->box + 6 * v;
 
@@ -258,46 +378,38 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     }
   }
 
-  /* boxes of the features around those of their vertices, grown by half the reach, and the trees
-     over them */
+  /* boxes of the features around those of their vertices, grown by half the reach */
   for (int k = 0; k < 6; k++) {
     struct SbContactFeatures *f = &p->features[k];
 
     for (PetscInt i = 0; i < f->n; i++) {
       PetscInt own;
-      const PetscInt *v = vertices_of(m, k / 2, f->item[i], &own);
+      const PetscInt *v = vertices_of(m, k % OTHERS, f->item[i], &own);
       const PetscReal grown = 0.5 * p->reach + (v[0] < m->nbody_vertex ? 0. : m->radius);
 
       for (int c = 0; c < 6; c++)
         f->box[i][c] = p->box[6 * v[0] + c];
-      for (int a = 1; a < corners[k / 2]; a++)
+      for (int a = 1; a < corners[k % OTHERS]; a++)
         SbBoxMerge(f->box[i], p->box + 6 * v[a]);
       for (int c = 0; c < 6; c++)
         f->box[i][c] += c < 3 ? -grown : grown;
     }
-    if (p->nsearch == 1)
-      PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
-    else
-      PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
   }
 
-  for (int q = 0; q < 5 && !p->full; q++) {
-    const struct SbContactFeatures *a = &p->features[meeting[q][0]];
-    const struct SbContactFeatures *b = &p->features[meeting[q][1]];
-    SbBoxPairs walk;
-    PetscInt n;
-
-    SbBoxPairsBegin(&a->tree, &b->tree, 0., &walk);
-    while (!p->full && (n = SbBoxPairsNext(&walk, CHUNK, found)) > 0) {
-      for (PetscInt k = 0; k < n; k++) {
-        const PetscInt i = a->item[found[2 * k]];
-        const PetscInt j = b->item[found[2 * k + 1]];
-
-        PetscCall(add_features(p, q < 3 ? SB_PAIR_VERTEX_TRIANGLE : SB_PAIR_EDGE_EDGE, i, j));
-      }
-      p->full = (PetscBool)(p->n > p->most);
-    }
-  }
+  /* those that meet, by number */
+  if (p->hash)
+    PetscCall(search_hash(p));
+  else
+    PetscCall(search_trees(p));
+  if (p->n > 1 && !p->full)
+    PetscCall(order_pairs(p));
+  if (p->hash)
+    SbSpatialHashCount(p->hash, count);
+  PetscCall(PetscInfo(NULL,
+                      "search for pairs: %" PetscInt_FMT " boxes in %" PetscInt_FMT
+                      " entries of the hash; %" PetscInt_FMT " pairs of boxes meet, %" PetscInt_FMT
+                      " are kept\n",
+                      count[0], count[1], p->ncandidate, p->n));
 
   /* a half-space or a bowl: vertices whose boxes come within the reach */
   for (PetscInt v = 0; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v++) {

@@ -93,6 +93,13 @@ static inline PetscReal SbContactPairRadius(SbContactSurface mesh, const SbConta
            : 0.;
 }
 
+/* How pairs are searched for, -effect_X_search; the pairs are the same. */
+typedef enum {
+  SB_SEARCH_AUTO,
+  SB_SEARCH_HASH,
+  SB_SEARCH_TREE
+} SbContactSearch;
+
 /* Search and its results; x0 and x1 below are arrays of SbContactSurfaceGetPositions(). */
 typedef struct _p_SbContactPairs *SbContactPairs;
 struct _p_SbContactPairs {
@@ -102,18 +109,24 @@ struct _p_SbContactPairs {
   PetscReal
     *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
+  SbSpatialHash hash; /* NULL: trees */
   struct SbContactFeatures
     *features;     /* [6] vertices, triangles and edges, each of this rank and of others */
   PetscBool known; /* cleared by who changes `near` */
   const uint8_t
     *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
-  SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
+  SbContactPair *pair; /* [n] all that have nodes of this rank; by kind, then vertices; last those
+                          with a side of the obstacle */
+  PetscInt other_size, *first; /* work of ordering them: [2 nvertex] */
+  SbContactPair *other;
+  PetscInt ncandidate; /* pairs of boxes that met in the last search */
   PetscInt nsearch,
     most; /* searches; number of pairs at which they end, and whether the last one did */
   PetscBool full;
 };
-PetscErrorCode SbContactPairsCreate(SbContactSurface mesh, PetscReal reach, SbContactPairs *pairs);
+PetscErrorCode SbContactPairsCreate(SbContactSurface mesh, PetscReal reach, SbContactSearch search,
+                                    SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
 /* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not
    collective. */

@@ -87,7 +87,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
-  PetscCall(SbContactPairsCreate(b->surface, b->widths.w[0], &b->pairs));
+  PetscCall(SbContactPairsCreate(b->surface, b->widths.w[0], b->options.search, &b->pairs));
   b->record.least = PETSC_MAX_REAL;
   b->record.shortest = b->separation.stiffer = b->widths.scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -562,11 +562,16 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Barrier *b = (Barrier *)e->data;
+  int search;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->options.pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->options.verify));
+  PetscCall(SbOptionChoice(scope, "search", &search));
+  b->options.search = (SbContactSearch)search;
+  if (search == SB_SEARCH_AUTO)
+    b->options.search = b->contact.partner.obstacle ? SB_SEARCH_TREE : SB_SEARCH_HASH;
   if (!b->contact.partner.obstacle) {
     PetscCall(SbOptionBool(scope, "self", &b->options.self));
     PetscCall(SbOptionBool(scope, "pairs", &b->options.pairs));

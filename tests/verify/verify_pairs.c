@@ -7,7 +7,9 @@
             pairs sum to the net contact force on it, contact points sum to the columns, and their
             number is the reported one
     fold    a hairpin is compressed: its self-contact pair has all contacts and the complete normal
-    force refused errors: more pairs than the history supports; body names that give two columns the
+    force
+    search  the heap by the hash and by trees: the same motion, to the last bit
+    errors  refused: more pairs than the history supports; body names that give two columns the
     same name
 
   Sums are compared with the contact forces in the equations of motion, which are computed without
@@ -187,6 +189,42 @@ static PetscErrorCode watch_fold(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Largest displacement and its sum over the owned nodes, with `more` options. */
+static PetscErrorCode end_of(const char *scene, const char *more, PetscReal end[2])
+{
+  const PetscScalar *u;
+  PetscInt n;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_open(&t, "%s %s", scene, more));
+  PetscCall(verify_solve(&t, more));
+  PetscCall(VecGetLocalSize(t.run->U, &n));
+  PetscCall(VecGetArrayRead(t.run->U, &u));
+  end[0] = end[1] = 0.;
+  for (PetscInt i = 0; i < n; i++) {
+    end[0] = PetscMax(end[0], PetscAbsReal(PetscRealPart(u[i])));
+    end[1] += PetscRealPart(u[i]);
+  }
+  PetscCall(VecRestoreArrayRead(t.run->U, &u));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The search is the hash's or the trees': nothing else changes. */
+static PetscErrorCode check_search(void)
+{
+  PetscReal end[2][2];
+
+  PetscFunctionBeginUser;
+  PetscCall(end_of(HEAP, "-effect_meet_search hash", end[0]));
+  PetscCall(end_of(HEAP, "-effect_meet_search tree", end[1]));
+  SB_CHECK(end[0][0] == end[1][0] && end[0][1] == end[1][1] && end[0][0] > 0.,
+           "the heap moves by %.17g with the hash and %.17g with trees, in sum %.17g and %.17g",
+           end[0][0], end[1][0], end[0][1], end[1][1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_fold(void)
 {
   const PetscInt n[3] = {22, 2, 1};
@@ -260,6 +298,7 @@ int main(int argc, char **argv)
   PetscCall(check_heap(""));
   PetscCall(check_heap(" -body_left_element cr"));
   PetscCall(check_fold());
+  PetscCall(check_search());
   PetscCall(try_bodies(21, many, "", NULL));
   PetscCall(try_bodies(20, many, "-effect_meet_pairs yes", NULL));
   PetscCall(
