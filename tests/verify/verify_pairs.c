@@ -199,14 +199,14 @@ static PetscErrorCode end_of(const char *scene, const char *more, PetscReal end[
   PetscFunctionBeginUser;
   PetscCall(test_open(&t, "%s %s", scene, more));
   PetscCall(verify_solve(&t, more));
-  PetscCall(VecGetLocalSize(t.run->U, &n));
-  PetscCall(VecGetArrayRead(t.run->U, &u));
+  PetscCall(VecGetLocalSize(t.run->state.U, &n));
+  PetscCall(VecGetArrayRead(t.run->state.U, &u));
   end[0] = end[1] = 0.;
   for (PetscInt i = 0; i < n; i++) {
     end[0] = PetscMax(end[0], PetscAbsReal(PetscRealPart(u[i])));
     end[1] += PetscRealPart(u[i]);
   }
-  PetscCall(VecRestoreArrayRead(t.run->U, &u));
+  PetscCall(VecRestoreArrayRead(t.run->state.U, &u));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
