@@ -58,13 +58,6 @@
   #define SB_UNLIMITED_REAL ((PetscReal)PETSC_UNLIMITED)
 #endif
 
-/* What PetscErrorMessage() hands out. */
-#if PETSC_VERSION_LT(3, 19, 0)
-typedef char *SbErrorText;
-#else
-typedef const char *SbErrorText;
-#endif
-
 /* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). Newton's method met what is
    not a number. */
 #if PETSC_VERSION_LT(3, 25, 0)

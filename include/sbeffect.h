@@ -121,9 +121,6 @@ PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
 extern const SbOption SbEffectRows[]; /* of all types */
 /* Adds a type, which must live as long as the program, and its option rows. Not collective. */
 PetscErrorCode SbEffectRegister(const SbEffectType *type);
-/* Names of all types. Not collective. */
-#define SB_EFFECT_TYPES 32
-PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
 /*
   SbEffectCreate - an effect of the scenario by its name, with its options read.
 

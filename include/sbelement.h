@@ -8,7 +8,6 @@
 */
 #pragma once
 #include "sbmaterial.h"
-#include "sbquadratic.h"
 
 #define SB_PAIRS 55
 /* Pairs (a, b) with a <= b in the order of the blocks of a symmetric matrix: ten, or all of P2. */

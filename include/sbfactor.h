@@ -3,7 +3,7 @@
   interface nodes, on several; PETSc's packages; the saddle-point system of constraints.
 */
 #pragma once
-#include "sbconstraint.h"
+#include "sbfem.h"
 
 /* ---- the packages of PETSc (direct.c, pivots.c) */
 

@@ -1,9 +1,12 @@
 /*
-  sbfem.h - layer 3: nodes and unknowns, batches of cells, assembly, constraints, solver set-up.
+  sbfem.h - layer 3: nodes and unknowns, batches of cells, residual, tangent, constraints of
+  nodes, and the assembly plan for linear solvers.
 */
 #pragma once
 #include "sbelement.h"
 #include "sbmesh.h"
+
+/* data */
 
 /* The arguments of an evaluation of forces and tangent. Arrays: owned nodes, then ghosts,
    [nnode][3]. */
@@ -37,7 +40,7 @@ typedef struct {
 } SbRegion;
 
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
-typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
+typedef struct _p_SbConstraints *SbConstraints; /* below */
 
 /* Groups of nodes that an effect couples: those with a node that is owned here. */
 typedef struct {
@@ -121,6 +124,8 @@ struct _p_SbSpace {
   PetscBool linear_pressure; /* and whether tangents have them instead of the pressures of states */
 };
 
+/* the space and its vectors */
+
 /* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of
    inclusions), elements one per body. Options read: -mass. */
 PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
@@ -153,6 +158,8 @@ static inline PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, Pets
 /* Brings x[nnode][3] of owned nodes to the ghosts of other ranks. Collective. */
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace space, PetscReal x[]);
 
+/* forces and jumps */
+
 /* f[nnode][3] += internal force (stress divergence and beta K v), N. Right on owned nodes. Not
    collective. */
 PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);
@@ -181,6 +188,8 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBo
    penalty depends on, Pa. Set: the same, before SbSpaceFollowJumps(). Collective. */
 PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
 PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
+
+/* matrices and their assembly */
 
 typedef enum {
   SB_MATRIX_AIJ,
@@ -228,6 +237,8 @@ PetscErrorCode SbSpaceAddCoupling(SbSpace space, Mat A, PetscInt number, const P
 PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                                 PetscReal f[], Mat A);
 
+/* prescribed unknowns */
+
 /* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks with the node
    do it. */
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
@@ -238,6 +249,8 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace space);
 void SbSpaceSetPrescribed(SbSpace space, PetscScalar u[]);
 /* Zeroes the prescribed components of a vector, or all others. Not collective. */
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
+
+/* stresses and energies of cells */
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest),
    the law's pressure -lambda theta, Pa (SbMaterialPressure()). Outputs may be NULL. Not
@@ -260,6 +273,8 @@ PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const Pet
 /* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at
    most. Collective, after SbSpacePrescribeDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
+
+/* places: facets, curved cells, sets */
 
 /*
   A boundary facet. face = 0..3, opposite local vertex `face`. The displacement of its corner k is
@@ -309,3 +324,361 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
 /* Whether the space's laws, elements and mass allow a matrix-free operator. Collective, same on all
    ranks. */
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
+
+/* constraints of single nodes */
+
+/*
+  n . u = value, exactly or by springs, for contact with rigid obstacles (method:
+  src/fem/constraint.c).
+
+  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they
+  change: SbSpaceClearConstraints(), SbSpaceAddConstraint() by the owners of the nodes,
+  SbSpaceAssembleConstraints(). SbModelPrescribe(), residuals, tangents and solves follow.
+*/
+
+/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation. */
+typedef enum {
+  SB_SADDLE_NONE,
+  SB_SADDLE_DIRECT
+} SbSaddle;
+
+typedef struct {
+  PetscInt node;  /* owned local node */
+  PetscReal n[3]; /* unit vector of the constraint n . u */
+  PetscReal
+    push[3];        /* direction of the force; differs from n where the node slides with friction */
+  PetscReal value;  /* right-hand side: n . u = value, m */
+  PetscBool spring; /* the force is constant + stiffness (value - n . u); else a multiplier */
+  PetscReal stiffness, constant; /* N/m, >= 0, and N */
+  PetscReal velocity;            /* of n . u at the end of the step, m/s */
+  PetscReal force; /* by the last SbConstraintsComputeForces(), N; positive: along push */
+  PetscReal sum;   /* n . u then, m */
+  PetscInt next;   /* next constraint of the node, -1: none; filled by SbSpaceAddConstraint() */
+} SbConstraint;
+
+struct _p_SbConstraints {
+  PetscBool
+    beside; /* solves treat them outside K (SbConstraintsCreateOperator()), else K is projected */
+  PetscBool nonsymmetric; /* some may have push other than n */
+  PetscInt n, size;
+  SbConstraint *constraint; /* [n] */
+  PetscInt *first;          /* [nnode_owned] last constraint of a node, -1: none */
+  PetscReal *Q;             /* [nnode][9] the projection of a residual at a node is r - Q r */
+  /* of all ranks, since the last SbSpaceAssembleConstraints() */
+  PetscInt ntotal, nexact;
+  PetscBool tilted; /* some have push other than n */
+
+  /* src/solver: solves with constraints outside K */
+  SbSaddle saddle;
+  Mat K;            /* borrowed; NULL before SbConstraintsCreateOperator() */
+  Mat whole;        /* borrowed: the complete tangent, K plus SbModelNonsymmetric(), or K */
+  PetscReal *added; /* [nnode_owned][3] diagonal regularisation added to K, N/m; NULL: none */
+  PetscInt version, matrix; /* raised when the constraints change, and when K does */
+  PC
+    factored; /* factorisation of the system, owned; NULL before the first solve with SB_SADDLE_DIRECT */
+  PetscInt factored_version, factored_matrix; /* version and matrix then */
+  PCFailedReason failed;                      /* of this factorisation */
+  PetscBool general;                          /* FGMRES replaces a method for symmetric systems */
+  char method[SB_NAME_MAX];
+  KSPNormType norm;
+  PCSide side; /* of the replaced method */
+};
+
+/* The constraints that solves treat outside K; NULL: there are none. Not collective. */
+static inline SbConstraints SbConstraintsSeparate(SbSpace space)
+{
+  return space->constraints && space->constraints->beside ? space->constraints : NULL;
+}
+
+/* Whether a factorisation of the saddle-point system replaces the preconditioner now. Not
+   collective. */
+static inline PetscBool SbConstraintsFactored(SbSpace space)
+{
+  const SbConstraints c = space->constraints;
+
+  return (PetscBool)(c && c->saddle == SB_SADDLE_DIRECT && c->nexact);
+}
+
+/* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs
+   `beside`. Flags of several calls are joined by or. Alike on all ranks. Not collective. */
+PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool beside, PetscBool nonsymmetric);
+void SbSpaceClearConstraints(SbSpace space);
+/* Output: number of the constraint on this rank; -1: redundant, as it follows from earlier exact
+   ones and supports of the node, and not added. Not collective. */
+PetscErrorCode SbSpaceAddConstraint(SbSpace space, const SbConstraint *constraint,
+                                    PetscInt *number);
+/* After the last SbSpaceAddConstraint(): builds Q and the global counts. Collective. */
+PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
+/* Whether there is one on any rank. Not collective, alike on all ranks. */
+static inline PetscBool SbSpaceIsConstrained(SbSpace space)
+{
+  return (PetscBool)(space->constraints && space->constraints->ntotal);
+}
+/* Lends constraint `number` of this rank till the next one is added. */
+static inline SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number)
+{
+  return &space->constraints->constraint[number];
+}
+
+/*
+  Not collective, on owned nodes [nnode_owned][3]: x <- the closest displacement, m, that satisfies
+  exact constraints, or velocity, m/s, of which n . x is theirs (if push is n); x <- x - Q x:
+  projected residual.
+*/
+void SbConstraintsPrescribe(SbSpace space, PetscBool velocities, PetscReal x[]);
+void SbConstraintsProject(SbSpace space, PetscReal x[]);
+/* z <- its projection onto directions that supports and exact constraints admit. Not collective. */
+PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
+/* f[nnode_owned][3], N, less springs' forces; projected by exact constraints if `constrain`. */
+void SbConstraintsResidual(SbSpace space, const PetscReal u[], PetscBool constrain, PetscReal f[]);
+/* y <- y + (F^T k G - added) x, F, G, k: push, n and stiffness of springs; the same added to the
+   diagonal block of a node. */
+void SbConstraintsAddTangent(SbSpace space, const PetscReal x[], PetscReal y[]);
+void SbConstraintsAddSprings(SbSpace space, PetscInt node, PetscReal block[9]);
+/* Computes `force` and `sum` of all, for u[nnode_owned][3], m, and its residual r without
+   constraints (but with springs), N. */
+void SbConstraintsComputeForces(SbSpace space, const PetscReal u[], const PetscReal r[]);
+/* After it: adds the forces of all constraints to f[nnode_owned][3], N. */
+void SbConstraintsAddForces(SbSpace space, PetscReal f[]);
+/* After it: turns this residual r into reactions: of supports, elsewhere constraints, N. */
+void SbConstraintsReactions(SbSpace space, PetscReal r[]);
+/* Block of local nodes i, j: B <- P_i B P_j (P = I - Q), if i = j plus |B| Q_i; strides of rows,
+   columns. */
+void SbConstraintsProjectBlock(SbSpace space, PetscInt i, PetscInt j, size_t rs, size_t cs,
+                               PetscScalar *v);
+
+/* for linear solvers: the assembly plan */
+
+/*
+  The plan: sparsity graph of the owned node rows, split as PETSc splits it (diagonal part: owned
+  columns; off-diagonal part: ghost columns), and for each local cell the position of its width^2
+  node blocks in it. A block index k of row i is the same for BAIJ (values 9 k ..) and for AIJ with
+  full 3x3 blocks.
+*/
+typedef struct _p_SbPlan {
+  PetscInt *di, *dj;  /* diagonal part: rows [nnode_owned+1], local columns ascending */
+  PetscInt *oi, *oj;  /* off-diagonal part: local ghost nodes, ascending by global number */
+  PetscInt *diagonal; /* [nnode_owned] block index of (i, i) */
+  /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the
+     off-diagonal part, PETSC_MIN_INT when row a is another rank's; padding lanes have those of the
+     first */
+  PetscInt *offset;
+  PetscInt *coupling_start; /* [couplings.n] into coupling; NULL without couplings */
+  PetscInt *coupling;       /* [n^2] of a group of n nodes: block (a, b) at n a + b, as in offset */
+  PetscInt *ui;   /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt npair; /* of blocks of a cell in upper: 10, or SB_PAIRS with a P2 body */
+  PetscInt *
+    upper; /* [nbatch][npair][SB_BATCH] block of pair p in the upper triangle, ~k: to be transposed */
+  PetscInt *fresh_start; /* [nbatch+1] into fresh */
+  PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
+  PetscReal *face_term[2]; /* factor of the identity in each block of both parts, N/m; or NULL */
+  PetscInt nfix;           /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block;     /* [nfix] block index as in offset */
+  PetscInt *fix_row;       /* [nfix] local row node */
+  uint8_t
+    *fix_mask; /* [nfix] bits 0..2: rows, 3..5: columns of the block to clear; 6: diagonal block */
+} * SbPlan;
+
+PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
+
+/* splitting, and other operators */
+
+/*
+  The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a
+  = V D grad psi_a with D from SbMaterialOps.dilatation_gradient; of P2 V times the derivative of
+  the mean of theta. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both
+  moduli are zero.
+*/
+typedef struct {
+  PetscInt stride; /* lanes of a batch in b: 12, or 30 with a P2 body */
+  SbPack *b;       /* [nbatch][stride] m^2; 0 in padding */
+  SbPack *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
+  SbPack *shear;   /* [nbatch] mu likewise, Pa */
+} SbVolumetric;
+/* The tangent without its volumetric part, in up to three spaces, space[0] = s, whose strains they
+   are. Where space[k] has its nodes at vertices and s at faces, A[k] is the same form there. out
+   NULL: nothing is left out. Not collective. */
+PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
+                                    const SbSpace space[], const Mat A[], const SbVolumetric *out);
+
+/* Assembly of an operator other than one block matrix. */
+typedef struct {
+  Mat stored; /* target of SbSpaceAddCellBlock(); borrowed; NULL: none */
+  PetscErrorCode (*assemble)(
+    Mat A, const SbStage *stage); /* for SbSpaceAssembleTangent(). Not collective */
+  /* for SbSpaceAddSpring(): factor times a block, N/m, of a node; `stored` has it already; or
+     NULL */
+  PetscErrorCode (*add_spring)(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);
+  PetscErrorCode (*finish)(
+    Mat A); /* for SbSpaceFinishTangent(); NULL: nothing is to be done. Collective */
+} SbAssembly;
+/* Makes the functions of sbfem.h assemble A so. The table is borrowed and lives as long as A.
+   Collective. */
+PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly);
+
+/* batches: gathers and scatters */
+
+/* u[3 a + i][lane] of n nodes of a batch from a local array [nnode][3]. */
+SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[], SbPack u[])
+{
+  for (int a = 0; a < n; a++) {
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal *p = x + 3 * node[a * SB_BATCH + l];
+
+      u[3 * a][l] = p[0];
+      u[3 * a + 1][l] = p[1];
+      u[3 * a + 2][l] = p[2];
+    }
+  }
+}
+
+/* The nodes of a batch, those of P2 at edges behind those at vertices: [region.nnode][SB_BATCH]. */
+static inline const PetscInt *sb_batch_nodes(SbSpace s, PetscInt b)
+{
+  return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
+}
+
+/*
+  Nodal values that strains are computed from, u[3 nnode]: of the cells' nodes; for DG the means m =
+  p + w (u - p) of the own node u and the one across the face p.
+*/
+static inline void sb_gather_strain(SbSpace s, PetscInt b, const PetscReal x[], SbPack u[30])
+{
+  const SbRegion *region = s->batch_region[b];
+
+  /* loops of constant length */
+  if (region->nnode == 4)
+    sb_gather_nodes(4, sb_batch_nodes(s, b), x, u);
+  else
+    sb_gather_nodes(10, sb_batch_nodes(s, b), x, u);
+  if (region->broken) {
+    SbPack p[12];
+
+    sb_gather_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, x, p);
+    for (int k = 0; k < 12; k++)
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
+  }
+}
+
+/* f[nnode][3] += the first n lanes of a batch's vectors at nnode nodes. */
+SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, const SbPack fe[],
+                                PetscReal f[])
+{
+  for (int a = 0; a < nnode; a++) {
+    for (PetscInt l = 0; l < n; l++) {
+      PetscReal *p = f + 3 * node[a * SB_BATCH + l];
+
+      p[0] += fe[3 * a][l];
+      p[1] += fe[3 * a + 1][l];
+      p[2] += fe[3 * a + 2][l];
+    }
+  }
+}
+
+/* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
+static inline void sb_scatter_strain(SbSpace s, PetscInt b, SbPack fe[30], PetscReal f[])
+{
+  const SbRegion *region = s->batch_region[b];
+
+  if (region->broken) {
+    SbPack p[12];
+
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal own = s->batch_weight[4 * b + k / 3][l] * fe[k][l];
+
+        p[k][l] = fe[k][l] - own;
+        fe[k][l] = own;
+      }
+    }
+    sb_scatter_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, s->batch_n[b], (const SbPack *)p, f);
+  }
+  if (region->nnode == 4)
+    sb_scatter_nodes(4, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
+  else
+    sb_scatter_nodes(10, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
+}
+
+/* rigid-body modes */
+
+/* Longest side of a box: length scale of rotations. */
+SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
+{
+  return PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2]));
+}
+/* Value of rigid-body mode 0 to 5 (translations, rotations about its middle) at x, over its
+   size. */
+void SbRigidMode(PetscInt mode, const PetscReal x[3], const PetscReal box[6], PetscReal value[3]);
+/* The near null space of A: the six rigid-body modes, which algebraic multigrid must reproduce,
+   made orthonormal. Six serve any number of bodies: no aggregate spans two, and each body turns
+   about its own centre. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is
+   left out. Collective. */
+PetscErrorCode
+SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
+              const void *ctx);
+
+/* rotations of cells and nodes */
+
+/* Rotations that are stored for a cell: P2 has one at each point of SbRuleQuadratic, others use the
+   first. */
+static inline PetscInt sb_rotation_points(SbSpace s)
+{
+  return s->edge_node ? 4 : 1;
+}
+/* R[nbatch][sb_rotation_points()][9]: the frames of laws, or polar rotations of F, at u[nnode][3]
+   with ghosts, m; NULL: at rest. Not collective. */
+void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbPack R[]);
+/* The material's rotation around each owned node, node_R[nnode_owned][9], row-major: the proper one
+   closest to the volume-weighted mean of those of the cells around it. spread[nnode_owned] (may be
+   NULL): the largest |R_cell - R|_F^2 among these cells, 8 sin^2(angle / 2). Not collective. */
+PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbPack R[], PetscReal node_R[],
+                                       PetscReal spread[]);
+
+/* Lends the rotations of cells that a matrix-free operator holds; NULL for another matrix. */
+PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
+
+/* rows, graphs and values of matrices */
+
+/* Rows of A, a matrix-free operator, AIJ, BAIJ or SBAIJ of the space, for the owned local nodes
+   node[n], NULL: 0 to n - 1. Output: ia[n+1], ja: local nodes, owned ones first, both ascending;
+   block[ia[n]][9], row-major, N/m. ja and block may be NULL to learn ia. Caller owns the arrays.
+   Not collective. */
+PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[],
+                              PetscInt ia[], PetscInt ja[], PetscReal block[]);
+
+/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2() that the caller
+   frees. Not collective. */
+PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
+
+/* Gives a symmetric SBAIJ (one rank) or BAIJ matrix of final pattern the product of product.c.
+   Collective. */
+PetscErrorCode SbProductAttach(Mat A);
+/* Lends the rows of a sequential BAIJ or SBAIJ matrix: start[n+1], column[start[n]]. Not
+   collective. */
+PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[],
+                               const PetscInt *column[]);
+/* The rows and columns of this rank of A, BAIJ or SBAIJ with the fast product, as SBAIJ: borrowed
+   from A, up to date until values of A change; A itself when that is SBAIJ on one rank. Ask again
+   after each assembly. Not collective. */
+PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
+/* y -= the columns of other ranks of A times x. Collective. */
+PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y);
+/* Gives back values only read, by the matrix's own function, say MatSeqSBAIJRestoreArray. Since
+   3.25 PETSc takes these functions for a change of the matrix, after which fast products and
+   preconditioners are set up again, in each iteration if one reads the values in its set-up. Not
+   collective. */
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]),
+                                PetscScalar *value[]);
+/* The values of a matrix: diagonal part, and the one with ghost columns; of SBAIJ the upper
+   triangle. */
+typedef struct {
+  SbMatrixKind kind;
+  PetscBool symmetric; /* SBAIJ */
+  Mat part[2];         /* the second one NULL on one rank */
+  PetscScalar *value[2];
+} SbMatBlocks;
+/* Lends the values of a block matrix, BAIJ or SBAIJ or, if `aij`, AIJ; its state stays. Not
+   collective. Error: PETSC_ERR_SUP for another kind. */
+PetscErrorCode SbMatGetBlocks(Mat A, PetscBool aij, SbMatBlocks *blocks);
+PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *blocks);

@@ -6,7 +6,6 @@
 #pragma once
 #include "sbbase.h"
 #include "sbkernel.h"
-#include "sbquadratic.h"
 
 #define SB_BOX_ROUNDING 16 /* rounding of a box's corners, in units of eps |x| */
 
@@ -362,7 +361,7 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 /*
   SbLocator - which tet holds a point. The arrays are borrowed. Flat and inverted tets contain no
   point. Tets are curved by edge_off[ncell][6][3], nodes at edges 01 02 03 12 13 23 from their
-  middles; NULL: straight. The weights of a curved one are l of its map x(l) (sbquadratic.h).
+  middles; NULL: straight. The weights of a curved one are l of its map x(l) (sbkernel.h).
 
   SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold
   the point the one in which it lies deepest, or the first of equal ones; of a point in none the

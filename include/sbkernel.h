@@ -1,5 +1,5 @@
 /*
-  sbkernel.h - layer 0: what batch kernels are made of: lanes, versions for processors, 3x3 algebra.
+  sbkernel.h - layer 0: what batch kernels are made of: lanes, 3x3 algebra, tets with ten nodes.
 
   A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel
   is a loop over lanes around straight-line code, so that the compiler turns each scalar of the text
@@ -13,6 +13,8 @@
 #pragma once
 #include <petscsys.h>
 #include <math.h>
+
+/* lanes */
 
 #define SB_BATCH 8
 typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocates it */
@@ -50,6 +52,8 @@ SB_INLINE void SbPackPut(int n, const PetscReal x[], int l, SbPack a[])
   for (int k = 0; k < n; k++)
     a[k][l] = x[k];
 }
+
+/* 3x3 algebra on one lane */
 
 SB_INLINE PetscReal SbDot3(const PetscReal a[3], const PetscReal b[3])
 {
@@ -133,19 +137,30 @@ SB_INLINE PetscReal SbMatDet(const PetscReal A[9])
   return SbDot3(A, c);
 }
 
-/* The proper rotation R next to F: det R = +1, the maximiser of R : F, for every F; R^T F is
-   symmetric. Where the maximiser is not unique (rank one, F = 0, reflections with equal stretches)
-   some maximiser is returned, I for F = 0. A lane that is not finite gives NaN. Error of R about 5
-   eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches: that is rounding
-   of F seen through the condition number of the problem. A lane's result does not depend on the
-   others. Not collective. */
-void SbPolar(const SbPack F[9], SbPack R[9]);
+/* two and four numbers at a time: unaligned, and allowed to examine any array */
 
-/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22,
-   right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and
-   S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the
-   sign of det F being in s. Not collective. */
-void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
+typedef double SbTwo __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double SbFour __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t SbFourMask __attribute__((vector_size(32), aligned(8), may_alias));
+#define SB_SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
 
-/* F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign. */
-void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);
+/* tets with ten nodes, at corners and edges: basis, map, rules (src/base/quadratic_map.c) */
+
+#define SB_CELL_NODES 10 /* of a cell at most: P2 has them at its vertices, then at its edges */
+/* Vertices of the edges of a cell: P2's node 4 + e is at the middle of edge e. */
+static const int SbTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+/* Points by their barycentric coordinates, with their parts of the volume. */
+#define SB_POINTS 14 /* of a rule at most */
+typedef struct {
+  int n;
+  PetscReal L[SB_POINTS][4], weight[SB_POINTS];
+} SbPointRule;
+extern const SbPointRule SbRuleQuintic; /* degree 5, positive weights: stresses of curved tets */
+extern const SbPointRule SbRuleFacet;   /* degree 5 on a triangle, L[3] (Radon 1948) */
+/* The ten basis functions at L. */
+void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES]);
+/* Corners of the P1 tet with the derivatives of the map x of ten nodes at L, but for a
+   translation. */
+void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3],
+                        PetscReal corner[4][3]);

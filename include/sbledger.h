@@ -13,18 +13,7 @@
   SbLedgerAttach(), SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().
 */
 #pragma once
-#include "sbestimate.h"
 #include "sbtime.h"
-
-typedef enum {
-  SB_ERROR_SPACE,     /* of the mesh: estimate_space.c */
-  SB_ERROR_TIME,      /* of the integrator, summed over the steps */
-  SB_ERROR_NONLINEAR, /* remaining residual of Newton's method */
-  SB_ERROR_LINEAR,    /* remaining residual of the linear solver */
-  SB_ERROR_CONTACT,   /* forces on gaps that are not closed */
-  SB_ERROR_ROUNDING,  /* of displacements in double precision */
-  SB_ERROR_COUNT
-} SbErrorSource;
 
 typedef struct _p_SbLedger *SbLedger;
 

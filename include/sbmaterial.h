@@ -13,6 +13,21 @@
 
 typedef struct _p_SbMaterial *SbMaterial;
 
+/* polar.c, spectral.c: 3x3 matrices of a batch */
+
+/* The proper rotation R next to F: det R = +1, the maximiser of R : F, for every F; R^T F is
+   symmetric. Where the maximiser is not unique (rank one, F = 0, reflections with equal stretches)
+   some maximiser is returned, I for F = 0. A lane that is not finite gives NaN. Error of R about 5
+   eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches: that is rounding
+   of F seen through the condition number of the problem. A lane's result does not depend on the
+   others. Not collective. */
+void SbPolar(const SbPack F[9], SbPack R[9]);
+
+/* F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign. */
+void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);
+
+/* laws */
+
 /* Tangents of a law. A law without a warped one refuses it. */
 typedef enum {
   SB_TANGENT_WARPED, /* Hooke's tensor turned by R: symmetric, positive definite, leaves out dR/dF */

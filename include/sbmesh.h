@@ -1,10 +1,11 @@
 /*
   sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned
-  with the help of METIS, and held as plain arrays with one layer of overlap.
+  with the help of METIS, and held as plain arrays with one layer of overlap; tets on one rank, for
+  what works on them before that.
 */
 #pragma once
 #include <petscdm.h>
-#include "sbbase.h"
+#include "sbgeometry.h"
 
 #define SB_SET_MAX 63 /* named sets that one scenario may use: one bit each, bit 0 is taken */
 #define SB_ON_BOUNDARY \
@@ -14,6 +15,8 @@
 #define SB_SLIVER \
   0.5 /* degrees: tets with a smaller dihedral angle are slivers, which slow down solvers */
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
+
+/* bodies and sets, as the scenario gives them */
 
 /* Program that fills a surface with tets. */
 typedef enum {
@@ -129,6 +132,26 @@ typedef struct {
   PetscBool prescribed;          /* an effect prescribes every displacement there */
 } SbSet;
 
+/* Allocates a mesh in memory, zeroed. Not collective. */
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
+                                  SbMemoryMesh **in_memory);
+PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
+/* Sends step, mass and bound of the mesh on rank 0 to empty ones on all; NULL there: NULL on all.
+   Collective. */
+PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
+/*
+  SbSetParse - reads the description of a set. Not collective.
+
+  Input: option - full name, for messages; text - group:NAME, group:BODY.NAME,
+  box:xmin,ymin,zmin,xmax,ymax,zmax, plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r,
+  halfspace:nx,ny,nz,d, body:NAME or boundary (lengths in m).
+  Output: shape, group, p of set; its name is left alone.
+  Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
+*/
+PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);
+
+/* the distributed mesh */
+
 /*
   SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first,
   then the ghosts that touch them: every cell with an owned vertex is here. With nodes at faces or
@@ -202,29 +225,8 @@ PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, con
 PetscErrorCode
 SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 extern const SbOption SbMeshRows[];
-/* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not
-   collective. */
-void SbTetDefaults(SbTetOptions *options);
-PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
-/* Allocates a mesh in memory, zeroed. Not collective. */
-PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
-                                  SbMemoryMesh **in_memory);
-PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
-/* Sends step, mass and bound of the mesh on rank 0 to empty ones on all; NULL there: NULL on all.
-   Collective. */
-PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
-/*
-  SbSetParse - reads the description of a set. Not collective.
-
-  Input: option - full name, for messages; text - group:NAME, group:BODY.NAME,
-  box:xmin,ymin,zmin,xmax,ymax,zmax, plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r,
-  halfspace:nx,ny,nz,d, body:NAME or boundary (lengths in m).
-  Output: shape, group, p of set; its name is left alone.
-  Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
-*/
-PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);
-
 /* route.c: records to other ranks */
+
 typedef struct {
   MPI_Comm comm;
   PetscInt nsend, nrecv;
@@ -244,3 +246,113 @@ PetscErrorCode SbRouteDestroy(SbRoute *route);
    received[nrecv] by rank, PetscFree(). Collective. */
 PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[],
                            const void *record, void *received);
+
+/* tets as arrays on one rank: faces, shape, checks. Not collective */
+
+typedef struct _p_SbImport SbImport; /* vertices, simplices of every dimension and their groups */
+
+/* faces.c: which cells share a face */
+typedef struct {
+  PetscInt ncell;
+  PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
+  SbKey
+    *face; /* [4 ncell] of the two other vertices, ascending for each lowest; slots 4 cell + face */
+  PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
+  PetscInt nboundary;
+  PetscInt nshared;   /* faces of more than two cells */
+  PetscInt shared[3]; /* three cells at the first one of these */
+} SbFaces;
+
+/* of face f, counter-clockwise seen from outside a positively oriented tet */
+extern const int SbFaceVertex[4][3];
+
+PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces);
+PetscErrorCode SbFacesDestroy(SbFaces *faces);
+/* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
+PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
+
+/* check.c, quality.c */
+
+/* Adds "what: n" to a note, unless n is 0. */
+static inline void SbNoteCount(size_t size, char note[], const char *what, PetscInt n)
+{
+  if (n)
+    SbAppend(size, note, "%s%s: %" PetscInt_FMT, note[0] ? ", " : "", what, n);
+}
+
+/* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and
+   nlost. */
+PetscErrorCode SbImportDropUnused(SbImport *import);
+/* Removes unused vertices, orients cells, checks for defects; builds the faces. */
+PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
+/* Sums and maxima over tets and vertices; neutral where there are none. */
+typedef struct {
+  PetscInt nsliver;  /* tets with a dihedral angle below that wanted */
+  PetscReal volume;  /* m^3 */
+  PetscReal most[8]; /* cosine of a dihedral angle, radius ratio, -x, -y, -z, x, y, z */
+} SbShape;
+void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
+
+/*
+  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and
+  around it, 1 for the regular one, 0 for a flat one, negative when it is inverted. Not collective.
+*/
+PetscReal SbTetQuality(const PetscReal x[], const PetscInt vert[4]);
+/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least
+   Jacobian, where P2 uses it and at its nodes, over that of the straight tet. */
+PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
+PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
+
+/* a mesh read by SbImportRead(), on one rank: measured, repaired, refined. Not collective. Errors:
+   PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a line that names the file and what to do */
+
+/* Simplices of group i of a mesh, and their length, area or volume; m, m^2, m^3; 0 for points. */
+PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, PetscInt *n, PetscReal *size);
+
+#define SB_ANGLE_BINS 18 /* of ten degrees */
+#define SB_RATIO_BINS 8
+extern const PetscReal SbRatioBinEdges[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
+
+typedef struct {
+  SbBody body;                     /* the fields that SbMeshCreate() finds */
+  PetscInt nedge, nface;           /* of the tets; nface counts each face once */
+  PetscReal area;                  /* of the boundary, m^2 */
+  PetscReal edge[3];               /* shortest, mean, longest, m */
+  PetscReal max_dihedral;          /* degrees */
+  PetscInt64 angle[SB_ANGLE_BINS]; /* dihedral angles, six for each tet */
+  PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
+} SbMeshStatistics;
+/*
+  SbMeshFileMeasure - statistics, after checks and repairs (unused vertices, orientation) as those
+  of a run.
+
+  Errors: what SbMeshCreate() refuses.
+*/
+PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshStatistics *facts);
+
+typedef struct {
+  PetscReal merge_tolerance; /* vertices at most so far apart became one, m */
+  PetscInt nwelded;          /* vertices that went into another one */
+  PetscInt ncollapsed;       /* tets that used a vertex twice, dropped */
+  PetscInt nflat;            /* flat tets, dropped */
+  PetscInt nslit; /* those of them that had no face on the boundary: a slit without width is left */
+  PetscInt nduplicate; /* duplicate tets, removed; their groups are joined */
+  PetscInt nturned;    /* inverted tets, reoriented */
+  PetscInt nunused;    /* vertices that no tet uses, dropped */
+  PetscInt nitem; /* duplicate, collapsed or unused triangles, lines, points of groups, removed */
+} SbRepair;
+/*
+  SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.
+
+  Input:
+    merge_tolerance - vertices at most so far apart become one, m; 0: none; below 0: 1e-9 of the
+    diagonal
+  Output:
+    done - counts of repairs
+  Errors: remaining defects that SbMeshCreate() would refuse: overlapping tets, no tets.
+*/
+PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
+
+/* Cuts every tet into eight, every triangle into four, every line into two; groups are carried
+   over. */
+PetscErrorCode SbMeshFileRefine(SbImport *import);

@@ -41,30 +41,7 @@
 #pragma once
 #include "sbtime.h"
 
-/* A named field. compute() fills this rank's owned entities (points or cells, in the mesh's local
-   order). */
-typedef struct SbField SbField;
-struct SbField {
-  const char *name; /* "von_mises" */
-  const char *unit;
-  PetscInt
-    ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
-  PetscBool cell; /* per cell, else per vertex, or corner of a cell with -output_discontinuous */
-  PetscBool constant; /* integers, written once with the mesh */
-  PetscBool dynamic;  /* does not exist in a static run */
-  const char *help;
-  PetscErrorCode (*compute)(const SbField *field, SbRun run, const SbStep *step,
-                            PetscReal *values); /* NULL: `sets`, several arrays */
-  /* parameters of compute(): */
-  size_t from; /* where in the step or the output the quantity is */
-  void (*of_stress)(const PetscReal sigma[6],
-                    PetscReal value[]); /* value[ncomp] from xx yy zz xy yz xz */
-};
-
 extern const SbOption SbOutputRows[], SbProbeRows[];
-
-/* Every field that there is. Not collective. */
-const SbField *SbFieldGetAll(PetscInt *n);
 
 /*
   SbOutputSetFromOptions - reads every option of the output and makes the folder of the run.

@@ -2,7 +2,7 @@
   sbsolver.h - layer 6: linear solvers by name, and the choice of one by problem and rank count.
 */
 #pragma once
-#include "sbconstraint.h"
+#include "sbfem.h"
 
 /* A row of the solver table: a matrix type and default PETSc options. */
 typedef struct _SbSolverPreset {

@@ -14,7 +14,6 @@ typedef enum {
   SB_TIME_ALPHA2,
   SB_TIME_STATIC
 } SbIntegrator;
-extern const char *const SbIntegrators; /* "euler_implicit|newmark|..." in the order of the enum */
 
 /* What a monitor sees after each accepted step (and once before the first). */
 typedef struct {

@@ -9,7 +9,6 @@
 */
 #include <signal.h>
 #include "sb.h"
-#include "sblog.h"
 
 /* Objects of a simulation; re-meshing replaces the first three. */
 typedef struct {

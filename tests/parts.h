@@ -8,9 +8,11 @@
   here.
 */
 #pragma once
+#include "../src/time/time_impl.h"
+#include "../src/effect/effect_impl.h"
+#include "../src/output/output_impl.h"
 #include "../src/base/option.h"
 #include "scene.h"
-#include <sblog.h>
 
 #define PART_TEXT 4096 /* longest scenario, characters */
 #define PART_STEPS "8" /* steps of every run */

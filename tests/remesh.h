@@ -3,6 +3,7 @@
   point.
 */
 #pragma once
+#include "../src/remesh/remesh_impl.h"
 #include "scene.h"
 
 /* Mesher for star-shaped surfaces around the centre. ctx: NULL, or an int that counts the calls. */

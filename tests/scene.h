@@ -136,10 +136,9 @@ static inline PetscErrorCode test_scene_close(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The error of a source, J^(1/2), and the energy that it is relative to, J: as in history.csv,
-   checkpoints. */
-static inline PetscErrorCode test_ledger(SbRun run, SbErrorSource source, PetscReal *error,
-                                         PetscReal *stored)
+/* The error of a source (SB_ERROR_... of ledger_impl.h), J^(1/2), and the energy that it is
+   relative to, J: as in history.csv, checkpoints. */
+static inline PetscErrorCode test_ledger(SbRun run, int source, PetscReal *error, PetscReal *stored)
 {
   PetscInt k = 0;
 

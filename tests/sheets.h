@@ -4,7 +4,7 @@
 */
 #pragma once
 #include <math.h>
-#include <sblog.h>
+#include <sbbase.h>
 #include "../src/contact/pairs.h"
 #include "test.h"
 

@@ -21,6 +21,9 @@ struct _p_SbFormula {
   PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
 };
 
+/* where: option name, for messages. */
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
+                               SbFormula *formula);
 /* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and
    line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where,

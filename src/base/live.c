@@ -11,6 +11,7 @@
   faster than -live_pace simulated seconds per second waits; a slower one does not catch up.
 */
 #include "formula.h"
+#include "option.h"
 
 #define VALUE_MAX 48 /* largest number of live values */
 

@@ -5,7 +5,7 @@
   The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID),
   because they time phases, not objects.
 */
-#include "sblog.h"
+#include "sbbase.h"
 
 PetscLogEvent SbEvents[SB_EVENT_COUNT];
 PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;

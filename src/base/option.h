@@ -4,6 +4,8 @@
 #pragma once
 #include "sbbase.h"
 
+#define SB_OPTION_COUNT_MAX 16 /* most numbers or formulas in one option */
+
 #define SB_OPTION_NAME_MAX \
   (3 * SB_NAME_MAX) /* "-" klass "_" instance "_" key, with the terminating zero */
 

@@ -10,7 +10,7 @@
   points with positive weights (Walkington 2000), which leave no zero-energy modes and no massless
   modes.
 */
-#include "sbquadratic.h"
+#include "sbkernel.h"
 
 #define A 0.31088591926330060980
 #define B 0.092735250310891226402

@@ -3,7 +3,6 @@
   of the active set after it.
 */
 #include "contact_impl.h"
-#include "sblog.h"
 
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts)
 {

@@ -5,7 +5,6 @@
 #pragma once
 #include "obstacle.h"
 #include "sbcontact.h"
-#include "sblog.h"
 
 /* Calls an operation of a contact, if there is one, within the log event of its effect; PHASE: with
    its time added to the contact phase as well. */

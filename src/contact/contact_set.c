@@ -3,7 +3,6 @@
   them, whatever partner and response each one has. The active set is in active_set.c.
 */
 #include "contact_impl.h"
-#include "sblog.h"
 
 PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effect[],
                                   SbContactSet *to)

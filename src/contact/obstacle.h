@@ -4,7 +4,7 @@
 #pragma once
 #include "sbfem.h"
 #include "sbgeometry.h"
-#include "sbtriangles.h"
+#include "sbsurface.h"
 
 typedef struct _p_SbObstacle *SbObstacle;
 /*

@@ -16,7 +16,6 @@
 */
 #include "pairs.h"
 #include "sbgeometry.h"
-#include "sblog.h"
 
 #define LEFT 0.1 /* fraction of its gap that a pair keeps at least */
 #define LEFT_MOST \

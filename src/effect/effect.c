@@ -5,7 +5,6 @@
   Everything that needs the mesh waits for its setup operation.
 */
 #include "effect_impl.h"
-#include "sblog.h"
 
 static const SbEffectType *types[SB_EFFECT_TYPES];
 static PetscInt ntype;

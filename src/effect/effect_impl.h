@@ -4,6 +4,10 @@
 #pragma once
 #include "sbeffect.h"
 
+/* Names of all types. Not collective. */
+#define SB_EFFECT_TYPES 32
+PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
+
 /* Reads the n formulas of an option; e owns them, and is no longer steady where one uses t.
    position: whether they may use x, y, z; an error (PETSC_ERR_USER_INPUT) if they do and may not.
    Not collective. */

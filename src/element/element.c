@@ -15,7 +15,7 @@
   difference of two nodes. (Crouzeix and Raviart 1973; Hansbo and Larson 2003.)
 */
 #include <sbelement.h>
-#include "sblog.h"
+#include "sbbase.h"
 
 static const SbElementType *types[SB_ELEMENT_TYPES];
 static PetscInt ntype;

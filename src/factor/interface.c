@@ -12,7 +12,6 @@
 
   Not handled: zeros of W between parts of the interface that are not connected.
 */
-#include "sbassembly.h"
 #include "sbfactor.h"
 #include "quantized.h"
 #include <petscblaslapack.h>

@@ -14,7 +14,6 @@
   without friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (direct.c). It is factored
   again only when K or the constraints have changed.
 */
-#include "sbassembly.h"
 #include "sbfactor.h"
 
 PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *failed)

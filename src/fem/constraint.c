@@ -27,7 +27,6 @@
   saddle_factor.c.)
 */
 #include "fem_impl.h"
-#include "sbconstraint.h"
 #include "sbkernel.h"
 
 #define SAID \

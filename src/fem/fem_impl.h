@@ -3,7 +3,9 @@
   batch.
 */
 #pragma once
-#include "sbassembly.h"
+#include "sbfem.h"
+
+#define SB_NOT_OWNED PETSC_MIN_INT /* in SbPlan.offset: the row is of another rank */
 
 /* layout.c: creates the nodes of the space. After the batches: the nodes of each stress.
    Collective. */

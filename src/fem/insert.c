@@ -14,7 +14,6 @@
   AIJ does not store blocks contiguously: they are added entry by entry.
 */
 #include "fem_impl.h"
-#include "sbfour.h"
 
 void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *faces,
                    const PetscReal beta[])
@@ -81,25 +80,25 @@ SB_INLINE void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npa
 static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
 
 /* out[l][e] = in[e][l] */
-SB_INLINE void transpose(const Four in[4], Four out[4])
+SB_INLINE void transpose(const SbFour in[4], SbFour out[4])
 {
-  const Four a = SHUFFLE(in[0], in[1], 0, 4, 2, 6);
-  const Four b = SHUFFLE(in[0], in[1], 1, 5, 3, 7);
-  const Four c = SHUFFLE(in[2], in[3], 0, 4, 2, 6);
-  const Four d = SHUFFLE(in[2], in[3], 1, 5, 3, 7);
+  const SbFour a = SB_SHUFFLE(in[0], in[1], 0, 4, 2, 6);
+  const SbFour b = SB_SHUFFLE(in[0], in[1], 1, 5, 3, 7);
+  const SbFour c = SB_SHUFFLE(in[2], in[3], 0, 4, 2, 6);
+  const SbFour d = SB_SHUFFLE(in[2], in[3], 1, 5, 3, 7);
 
-  out[0] = SHUFFLE(a, c, 0, 1, 4, 5);
-  out[1] = SHUFFLE(b, d, 0, 1, 4, 5);
-  out[2] = SHUFFLE(a, c, 2, 3, 6, 7);
-  out[3] = SHUFFLE(b, d, 2, 3, 6, 7);
+  out[0] = SB_SHUFFLE(a, c, 0, 1, 4, 5);
+  out[1] = SB_SHUFFLE(b, d, 0, 1, 4, 5);
+  out[2] = SB_SHUFFLE(a, c, 2, 3, 6, 7);
+  out[3] = SB_SHUFFLE(b, d, 2, 3, 6, 7);
 }
 
 /* Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position.
    With `edge` the position may be in the off-diagonal part, or on another rank. */
-SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool edge,
+SB_INLINE void add_blocks(const SbFour k[9], const PetscInt position[4], PetscBool edge,
                           PetscScalar *const value[2])
 {
-  Four head[4], middle[4];
+  SbFour head[4], middle[4];
 
   transpose(k, head);
   transpose(k + 4, middle);
@@ -110,8 +109,8 @@ SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool
     if (edge && position[l] == SB_NOT_OWNED)
       continue;
     v = value[off] + 9 * (size_t)(off ? ~position[l] : position[l]);
-    *(Four *)v += head[l];
-    *(Four *)(v + 4) += middle[l];
+    *(SbFour *)v += head[l];
+    *(SbFour *)(v + 4) += middle[l];
     v[8] += k[8][l];
   }
 }
@@ -126,15 +125,15 @@ SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset
     const PetscInt ba = width * SbPairB[p] + SbPairA[p];
 
     for (int h = 0; h < SB_BATCH; h += 4) {
-      Four k[9];
+      SbFour k[9];
 
       for (int e = 0; e < 9; e++)
-        k[e] = *(const Four *)&K[p][swapped[e]][h];
+        k[e] = *(const SbFour *)&K[p][swapped[e]][h];
       add_blocks(k, offset + SB_BATCH * ab + h, edge, value);
       if (ab == ba)
         continue;
       for (int e = 0; e < 9; e++)
-        k[e] = *(const Four *)&K[p][e][h];
+        k[e] = *(const SbFour *)&K[p][e][h];
       add_blocks(k, offset + SB_BATCH * ba + h, edge, value);
     }
   }
@@ -160,8 +159,8 @@ SB_INLINE void insert_upper(int npair, const SbPack K[restrict][9], const PetscI
   for (int p = 0; p < npair; p++) {
     for (int h = 0; h < SB_BATCH; h += 4) {
       PetscInt position[4];
-      Mask turn;
-      Four k[9];
+      SbFourMask turn;
+      SbFour k[9];
 
       for (int l = 0; l < 4; l++) {
         const PetscInt u = upper[SB_BATCH * p + h + l];
@@ -170,10 +169,10 @@ SB_INLINE void insert_upper(int npair, const SbPack K[restrict][9], const PetscI
         position[l] = u < 0 ? ~u : u;
       }
       for (int e = 0; e < 9; e++) {
-        const Mask ab = *(const Mask *)&K[p][swapped[e]][h];
-        const Mask ba = *(const Mask *)&K[p][e][h];
+        const SbFourMask ab = *(const SbFourMask *)&K[p][swapped[e]][h];
+        const SbFourMask ba = *(const SbFourMask *)&K[p][e][h];
 
-        k[e] = (Four)((turn & ba) | (~turn & ab));
+        k[e] = (SbFour)((turn & ba) | (~turn & ab));
       }
       add_blocks(k, position, PETSC_FALSE, value);
     }

@@ -18,7 +18,6 @@
 */
 #include <petscdmplex.h>
 #include "fem_impl.h"
-#include "sbtet.h"
 
 #define UNKNOWN (-1)
 /* Where the node of a slot of a cell is: its point, and its number among the nodes of the point. */

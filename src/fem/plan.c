@@ -9,7 +9,6 @@
   DMCreateMatrix (`make bench`).
 */
 #include "fem_impl.h"
-#include "sblog.h"
 
 /* Cliques of nodes in lanes: those of the cells (width nodes each) or of the faces (eight).
    The slot of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the

@@ -15,7 +15,6 @@
   the time.
 */
 #include "fem_impl.h"
-#include "sbfour.h"
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
@@ -38,9 +37,9 @@ SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict],
     const PetscScalar *a = value + 9 * (size_t)start[i];
     const PetscScalar *u = x + 3 * (size_t)column[start[i]];
     PetscScalar *w = y + 3 * (size_t)column[start[i]];
-    const Four xi = {u[0], u[1], u[2], 0.};
-    const Four last = {a[6], a[7], a[8], 0.};
-    Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
+    const SbFour xi = {u[0], u[1], u[2], 0.};
+    const SbFour last = {a[6], a[7], a[8], 0.};
+    SbFour sum = *(const SbFour *)a * u[0] + *(const SbFour *)(a + 3) * u[1] + last * u[2];
 
     for (PetscInt k = 1; k < start[i + 1] - start[i]; k++) {
       /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to
@@ -48,19 +47,19 @@ SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict],
       const PetscScalar *b = a + 9 * k;
       const PetscScalar *xj = x + 3 * (size_t)column[start[i] + k];
       PetscScalar *yj = y + 3 * (size_t)column[start[i] + k];
-      const Four c0 = *(const Four *)b;
-      const Four c1 = *(const Four *)(b + 3);
-      const Four c5 = *(const Four *)(b + 5);
-      const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0);
-      const Four p0 = c0 * xi;
-      const Four p1 = c1 * xi;
-      const Four p2 = c2 * xi;
-      const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
-      const Two low = {s[0], s[1]};
-      const Two high = {s[2], s[3]};
+      const SbFour c0 = *(const SbFour *)b;
+      const SbFour c1 = *(const SbFour *)(b + 3);
+      const SbFour c5 = *(const SbFour *)(b + 5);
+      const SbFour c2 = SB_SHUFFLE(c5, c5, 1, 2, 3, 0);
+      const SbFour p0 = c0 * xi;
+      const SbFour p1 = c1 * xi;
+      const SbFour p2 = c2 * xi;
+      const SbFour s = SB_SHUFFLE(p0, p1, 0, 4, 2, 6) + SB_SHUFFLE(p0, p1, 1, 5, 3, 7);
+      const SbTwo low = {s[0], s[1]};
+      const SbTwo high = {s[2], s[3]};
 
       sum += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
-      *(Two *)yj += low + high;
+      *(SbTwo *)yj += low + high;
       yj[2] += (p2[0] + p2[2]) + (p2[1] + p2[3]);
     }
     for (int k = 0; k < 3; k++)

@@ -13,7 +13,6 @@
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
-#include "sblog.h"
 
 /* P2: each point with its fraction of the volume; the volumetric part by the mean of the cell.
    Damping likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H. */

@@ -12,8 +12,6 @@
   terms of CR and DG.
 */
 #include "fem_impl.h"
-#include "sblog.h"
-#include "sbtet.h"
 
 const SbOption SbSpaceRows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",

@@ -14,7 +14,6 @@
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
-#include "sblog.h"
 #include <petsc/private/petscimpl.h>
 
 #define ASSEMBLY "SbAssembly"

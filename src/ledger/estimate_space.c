@@ -71,7 +71,7 @@
   derivatives are regularised like slopes above. The recovered stress is quadratic in a cell, p(X_v)
   at its vertices and, at the middle of an edge, the mean of the polynomials of its ends.
 */
-#include "sbestimate.h"
+#include "ledger_impl.h"
 #include "sbgeometry.h"
 #include "sbkernel.h"
 #include <petscblaslapack.h>

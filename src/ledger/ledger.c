@@ -10,7 +10,6 @@
   the error of the last estimated one; with -accuracy the integrator's error is estimated in each.
 */
 #include "ledger_impl.h"
-#include "sblog.h"
 
 #define SHARE 0.08    /* largest fraction of the work for estimates */
 #define SPACE_WORK 6. /* cost of the space estimate, in residual evaluations */

@@ -7,7 +7,6 @@
   2^(1/p). Solves: the iterations that halve the residual at the measured rate.
 */
 #include "ledger_impl.h"
-#include "sblog.h"
 
 #define WASTE \
   1e3 /* a source with an error smaller than the largest one by this factor is too accurate */

@@ -5,7 +5,7 @@
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
-#include "sblog.h"
+#include "sbbase.h"
 
 #define LISTED(law) &law,
 static const SbMaterialType *const laws[] = {SB_MATERIAL_LAWS(LISTED)};

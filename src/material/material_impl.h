@@ -68,3 +68,11 @@ SB_INLINE void SbTangentPut(const SbPack c, int ij, int kl, SbPack C[81])
   for (int l = 0; l < SB_BATCH; l++)
     C[9 * kl + ij][l] = c[l];
 }
+
+/* spectral.c */
+
+/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22,
+   right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and
+   S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the
+   sign of det F being in s. Not collective. */
+void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);

@@ -23,7 +23,7 @@
   the last Laguerre step was so short that the error is below rounding. Other lanes are computed one
   by one by the robust path: LAPACK's eigenvectors of N.
 */
-#include <sbkernel.h>
+#include <sbmaterial.h>
 #include <petscblaslapack.h>
 
 #define ROOT_STEPS 3

@@ -3,7 +3,6 @@
 #include <petscdmplex.h>
 #include "mesh_impl.h"
 #include "sbsurface.h"
-#include "sblog.h"
 
 const SbOption SbMeshRows[] = {
   {"petscpartitioner_type", SB_OPTION_STRING, 1, "", "", "",

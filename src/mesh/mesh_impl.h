@@ -6,7 +6,7 @@
 #pragma once
 #include <petscpartitioner.h>
 #include <petscsf.h>
-#include "sbtet.h"
+#include "sbmeshio.h"
 
 /* Pseudorandom hash of an integer (splitmix64, Steele et al. 2014). */
 static inline uint64_t SbMix(PetscInt i)

@@ -5,7 +5,6 @@
   equal neighbours in it are one edge. The number of an edge is its position in the list.
 */
 #include "meshio_impl.h"
-#include "sbquadratic.h"
 
 static const int edge_count[4] = {0, 1, 3,
                                   6}; /* edges by dimension; triangles use the pairs 0, 1 and 3 */

@@ -6,7 +6,6 @@
   once (a "tag set"), and items refer to it by number; set 0 is the empty set.
 */
 #include "meshio_impl.h"
-#include "sbquadratic.h"
 
 #define STRAIGHT 1e-6 /* offset of the node of a straight edge over its length, at most */
 

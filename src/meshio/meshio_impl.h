@@ -3,7 +3,7 @@
   gmsh as a child.
 */
 #pragma once
-#include "sbgmsh.h"
+#include "sbmeshio.h"
 
 /* The arrays of a body: vertices and simplices, then nodes of edges and groups. */
 enum {
@@ -17,6 +17,14 @@ typedef struct {
 void SbImportParts(SbImport *import, SbImportPart part[SB_IMPORT_NPART]);
 /* Frees what only the reader needs: the text of the file and scratch arrays. */
 PetscErrorCode SbImportForget(SbImport *import);
+PetscErrorCode SbNumbersDestroy(SbNumbers *numbers);
+/* The tag set that holds this group alone. */
+PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
+                                 PetscInt *tags);
+/* Notes that an item belongs to a group; SbImportJoinGroups() adds to each item the groups noted
+   for it. */
+PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
+PetscErrorCode SbImportJoinGroups(SbImport *import);
 /* Names the group (dim, tag), if it exists. */
 void SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 

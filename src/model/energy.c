@@ -6,7 +6,6 @@
   With the consistent mass matrix kinetic energy and momenta use it, too; not the centre of mass.
 */
 #include "model_impl.h"
-#include "sblog.h"
 
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {

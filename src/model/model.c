@@ -6,8 +6,6 @@
   factor.
 */
 #include "model_impl.h"
-#include "sblog.h"
-#include "sbtet.h"
 
 PetscErrorCode SbModelDestroy(SbModel *model)
 {

@@ -5,10 +5,30 @@
 #pragma once
 #include <hdf5.h>
 #include <stdio.h>
-#include "sblog.h"
 #include "sboutput.h"
 
 #define SB_FIELD_MAX 32
+
+/* A named field. compute() fills this rank's owned entities (points or cells, in the mesh's local
+   order). */
+typedef struct SbField SbField;
+struct SbField {
+  const char *name; /* "von_mises" */
+  const char *unit;
+  PetscInt
+    ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
+  PetscBool cell; /* per cell, else per vertex, or corner of a cell with -output_discontinuous */
+  PetscBool constant; /* integers, written once with the mesh */
+  PetscBool dynamic;  /* does not exist in a static run */
+  const char *help;
+  PetscErrorCode (*compute)(const SbField *field, SbRun run, const SbStep *step,
+                            PetscReal *values); /* NULL: `sets`, several arrays */
+  /* parameters of compute(): */
+  size_t from; /* where in the step or the output the quantity is */
+  void (*of_stress)(const PetscReal sigma[6],
+                    PetscReal value[]); /* value[ncomp] from xx yy zz xy yz xz */
+};
+
 #define SB_MESSAGE_MAX 1024
 #define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
 
@@ -246,6 +266,8 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
 PetscErrorCode SbOutputForgetMesh(SbOutput out);
 PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
+/* Every field that there is. Not collective. */
+const SbField *SbFieldGetAll(PetscInt *n);
 /* option: for messages */
 PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field);
 PetscErrorCode

@@ -16,7 +16,6 @@
 #include <math.h>
 #include <stddef.h>
 #include "output_impl.h"
-#include "sbtet.h"
 
 /* Numbers of a probe in a checkpoint: the position, the body. */
 #define NNUMBER 4

@@ -3,7 +3,6 @@
   its solver. Used by two_level.c.
 */
 #pragma once
-#include "sbassembly.h"
 #include "sbpc.h"
 
 /*

@@ -20,7 +20,6 @@
   SIAM J. Sci. Comput. 33). t then starts from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i
   z_i - ..).
 */
-#include "sbfour.h"
 #include "sbkernel.h"
 #include "gauss_seidel.h"
 
@@ -28,22 +27,22 @@
 SB_INLINE void subtract_transposed(const PetscScalar *a, PetscInt n, const PetscInt column[],
                                    const PetscReal x[3], PetscScalar z[])
 {
-  const Four xi = {x[0], x[1], x[2], 0.};
+  const SbFour xi = {x[0], x[1], x[2], 0.};
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscScalar *b = a + 9 * k;
     PetscScalar *zj = z + 3 * (size_t)column[k];
-    const Four c0 = *(const Four *)b;
-    const Four c1 = *(const Four *)(b + 3);
-    const Four c5 = *(const Four *)(b + 5);
-    const Four p0 = c0 * xi;
-    const Four p1 = c1 * xi;
-    const Four p2 = SHUFFLE(c5, c5, 1, 2, 3, 0) * xi;
-    const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
-    const Two low = {s[0], s[1]};
-    const Two high = {s[2], s[3]};
+    const SbFour c0 = *(const SbFour *)b;
+    const SbFour c1 = *(const SbFour *)(b + 3);
+    const SbFour c5 = *(const SbFour *)(b + 5);
+    const SbFour p0 = c0 * xi;
+    const SbFour p1 = c1 * xi;
+    const SbFour p2 = SB_SHUFFLE(c5, c5, 1, 2, 3, 0) * xi;
+    const SbFour s = SB_SHUFFLE(p0, p1, 0, 4, 2, 6) + SB_SHUFFLE(p0, p1, 1, 5, 3, 7);
+    const SbTwo low = {s[0], s[1]};
+    const SbTwo high = {s[2], s[3]};
 
-    *(Two *)zj -= low + high;
+    *(SbTwo *)zj -= low + high;
     zj[2] -= (p2[0] + p2[2]) + (p2[1] + p2[3]);
   }
 }
@@ -55,16 +54,16 @@ SB_INLINE void subtract_transposed(const PetscScalar *a, PetscInt n, const Petsc
 SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[],
                            const PetscScalar z[], PetscReal sum[3])
 {
-  Four s = {0., 0., 0., 0.};
+  SbFour s = {0., 0., 0., 0.};
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscScalar *b = a + 9 * k;
     const PetscScalar *zj = z + 3 * (size_t)column[k];
-    const Four c5 = *(const Four *)(b + 5);
+    const SbFour c5 = *(const SbFour *)(b + 5);
 
     __builtin_prefetch(b - AHEAD);
-    s += *(const Four *)b * zj[0] + *(const Four *)(b + 3) * zj[1] +
-         SHUFFLE(c5, c5, 1, 2, 3, 0) * zj[2];
+    s += *(const SbFour *)b * zj[0] + *(const SbFour *)(b + 3) * zj[1] +
+         SB_SHUFFLE(c5, c5, 1, 2, 3, 0) * zj[2];
   }
   for (int c = 0; c < 3; c++)
     sum[c] = s[c];

@@ -3,7 +3,7 @@
   and levels.c.
 */
 #pragma once
-#include "sbassembly.h"
+#include "sbfem.h"
 
 /* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes.
    extra[n][3] (output; NULL: none): l1 terms, added to the diagonal, with which sweeps converge on

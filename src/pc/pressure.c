@@ -28,7 +28,6 @@
   petsc/private/kspimpl.h: else the outer solver would report its few corrections as iterations.
 */
 #include "pressure.h"
-#include "sblog.h"
 #include <petsc/private/kspimpl.h>
 
 #define RESTART 120  /* restart length of GMRES: 80 took 97 iterations instead of 81 on 64 ranks */

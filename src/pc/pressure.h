@@ -3,7 +3,6 @@
   the pressures of the cells as unknowns, and the preconditioner of its displacement block.
 */
 #pragma once
-#include "sbassembly.h"
 #include "sbpc.h"
 
 /* Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1

@@ -16,7 +16,6 @@
   only, so that runs are repeatable.
 */
 #include "rotated.h"
-#include "sblog.h"
 
 #define WORSE_FACTOR \
   4 /* refactor when a solve takes this many times the iterations of the first solve */

@@ -3,7 +3,6 @@
   exactly solved nodes.
 */
 #pragma once
-#include "sbassembly.h"
 #include "sbpc.h"
 
 /* Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation

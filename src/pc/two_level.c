@@ -61,7 +61,6 @@
 */
 #include "coarse.h"
 #include "gauss_seidel.h"
-#include "sblog.h"
 
 #define NAME "two-level"
 #define NU_ICC 0.4   /* largest Poisson's ratio for which the incomplete factorisation is tried */

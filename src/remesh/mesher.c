@@ -7,8 +7,7 @@
   where it nearly touches itself, exact coordinates are used. The vertices of the hull keep their
   positions in either case.
 */
-#include "sbremesh.h"
-#include "sbtet.h"
+#include "remesh_impl.h"
 
 #define BITS 10 /* an edge is 2^10 to 2^11 rounding steps */
 #define AHEAD \

@@ -15,7 +15,6 @@
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
-#include "sblog.h"
 
 #define AGAIN 0.5 /* factor on the quality reached: below that a body may be re-meshed again */
 #define QUALITY_LEAST 1e-3 /* quality of new tets at rest and now below which vertices are moved */

@@ -4,7 +4,31 @@
 */
 #pragma once
 #include "sbremesh.h"
-#include "sbtet.h"
+#include "sbmeshio.h"
+#include "sbsurface.h"
+
+/* the mesher */
+
+/*
+  Re-meshing of one body (src/remesh/body.c), on rank 0. Not collective.
+
+  A hull is the surface of a body and what parts its regions inside; its tags are all 0. A mesher
+  fills it with tets: their first vertices are those of the hull, unchanged and in order, its
+  triangles are faces of tets. x and cell (positively oriented) are allocated here; the caller
+  frees. An error is one line that says why it did not work.
+*/
+typedef struct {
+  PetscInt nvert, ncell;
+  PetscReal *x;   /* [nvert][3] m */
+  PetscInt *cell; /* [ncell][4] */
+} SbTets;
+typedef PetscErrorCode (*SbMesher)(const char *where, const SbSurface *hull, PetscReal size,
+                                   void *ctx, SbTets *tets);
+/* The program's own: SbTetrahedralize(). */
+PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
+                               SbTets *tets);
+/* Who makes the tets, instead of SbMesherDefault(). Not collective. */
+void SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
 
 /* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0, NULL
    elsewhere. */

@@ -3,8 +3,8 @@
   line here.
 */
 #include "sbremesh.h"
+#include "sbsurface.h"
 #include "scene_impl.h"
-#include "sblog.h"
 
 PetscErrorCode SbRegisterAll(void)
 {

@@ -12,6 +12,7 @@
   are read.
 */
 #include <ctype.h>
+#include "sbsurface.h"
 #include "scene_impl.h"
 
 #define NAME_LENGTH 31 /* PETSc allows 63 characters of an option's name in YAML files */

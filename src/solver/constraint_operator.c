@@ -9,7 +9,6 @@
 */
 #include "sbpc.h"
 #include "solver_impl.h"
-#include "sblog.h"
 
 /* x <- P x, with its log event. */
 static PetscErrorCode project(SbSpace s, Vec x)

@@ -18,8 +18,6 @@
   -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
   -sub_pc_type) apply here, too.
 */
-#include "sbassembly.h"
-#include "sblog.h"
 #include "sbpc.h"
 #include "sbsolver.h"
 

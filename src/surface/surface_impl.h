@@ -3,9 +3,8 @@
   mesh generators. Rank 0 only.
 */
 #pragma once
+#include "sbmeshio.h"
 #include "sbsurface.h"
-#include "sbtet.h"
-#include "sbtriangles.h"
 
 #define SB_TRIANGLE_FLAT \
   1e-10 /* flat triangle: largest twice the area over the longest edge squared */

@@ -7,6 +7,8 @@
 #define SB_MAX_RESOLVES 4 /* most repetitions of a step by a post-solve callback */
 #define SB_TS_SECOND_ORDER "sb_second_order"
 
+extern const char *const SbIntegrators; /* "euler_implicit|newmark|..." in the order of the enum */
+
 /* The one-step methods of second_order.c. */
 typedef enum {
   SB_METHOD_EULER_IMPLICIT,

@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "sbmeshio.h"
+#include "sbsurface.h"
 
 #define SB_TOOL_OPTIONS 15
 

@@ -12,7 +12,6 @@
 #include "h5.h"
 #include "../../src/meshio/meshio_impl.h"
 #include "../../src/surface/surface_impl.h"
-#include "sbtet.h"
 
 /* A surface for a body: read, repaired, checked and cut into regions; it is not filled with
    tets. */

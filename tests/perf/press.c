@@ -11,7 +11,6 @@
 */
 #include "../verify/contact.h"
 #include "perf.h"
-#include <sblog.h>
 
 static const SbEvent parts[] = {SB_EVENT_SEARCH};
 enum {

@@ -10,7 +10,6 @@
   several ranks BAIJ) is its time.
 */
 #include "perf.h"
-#include <sblog.h>
 
 /* Seconds of an event so far on this rank. */
 static double event_seconds(SbEvent e)

@@ -12,7 +12,6 @@
   0, which distributes the mesh.
 */
 #include "perf.h"
-#include <sblog.h>
 #include <sbsolver.h>
 
 typedef struct {

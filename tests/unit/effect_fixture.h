@@ -11,7 +11,6 @@
 */
 #pragma once
 #include "test.h"
-#include <sblog.h>
 #include <sbeffect.h>
 #include <sbsurface.h>
 

@@ -3,9 +3,7 @@
   read and checked as in a run.
 */
 #pragma once
-#include <sbmeshfile.h>
 #include <sbmeshio.h>
-#include <sbtet.h>
 #include "../test.h"
 
 /* A body of this name and mesh, neither scaled nor moved. */

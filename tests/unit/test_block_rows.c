@@ -1,7 +1,7 @@
 // @ranks 1 2 3
 /* Rows of an operator as blocks: those of AIJ, BAIJ, a matrix-free operator and (one rank) SBAIJ
    are the same, and they are what MatMult does. */
-#include "sbassembly.h"
+#include "sbfem.h"
 #include "../scene.h"
 
 static const char *const scene =

@@ -6,7 +6,6 @@
 */
 // @ranks 1 3
 #include "../scene.h"
-#include <sbassembly.h>
 
 #define STIFFNESS 300.0 /* N/m */
 #define LENGTH 1.0      /* natural length, m; the nodes are farther apart */

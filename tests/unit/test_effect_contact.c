@@ -6,7 +6,6 @@
 // @ranks 1 3
 #include "../scene.h"
 #include "effect_fixture.h"
-#include <sblog.h>
 
 #define FLOOR                                                                           \
   "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle " \

@@ -5,7 +5,6 @@
 // @ranks 1 3
 #include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
-#include <sbtet.h>
 
 static const char *const sets[][2] = {
   {"bottom", "plane:0,0,1,0"},    {"west", "plane:1,0,0,0"},         {"all", "box:-1,-1,-1,2,2,2"},

@@ -7,6 +7,7 @@
   Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the
   energies: 1e-24 of them.
 */
+#include "../../src/ledger/ledger_impl.h"
 #include "../scene.h"
 
 #define FAR 40. /* Young's modulus of the inclusion over that of the body, nu = 0 */

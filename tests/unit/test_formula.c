@@ -2,6 +2,7 @@
   test_formula.c - formulas and tables: values against C arithmetic, messages of invalid ones.
 */
 // @ranks 1 3
+#include "../../src/base/formula.h"
 #include "file.h"
 #include "test.h"
 

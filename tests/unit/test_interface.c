@@ -1,7 +1,6 @@
 // @ranks 1 2 3 4
 /* The interface uncouples the interiors of the ranks with few nodes; what it solves is the sum over
    ranks, as a dense solve does. */
-#include "sbassembly.h"
 #include "sbfactor.h"
 #include "../scene.h"
 #include <petscblaslapack.h>

@@ -5,7 +5,6 @@
 */
 #include "../../src/meshio/meshio_impl.h"
 #include "../test.h"
-#include "sbtet.h"
 
 #define N 6
 

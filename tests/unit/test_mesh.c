@@ -3,7 +3,6 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 #include <sbsurface.h>
-#include <sblog.h>
 
 #define DATA "tests/data/"
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 #include "mesh_test.h"
-#include "sbgmsh.h"
+#include "sbmeshio.h"
 
 static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work, void *ctx,
                           SbImport *im)

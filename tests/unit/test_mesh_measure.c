@@ -1,5 +1,6 @@
 // Statistics of supple-mesh info: counts, sizes and shapes of known bodies, sizes of groups.
 // @ranks 1
+#include "../../src/meshio/meshio_impl.h"
 #include "mesh_same.h"
 
 static PetscErrorCode test_box(void)

@@ -1,6 +1,7 @@
 // Map from file numbers to indices, and groups assigned to items by number: against a linear
 // search. @ranks 1
 #include <stdlib.h>
+#include "../../src/meshio/meshio_impl.h"
 #include "mesh_test.h"
 
 /* Every number is found at its position, and its neighbours if they are numbers too. */

@@ -1,5 +1,6 @@
 // A mesh read in slabs by all ranks equals the one read by rank 0 exactly: vertices, tets, curved
 // edges, sets, parts, notes, errors. @ranks 1 2 3 4
+#include "../../src/meshio/meshio_impl.h"
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 #include <sbsurface.h>

@@ -1,7 +1,7 @@
 // Surfaces from files: each format gives the same cube on every rank; errors of surfaces without
 // volume name the triangle. @ranks 1 3
 #include "mesh_test.h"
-#include "sbtriangles.h"
+#include "sbsurface.h"
 #include "surface_files.h"
 
 static const PetscReal zero[3] = {0, 0, 0}, unit[3] = {1, 1, 1};

@@ -2,7 +2,7 @@
 /* Rotations of nodes: exact for a rigid rotation by any angle, the local rotation in a bent bar, I
    for linear materials. */
 #include "../scene.h"
-#include "sbassembly.h"
+#include "sbfem.h"
 
 static const char *const bar =
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s "

@@ -5,7 +5,6 @@
   factorisation, with several and supported bodies; reported failures.
 */
 #include "../scene.h"
-#include <sblog.h>
 #include <sbpc.h>
 #include <sbsolver.h>
 

@@ -3,7 +3,7 @@
   the matrix. The same for the symmetric diagonal block of this rank.
 */
 #include "../scene.h"
-#include "sbassembly.h"
+#include "sbfem.h"
 
 static const char *const scene_text =
   "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 "

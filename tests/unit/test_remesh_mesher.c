@@ -1,8 +1,7 @@
 // The mesher of re-meshing: results independent of the last bits, surface vertices first, exact
 // positions where rounded ones cannot be meshed. @ranks 1
 #include "../test.h"
-#include "sbremesh.h"
-#include "sbtet.h"
+#include "../../src/remesh/remesh_impl.h"
 
 #define N 4 /* squares along an edge of the box */
 #define NVERT (6 * N * N + 2)

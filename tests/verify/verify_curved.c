@@ -15,7 +15,7 @@
     refused     error for a tet whose Jacobian is not positive, with its number
 */
 #include "curved.h"
-#include "sbestimate.h"
+#include "../../src/ledger/ledger_impl.h"
 #include "sbmeshio.h"
 
 static const char *laws[SB_MATERIAL_TYPES]; /* of the registry */

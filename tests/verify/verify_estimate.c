@@ -22,8 +22,8 @@
   traction jumps (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c calibrated for the
   cube, n = 16 and nu = 0.3, which exceed the error if the pressure oscillates.
 */
+#include "../../src/ledger/ledger_impl.h"
 #include "locking.h"
-#include "sbtet.h"
 
 typedef struct {
   const char *problem, *element;

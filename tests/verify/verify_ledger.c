@@ -7,6 +7,7 @@
   contact is the largest error. The true error of the time step is relative to the same run with 32
   times shorter steps by Newmark's method, that of a solve relative to a solution up to rounding.
 */
+#include "../../src/ledger/ledger_impl.h"
 #include "verify.h"
 
 #define BAR                                                                                 \

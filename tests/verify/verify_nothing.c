@@ -18,7 +18,6 @@
 */
 #include "../../src/fem/fem_impl.h"
 #include "verify.h"
-#include <sblog.h>
 
 /* An effect type that no scene names. Its options must not be read. */
 static int storms;

@@ -11,6 +11,7 @@
     failed     -remesh_failed: one attempt for each state, then the run stops with the reason; not
     if the first step fails
 */
+#include "../../src/ledger/ledger_impl.h"
 #include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"
 

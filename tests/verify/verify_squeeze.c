@@ -11,7 +11,6 @@
   times the force.
 */
 #include "contact.h"
-#include <sbtet.h>
 
 #define RADIUS 0.05 /* m */
 #define STEPS 20
