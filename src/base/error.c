@@ -90,8 +90,10 @@ static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const c
     const PetscBool type = (PetscBool)(length > 5 && !strcmp(name + length - 5, "_type"));
     const PetscBool solver = (PetscBool)(strstr(name, "ksp_") || strstr(name, "pc_") ||
                                          strstr(name, "snes_") || strstr(name, "mat_"));
+    const PetscBool parts =
+      (PetscBool)(strstr(file, "src/dm/partitioner/") && strstr(name, "petscpartitioner_"));
 
-    if (type && solver)
+    if (type && (solver || parts))
       SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value ? value : "");
   }
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));

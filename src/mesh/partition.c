@@ -317,10 +317,13 @@ static PetscErrorCode check_type(MPI_Comm comm, const char *type)
 {
   static const char *const packages[] = {"chaco", "parmetis", "ptscotch"};
   PetscErrorCode (*create)(PetscPartitioner);
+  PetscBool random = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  PetscCheck(strcmp(type, PETSCPARTITIONERSHELL), comm, PETSC_ERR_USER_INPUT,
-             "-petscpartitioner_type shell: it needs a program that gives the parts");
+  PetscCall(PetscOptionsGetBool(NULL, NULL, "-petscpartitioner_shell_random", &random, NULL));
+  PetscCheck(random || strcmp(type, PETSCPARTITIONERSHELL), comm, PETSC_ERR_USER_INPUT,
+             "-petscpartitioner_type shell: it needs a program that gives the parts, or "
+             "-petscpartitioner_shell_random");
   PetscCall(PetscFunctionListFind(PetscPartitionerList, type, &create));
   if (!create) {
     const char **names;
@@ -436,6 +439,8 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscObjectTypeCompare((PetscObject)partitioner, SB_PARTITIONER_BISECTION, &in_place));
+  PetscCheck(!in_place || !partitioner->viewGraph, comm, PETSC_ERR_USER_INPUT,
+             "-petscpartitioner_view_graph: the type bisection has no graph; metis has one");
   if (in_place)
     partitioner->data = (void *)w;
   else

@@ -509,7 +509,7 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
   // the boundary, then the sets: bit k of the masks
   for (PetscInt k = 0; k <= mesh->nset; k++) {
     const uint64_t bit = k ? SB_SET_BIT(k - 1) : SB_ON_BOUNDARY;
-    char name[SB_NAME_MAX + 8] = "boundary";
+    char name[SB_NAME_MAX + 16] = "boundary";
     PetscBool taken = PETSC_FALSE;
 
     for (PetscInt p = 0; p < npoint; p++)
@@ -531,8 +531,13 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
     if (k)
       PetscCall(PetscStrncpy(name, mesh->set[k - 1].name, sizeof(name)));
     PetscCall(DMHasLabel(mesh->dm, name, &taken));
-    if (taken)
-      (void)snprintf(name, sizeof(name), "set_%s", mesh->set[k - 1].name);
+    for (int again = 0; taken; again++) {
+      if (again)
+        (void)snprintf(name, sizeof(name), "set%d_%s", again, mesh->set[k - 1].name);
+      else
+        (void)snprintf(name, sizeof(name), "set_%s", mesh->set[k - 1].name);
+      PetscCall(DMHasLabel(mesh->dm, name, &taken));
+    }
     PetscCall(DMCreateLabel(mesh->dm, name));
     PetscCall(DMGetLabel(mesh->dm, name, &label));
     PetscCall(set_strata(label, npoint, key, 2));

@@ -8,10 +8,10 @@ enum {
   NSET = 4
 };
 
-/* Two boxes and sets, one of which has the name of a label. */
+/* Two boxes and sets, one of which has the name of a label, and one that which it gets instead. */
 static PetscErrorCode create(PetscBool sides, SbBody body[2], SbSet set[NSET], SbMesh *mesh)
 {
-  static const char *const names[NSET][2] = {{"low", "plane:0,0,1,0"},
+  static const char *const names[NSET][2] = {{"set_body", "plane:0,0,1,0"},
                                              {"body", "body:b"},
                                              {"corner", "box:-1,-1,-1,0.01,0.01,0.01"},
                                              {"hull", "boundary"}};
@@ -135,7 +135,7 @@ static PetscErrorCode test_forest(SbMesh mesh)
 /* Vertices, cells and, where they are points, faces in a label as in the arrays. */
 static PetscErrorCode test_labels(SbMesh mesh)
 {
-  static const char *const labels[NSET] = {"low", "set_body", "corner", "hull"};
+  static const char *const labels[NSET] = {"set_body", "set1_body", "corner", "hull"};
   DMLabel label;
   PetscInt value;
 
@@ -222,6 +222,23 @@ static PetscErrorCode test_types(void)
   PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", "metiss"));
   SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
                  "-petscpartitioner_type|metis");
+
+  // shell needs random parts; bisection has no graph that could be shown
+  PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", "shell"));
+  SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
+                 "shell|-petscpartitioner_shell_random");
+  PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_shell_random", "1"));
+  PetscCall(create(PETSC_TRUE, body, set, &mesh));
+  PetscCall(SbMeshValidate(mesh));
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_shell_random"));
+  if (test_size > 1) {
+    PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", "bisection"));
+    PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_view_graph", ""));
+    SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
+                   "-petscpartitioner_view_graph|bisection");
+    PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_view_graph"));
+  }
   PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_type"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
