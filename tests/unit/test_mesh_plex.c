@@ -223,7 +223,7 @@ static PetscErrorCode test_types(void)
   SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
                  "-petscpartitioner_type|metis");
 
-  // shell needs random parts; bisection has no graph that could be shown
+  // shell needs random parts
   PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", "shell"));
   SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
                  "shell|-petscpartitioner_shell_random");
@@ -232,13 +232,6 @@ static PetscErrorCode test_types(void)
   PetscCall(SbMeshValidate(mesh));
   PetscCall(SbMeshDestroy(&mesh));
   PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_shell_random"));
-  if (test_size > 1) {
-    PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_type", "bisection"));
-    PetscCall(PetscOptionsSetValue(NULL, "-petscpartitioner_view_graph", ""));
-    SB_CHECK_ERROR(create(PETSC_TRUE, body, set, &mesh), PETSC_ERR_USER_INPUT,
-                   "-petscpartitioner_view_graph|bisection");
-    PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_view_graph"));
-  }
   PetscCall(PetscOptionsClearValue(NULL, "-petscpartitioner_type"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

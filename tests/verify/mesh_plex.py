@@ -62,8 +62,13 @@ for kind in ("metis", "bisection", "simple", "gather", *(["ptscotch"] if "ptscot
     text, parts = run(kind, 3, *mesh, "-petscpartitioner_type", kind, "-dm_view")
     check(same(alone, parts), f"-petscpartitioner_type {kind}: other results than on one rank\n{text[-800:]}")
     check("type: plex" in text and "boundary:" in text, f"{kind}: -dm_view shows no DMPLEX with labels")
-for kind, words in (("metiss", ("metiss", "metis?")), ("shell", ("shell",))):
-    text, none = run(f"bad_{kind}", 2, *mesh, "-petscpartitioner_type", kind)
+for kind, more, words in (
+    ("metiss", (), ("metiss", "metis?")),
+    ("shell", (), ("shell",)),
+    ("bisection", ("-petscpartitioner_view_graph",), ("-petscpartitioner_view_graph", "bisection")),
+    ("simple", ("-petscpartitioner_simple_node_grid", "1,1,1"), ("-petscpartitioner_type simple",)),
+):
+    text, none = run(f"bad_{kind}", 3, *mesh, "-petscpartitioner_type", kind, *more)
     lines = [line for line in text.splitlines() if "error" in line.lower()]
     check(not none and len(lines) == 1 and all(w in lines[0] for w in words), f"-petscpartitioner_type {kind}: {lines}")
 
