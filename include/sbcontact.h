@@ -88,6 +88,9 @@ typedef struct {
      progress to 1; nactive: active pairs at u0 */
   PetscErrorCode (*max_step)(SbContact c, SbSpace space, const PetscReal u0[], const PetscReal u1[],
                              PetscReal *part, PetscInt *nactive);
+  /* exact constraints: adds the rows of those that are active at u */
+  PetscErrorCode (*constraints)(SbContact c, SbSpace space, const PetscReal u[],
+                                SbConstraintRows *rows);
   /* lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and slip
      directions from u; again: it did, and the step needs one more solve */
   PetscErrorCode (*update_friction)(SbContact c, SbSpace space, const PetscReal u[],
@@ -126,6 +129,7 @@ struct _p_SbContact {
   PetscInt number;         /* of the effect in the scenario */
   const SbContactOps *ops; /* of its response */
   PetscBool springs;       /* springs or friction, not constraints alone */
+  PetscBool exact;         /* its potential has exact constraints */
   PetscBool saddle;        /* constraints are to be solved with their multipliers as unknowns */
   PetscBool ends_step;     /* a step ends at the first time of impact */
   PetscReal restitution;   /* coefficient; 0: none */
@@ -142,6 +146,8 @@ typedef struct {
   SbContact *active_set; /* [nactive_set] those that have one */
   SbContact *potential;  /* [npotential] those that have one */
   SbContact ends_step;   /* the first one with the option time_of_impact; NULL: none */
+  PetscInt nexact;       /* potentials with exact constraints */
+  PetscBool saddle;      /* some of them have their forces as unknowns */
   PetscInt nconstraint;  /* those with constraints */
   PetscInt nrestitution; /* those with restitution */
   PetscReal speed;       /* of the present step, m/s: SbContactSetBeginStep() */
@@ -221,6 +227,8 @@ PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContac
                                    SbBlocks *blocks, Vec R);
 PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBool solved,
                                           PetscBool *again);
+/* The rows of exact constraints that are active at X, where contacts->nexact > 0; collective. */
+PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
 /* Work of potentials on the bodies in the last accepted step, this rank's, J. */
 PetscReal SbContactSetWork(const SbContactSet *contacts);
 

@@ -153,3 +153,32 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
 PetscErrorCode SbContactSystemSolve(SbContactSystem system, Mat K, const SbBlocks *blocks,
                                     PetscBool fresh, Vec F, Vec Y, KSPConvergedReason *reason,
                                     PetscInt *iterations);
+
+/* Rows of constraints between any nodes, on the rank that counts them: C Y - force / stiffness =
+   goal. Start with {0}; release with SbConstraintRowsFree(). */
+typedef struct {
+  PetscInt n, size; /* rows of this rank */
+  PetscInt nentry, entry_size;
+  PetscInt *start;      /* [n+1] */
+  PetscInt *column;     /* [nentry] global unknowns; values of equal ones are summed */
+  PetscReal *value;     /* [nentry] */
+  PetscReal *goal;      /* [n] m */
+  PetscReal *stiffness; /* [n] of a constraint, N/m */
+  PetscReal *soft;      /* [n] of its spring in the blocks, N/m */
+} SbConstraintRows;
+/* Room for further rows and entries. Not collective. */
+PetscErrorCode SbConstraintRowsReserve(SbConstraintRows *rows, PetscInt n, PetscInt nentry);
+PetscErrorCode SbConstraintRowsFree(SbConstraintRows *rows);
+
+/*
+  SbContactSystemSolveConstrained - SbContactSystemSolve() with stiff constraints: in their null
+  space, or (saddle) with their forces as unknowns.
+
+  Collective. Input: blocks, without the stiffness of the rows, and F with their forces at the goals;
+  weight, on the stiffness of rows and blocks.
+*/
+PetscErrorCode SbContactSystemSolveConstrained(SbContactSystem system, Mat K,
+                                               const SbBlocks *blocks, PetscBool saddle,
+                                               const SbConstraintRows *rows, PetscReal weight,
+                                               Vec F, Vec Y, KSPConvergedReason *reason,
+                                               PetscInt *iterations);

@@ -1,16 +1,35 @@
 /*
-  barrier.h - the response `barrier`.
+  barrier.h - contact of surfaces, by any response: barrier, or springs on the same pairs with
+  multipliers (multipliers.c).
 */
 #pragma once
 #include "contact_impl.h"
 #include "pairs.h"
 
-/* A pair with a gap below the width, at the current positions. */
+/* A pair that may have a force at the current positions: with a gap below the width, or with a
+   multiplier. */
 typedef struct {
   SbContactPair pair;
-  PetscReal gap; /* m */
+  PetscReal gap;   /* m */
+  PetscReal force; /* its multiplier, N */
   SbDistance at;
 } Active;
+
+/* The multiplier of a pair; its area is not used. */
+typedef struct {
+  SbContactPair pair;
+  PetscReal force; /* N */
+} PairForce;
+
+/* Multipliers above zero, the same on every rank. */
+typedef struct {
+  PetscInt n, size;
+  PairForce *pair;  /* [n] in the order of pairs */
+  PetscInt updates; /* in this step */
+  PetscReal least;  /* smallest error of gaps of its solutions, over the width */
+  PetscInt stuck;   /* updates since */
+  PetscBool said;   /* the warning that they do not settle was given */
+} Multipliers;
 
 /* A pair with friction in this step. */
 typedef struct {
@@ -39,6 +58,7 @@ typedef struct {
 
 typedef struct {
   PetscReal width, pressure; /* m, Pa; 0: by body */
+  PetscReal stiffness;       /* factor on that of springs */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
   SbContactSearch search;
@@ -59,7 +79,7 @@ typedef struct {
 
 /* By body, [nbody+1]; the obstacle's are infinite. */
 typedef struct {
-  PetscReal *w, *k, *mass; /* width, m; stiffness, Pa; mass, kg */
+  PetscReal *w, *k, *mass; /* width, m; stiffness (SbPairLaw), Pa or Pa/m; mass, kg */
   PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
@@ -128,6 +148,7 @@ typedef struct {
   BarrierMotion motion;
   BarrierWidths widths;
   ActivePairs active;
+  Multipliers multipliers;
   PairFriction friction;
   Separation separation;
   Springs springs;
@@ -145,6 +166,35 @@ static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
 
   return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
 }
+
+static inline PetscBool is_barrier(const Barrier *b)
+{
+  return (PetscBool)(b->contact.response == BARRIER);
+}
+
+/* Whether constraints are enforced exactly: by a null space, or with multipliers as unknowns. */
+static inline PetscBool is_exact(const Barrier *b)
+{
+  return (PetscBool)(b->contact.response == PROJECTED || b->contact.response == MULTIPLIER);
+}
+
+/* Whether forces have multipliers. */
+static inline PetscBool has_multipliers(const Barrier *b)
+{
+  return (PetscBool)(is_exact(b) || b->contact.response == AUGMENTED);
+}
+
+/* How a pair resists. */
+#define STIFFER 10. /* springs of exact constraints, over those of `augmented` */
+static inline SbPairLaw SbPairLawOf(const Barrier *b, const Active *a)
+{
+  return (SbPairLaw){.spring = (PetscBool)!is_barrier(b),
+                     .width = of_pair(b, b->widths.w, &a->pair),
+                     .stiffness = (is_exact(b) ? STIFFER : 1.) * of_pair(b, b->widths.k, &a->pair),
+                     .force = a->force};
+}
+/* The same of its part in the matrix of linear systems; row: the rest is in a row. */
+SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row);
 
 /* Whether this rank counts the pair. */
 static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
@@ -238,6 +288,15 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
    Collective. */
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[]);
+
+/* Multipliers (multipliers.c). Find: of a pair, N; -1: it has none. Update: takes the forces at the
+   current positions, of a solution; `again`: they have changed by more than a tolerance.
+   Collective. */
+PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
+PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
+/* Exact constraints (exact_pairs.c). */
+PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
+                                          SbConstraintRows *rows);
 
 /* Operations (sbcontact.h, sbeffect.h). */
 PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,

@@ -113,8 +113,8 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     SbBarrierTerm(b, i, &t);
     if (!t.counts)
       continue;
-    values[at[CONTACTS]] += i < b->active.n || t.force > 0.;
-    if (i < b->active.n)
+    values[at[CONTACTS]] += (i < b->active.n && is_barrier(b)) || t.force > 0.;
+    if (i < b->active.n && !has_multipliers(b))
       values[at[ENERGY]] += t.energy;
 
     /* force and torque of the obstacle on the bodies */

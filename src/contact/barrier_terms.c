@@ -40,14 +40,15 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    Active a;
+    const PetscReal multiplier = b->multipliers.n ? SbMultiplierFind(b, pair) : -1.;
+    Active a = {.pair = *pair, .force = PetscMax(0., multiplier)};
 
-    if (SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
+    if (multiplier < 0. &&
+        SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
       continue;
     a.gap = SbContactPairGap(b->surface, pair, b->motion.x, &a.at);
-    if (a.gap >= of_pair(b, b->widths.w, pair))
+    if (multiplier < 0. && a.gap >= of_pair(b, b->widths.w, pair))
       continue;
-    a.pair = *pair;
     PetscCall(
       SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));
     b->active.pair[b->active.n++] = a;
@@ -58,12 +59,12 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 PetscReal SbBarrierNormalForce(const Barrier *b, const Active *a, PetscReal *energy,
                                PetscReal gradient[12])
 {
-  const SbContactPair *pair = &a->pair;
+  const SbPairLaw law = SbPairLawOf(b, a);
   PetscReal force = 0.;
   PetscReal w2 = 0.;
 
-  SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
-                of_pair(b, b->widths.k, pair), energy, gradient, PETSC_FALSE, NULL);
+  SbPairEnergy(b->surface, &a->pair, &law, a->gap, &a->at, b->motion.x, energy, gradient,
+               PETSC_FALSE, NULL);
   for (int k = 0; k < 4; k++) {
     force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
     w2 += PetscSqr(a->at.weight[k]);
@@ -105,16 +106,19 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
     const SbContactPair *pair = &a->pair;
+    const SbPairLaw law = SbPairLawOf(b, a);
     PetscReal d[3], energy, gradient[12];
     const PetscReal force = SbBarrierNormalForce(b, a, &energy, gradient);
+    PetscReal part;
 
-    SbBarrier(a->gap, of_pair(b, b->widths.w, pair), of_pair(b, b->widths.k, pair), pair->area, d);
-    if (d[0] <= 0.)
+    SbPairLawEvaluate(&law, a->gap, pair->area, d);
+    if (d[1] >= 0.)
       continue;
     if (counts(b, pair))
       *bound += 0.5 * force * a->gap;
+    part = d[0] != 0. ? energy / d[0] : 1.; /* nearly parallel edges count less */
     for (int k = 0; k < 12; k++)
-      gradient[k] = energy / d[0] * d[2] * a->gap * a->at.weight[k / 3] * a->at.n[k % 3];
+      gradient[k] = part * d[2] * a->gap * a->at.weight[k / 3] * a->at.n[k % 3];
     spread(b, pair->side ? 1 : 4, pair->v, 1., gradient, f);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -244,14 +248,15 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u));
+
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
-    const SbContactPair *pair = &a->pair;
+    PetscBool row;
+    const SbPairLaw law = SbPairMatrixLaw(b, a, &row);
 
-    SbBarrierPair(b->surface, pair, a->gap, &a->at, b->motion.x, of_pair(b, b->widths.w, pair),
-                  of_pair(b, b->widths.k, pair), &energy, gradient,
-                  (PetscBool)(kind != SB_HESSIAN_EXACT), H);
-    PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
+    SbPairEnergy(b->surface, &a->pair, &law, a->gap, &a->at, b->motion.x, &energy, gradient,
+                 (PetscBool)(kind != SB_HESSIAN_EXACT), H);
+    PetscCall(add_blocks(b, a->pair.side ? 1 : 4, a->pair.v, NULL, H));
   }
 
   /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from

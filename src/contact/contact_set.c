@@ -28,6 +28,8 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
       to->potential[to->npotential++] = c;
     if (c->ends_step && !to->ends_step)
       to->ends_step = c;
+    to->nexact += c->exact;
+    to->saddle = (PetscBool)(to->saddle || (c->exact && c->saddle));
     to->nconstraint += c->ops->assemble_constraints != NULL;
     to->nrestitution += c->restitution > 0.;
   }
@@ -166,6 +168,19 @@ PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContac
     PHASE_CALL(contacts->contact[k], hessian, s, u, kind, blocks, r);
   PetscCall(give_back(s, U, R, &u, &r));
   PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows)
+{
+  const SbSpace s = contacts->space;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, X, &u));
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], constraints, s, u, rows);
+  PetscCall(SbSpaceRestoreLocalRead(s, X, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -106,9 +106,11 @@ static const SbOption rows[] = {
 
 static const char *const names_of_responses[] = {"auto",      "projected", "multiplier",
                                                  "augmented", "penalty",   "barrier"};
-/* Options that `barrier` lacks against obstacles; all but the first one are for obstacles only. */
-static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
+/* Options for which `auto` takes another response than `barrier`; those from NODES_ONLY on are for
+   nodes against obstacles only. */
+static const char *const exact_only[] = {"restitution", "stiffness", "time_of_impact", "damping",
                                          "friction_kinetic"};
+#define NODES_ONLY 2
 
 /* What contact effects ask for, one or several of them. */
 typedef struct {
@@ -150,8 +152,10 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
-static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
+/* The response of an effect; why: the reason of `auto`, NULL: the response is given; surfaces: on
+   pairs of features, not of nodes with the obstacle. */
+static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfaces,
+                             const char **why)
 {
   PetscBool possible = PETSC_TRUE;
   Wishes wishes = {0};
@@ -161,13 +165,6 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   /* the effect's own option */
   PetscCall(add_wishes(e->name, &wishes));
   *response = wishes.response;
-  PetscCheck(!wishes.bodies || *response == AUTO || *response == BARRIER, PETSC_COMM_WORLD,
-             PETSC_ERR_USER_INPUT,
-             "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave "
-             "it out, or give -effect_%s_obstacle",
-             e->name, names_of_responses[*response], e->name);
-  if (*response != AUTO)
-    PetscFunctionReturn(PETSC_SUCCESS);
 
   /* what all effects of the scene ask for, and the integrator, where the program has them */
   if (SbOptionFind(&SbRunScope, "effects")) {
@@ -179,6 +176,9 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
       PetscCall(add_wishes(names[i], &wishes));
     PetscCall(PetscFree(names));
   }
+  *surfaces = (PetscBool)(wishes.bodies || *response == BARRIER);
+  if (*response != AUTO)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (SbOptionFind(&SbRunScope, "time")) {
     int time;
 
@@ -206,6 +206,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
     while (!rule[k].holds)
       k++;
     *response = rule[k].response;
+    *surfaces = (PetscBool)(*surfaces || *response == BARRIER);
     *why = rule[k].why;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -216,31 +217,37 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   Contact *c = (Contact *)e->data;
   const char *why = NULL;
   PetscBool given;
+  PetscBool surfaces = PETSC_FALSE;
   PetscReal steps;
 
   PetscFunctionBeginUser;
   e->contact = &c->base;
   c->base.effect = e;
-  PetscCall(choose(e, &c->response, &why));
+  PetscCall(choose(e, &c->response, &surfaces, &why));
   if (why)
     SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
 
-  /* the obstacle and its path; contact between bodies has none of the options of obstacles */
+  /* the obstacle and its path; surfaces have none of the options of nodes */
   PetscCall(SbPartnerRead(e, scope, &c->partner));
-  for (size_t k = 1; !c->partner.obstacle && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+  for (size_t k = NODES_ONLY; surfaces && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
     PetscCall(SbOptionGiven(scope, exact_only[k], &given));
     PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; "
-               "leave it out",
+               "-effect_%s_%s is for nodes against obstacles in scenes without contact between "
+               "bodies, and not with barrier: leave it out",
                e->name, exact_only[k]);
   }
+  PetscCall(SbOptionGiven(scope, "stiffness", &given));
+  PetscCheck(!given || c->response != BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_stiffness is of springs, which barrier has not: use "
+             "-effect_%s_barrier_pressure, or another -effect_%s_response",
+             e->name, e->name, e->name);
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
   c->overlap.recovery = steps > 1 ? PetscExpReal(-1 / steps) : 0;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   c->base.restitution = c->bounce.e;
-  if (c->response == BARRIER)
+  if (surfaces)
     PetscCall(SbBarrierCreate(e, scope));
   else
     PetscCall(SbContactNodesCreate(e, scope));

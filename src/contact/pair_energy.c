@@ -1,11 +1,17 @@
 /*
-  pair_energy.c - the barrier potential of a contact pair and its derivatives.
+  pair_energy.c - the potential of a contact pair and its derivatives.
 
-  The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential
-  contact", ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
+  Barrier: the energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental
+  potential contact", ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
 
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),
     b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
+
+  Spring: with the multiplier l and c = k area, the augmented Lagrangian of the constraint d >= w
+  (Nocedal and Wright, Numerical Optimization, section 17.4), whose force is <l + c (w - d)>, <x> =
+  max(x, 0):
+
+    b = (<l + c (w - d)>^2 - l^2) / (2 c)
 
   Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is
   multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5);
@@ -35,6 +41,20 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   b[2] = k * area / w * (-2. * PetscLogReal(s) - 2. * (s - 1.) / s - (s * s - 1.) / (s * s));
 }
 
+void SbPairLawEvaluate(const SbPairLaw *law, PetscReal d, PetscReal area, PetscReal b[3])
+{
+  const PetscReal c = law->stiffness * area;
+  const PetscReal force = PetscMax(0., law->force + c * (law->width - d));
+
+  if (!law->spring) {
+    SbBarrier(d, law->width, law->stiffness, area, b);
+    return;
+  }
+  b[0] = (PetscSqr(force) - PetscSqr(law->force)) / (2. * c);
+  b[1] = -force;
+  b[2] = force > 0. ? c : 0.;
+}
+
 /* The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its
    derivatives: f = (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1. */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
@@ -58,14 +78,38 @@ static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, Petsc
   f[4] = -2. * (1. - 2. * y) * slope / e;
 }
 
-void SbBarrierPair(SbContactSurface m, const SbContactPair *pair, PetscReal gap,
-                   const SbDistance *g, const PetscReal x[], PetscReal width, PetscReal pressure,
-                   PetscReal *energy, PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
+/* |a|^2 |b|^2 of the edges of a pair at rest. */
+static PetscReal lengths_at_rest(SbContactSurface m, const SbContactPair *pair)
+{
+  PetscReal rest = 1.;
+
+  for (int k = 0; k < 4; k += 2)
+    rest *= SbDistance2(m->X + 3 * pair->v[k], m->X + 3 * pair->v[k + 1]);
+  return rest;
+}
+
+PetscBool SbPairIsMollified(SbContactSurface m, const SbContactPair *pair, PetscReal gap,
+                            const SbDistance *g, const PetscReal x[])
+{
+  PetscReal at[12];
+  PetscReal f[6] = {1.};
+
+  if (pair->kind != SB_PAIR_EDGE_EDGE)
+    return PETSC_FALSE;
+  for (int k = 0; k < 12; k++)
+    at[k] = x[3 * pair->v[k / 3] + k % 3];
+  mollify(SbEdgeCross(at, NULL, NULL), lengths_at_rest(m, pair), gap, g->d - gap, f);
+  return (PetscBool)(f[0] < 1.);
+}
+
+void SbPairEnergy(SbContactSurface m, const SbContactPair *pair, const SbPairLaw *law,
+                  PetscReal gap, const SbDistance *g, const PetscReal x[], PetscReal *energy,
+                  PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
 {
   PetscReal b[3], at[12], across[12], C[144];
   PetscReal f[6] = {1.};
 
-  SbBarrier(gap, width, pressure, pair->area, b);
+  SbPairLawEvaluate(law, gap, pair->area, b);
   for (int k = 0; k < 12; k++) {
     at[k] = x[3 * pair->v[k / 3] + k % 3];
     gradient[k] = g->weight[k / 3] * g->n[k % 3];
@@ -87,13 +131,8 @@ void SbBarrierPair(SbContactSurface m, const SbContactPair *pair, PetscReal gap,
   }
 
   /* nearly parallel edges: the factor of mollify() */
-  if (pair->kind == SB_PAIR_EDGE_EDGE) {
-    PetscReal rest = 1.;
-
-    for (int k = 0; k < 4; k += 2)
-      rest *= SbDistance2(m->X + 3 * pair->v[k], m->X + 3 * pair->v[k + 1]);
-    mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, g->d - gap, f);
-  }
+  if (pair->kind == SB_PAIR_EDGE_EDGE)
+    mollify(SbEdgeCross(at, across, H ? C : NULL), lengths_at_rest(m, pair), gap, g->d - gap, f);
   *energy = f[0] * b[0];
 
   /* E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd) of E(d, c), or its positive

@@ -196,20 +196,31 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], 
 PetscErrorCode SbContactSurfaceIsInside(SbContactSurface mesh, const PetscReal x[],
                                         PetscInt body[2], PetscBool *found);
 
-/* Energy of a gap d, J, and its first two derivatives: barrier of the width w (m), pressure k (Pa)
-   and area (m^2); 0 from w on, infinite at 0. */
+/* How a pair resists a gap below its width: a barrier, or a spring with a multiplier, the energy of
+   an augmented Lagrangian. */
+typedef struct {
+  PetscBool spring;
+  PetscReal width;     /* m */
+  PetscReal stiffness; /* of a barrier: its pressure, Pa; of a spring: Pa/m */
+  PetscReal force;     /* multiplier of a spring at its width, N */
+} SbPairLaw;
+/* Energy of a gap d, J, and its first two derivatives, of a pair with this area, m^2. */
+void SbPairLawEvaluate(const SbPairLaw *law, PetscReal d, PetscReal area, PetscReal b[3]);
+/* The same of a barrier of the width w (m) and pressure k (Pa): 0 from w on, infinite at 0. */
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);
 /*
-  SbBarrierPair - energy, gradient and Hessian of a pair at x; edges that are nearly parallel count
+  SbPairEnergy - energy, gradient and Hessian of a pair at x; edges that are nearly parallel count
   less.
 
   Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J;
   gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
-void SbBarrierPair(SbContactSurface mesh, const SbContactPair *pair, PetscReal gap,
-                   const SbDistance *distance, const PetscReal x[], PetscReal width,
-                   PetscReal pressure, PetscReal *energy, PetscReal gradient[12], PetscBool clamp,
-                   PetscReal H[144]);
+void SbPairEnergy(SbContactSurface mesh, const SbContactPair *pair, const SbPairLaw *law,
+                  PetscReal gap, const SbDistance *distance, const PetscReal x[],
+                  PetscReal *energy, PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
+/* Whether an edge pair is nearly parallel, so that it counts less, or not at all. */
+PetscBool SbPairIsMollified(SbContactSurface mesh, const SbContactPair *pair, PetscReal gap,
+                            const SbDistance *distance, const PetscReal x[]);
 
 /* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix. Start with
    {0}; release with PetscFree(block) and PetscFree(slot). */

@@ -36,11 +36,23 @@
   1e-7 /* least sticking slip e of a time step over the size of the smallest body */
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
 #define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
+#define STIFFEST 11. /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
 #define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define STATE 6 /* numbers in a record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
+
+/* Stiffness of a side of this material (SbPairLaw): of springs by the layer of cells below. */
+static PetscReal stiffness_of(const Barrier *b, SbMaterial law)
+{
+  if (b->contact.response != BARRIER)
+    return b->options.stiffness *
+           PetscMin(SbMaterialWaveModulus(law), STIFFEST * SbMaterialShearModulus(law)) /
+           b->surface->mean_edge;
+  return b->options.pressure > 0. ? b->options.pressure : PRESSURE * SbMaterialYoungModulus(law);
+}
 
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 {
@@ -78,8 +90,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
                                   0.5 * b->surface->shortest);
     b->contact.base.width = PetscMin(b->contact.base.width, b->widths.w[i]);
     b->widths.mass[i] = s->material[i]->density * s->mesh->body[i].volume;
-    b->widths.k[i] = b->options.pressure > 0. ? b->options.pressure
-                                              : PRESSURE * SbMaterialYoungModulus(s->material[i]);
+    b->widths.k[i] = stiffness_of(b, s->material[i]);
   }
   PetscCheck(
     b->widths.w[0] <= b->surface->shortest, s->comm, PETSC_ERR_USER_INPUT,
@@ -87,7 +98,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
-  PetscCall(SbContactPairsCreate(b->surface, b->widths.w[0], b->options.search, &b->pairs));
+  PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0], b->options.search, &b->pairs));
   b->record.least = PETSC_MAX_REAL;
   b->record.shortest = b->separation.stiffer = b->widths.scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -260,7 +271,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of the barrier at the current positions, J, and the work of its forces there on the
+/* Energy of pairs without multipliers at the current positions, J, and the work of its forces there on the
    obstacle along the path of this step, J; this rank's. They rotate with the obstacle: moment times
    angle. */
 static PetscReal gap_energy(const Barrier *b, PetscReal *along)
@@ -268,7 +279,7 @@ static PetscReal gap_energy(const Barrier *b, PetscReal *along)
   PetscReal sum = 0.;
 
   *along = 0.;
-  for (PetscInt i = 0; i < b->active.n; i++) {
+  for (PetscInt i = 0; i < b->active.n && !has_multipliers(b); i++) {
     Term t;
 
     SbBarrierTerm(b, i, &t);
@@ -338,6 +349,7 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscFunctionBeginUser;
   find_path(b, t, dt);
   b->contact.base.progress = 0.;
+  b->multipliers.updates = 0;
   b->friction.pairs.n = b->springs.n = b->springs.nbounce = 0;
   if (!b->motion.begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
@@ -411,10 +423,22 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
 
-  /* work of contact on the bodies in the step: of the barrier, of friction, of springs */
+  /* work of contact on the bodies in the step: of pairs, by their energy or, with multipliers, the
+     forces at its end; of friction; of springs */
   b->contact.base.work = b->sums.energy + 0.5 * b->sums.obstacle_power;
   b->sums.energy = gap_energy(b, &power);
   b->contact.base.work += 0.5 * power - b->sums.energy;
+  for (PetscInt i = 0; i < b->active.n && has_multipliers(b); i++) {
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    for (int k = 0; k < 12 && t.counts; k++) {
+      const PetscInt c = 3 * t.v[k / 3] + k % 3;
+
+      if (t.v[k / 3] < m->nbody_vertex)
+        b->contact.base.work -= t.gradient[k] * (b->motion.x[c] - b->motion.start[c]);
+    }
+  }
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     const FrictionPair *pair = &b->friction.pairs.pair[i];
     PetscReal u[3];
@@ -470,17 +494,27 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces follow from the positions: only accumulated sums are saved. */
+/* Forces follow from the positions and the multipliers: these are saved, and accumulated sums. The
+   first record of a rank has its sums, the others a multiplier each. */
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-  const PetscReal state[4] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
-                              s->rank ? 0. : b->widths.scale};
+  const Multipliers *m = &b->multipliers;
+  const PetscReal state[STATE] = {b->sums.work, b->friction.loss,
+                                  s->rank ? 0. : b->separation.stiffer,
+                                  s->rank ? 0. : b->widths.scale, -1.};
 
   PetscFunctionBeginUser;
-  *n = 1;
-  PetscCall(PetscMalloc1(4, records));
-  PetscCall(PetscArraycpy(*records, state, 4));
+  *n = s->rank ? 1 : 1 + m->n;
+  PetscCall(PetscMalloc1(STATE * *n, records));
+  PetscCall(PetscArraycpy(*records, state, STATE));
+  for (PetscInt k = 1; k < *n; k++) {
+    const PairForce *at = &m->pair[k - 1];
+    const PetscReal record[STATE] = {at->pair.v[0], at->pair.v[1], at->pair.v[2], at->pair.v[3],
+                                     2. * at->pair.kind + at->pair.side, at->force};
+
+    PetscCall(PetscArraycpy(*records + STATE * k, record, STATE));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -488,18 +522,51 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
                                    PetscInt n, const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
+  Multipliers *m = &b->multipliers;
   PetscReal sum[4] = {0.};
 
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
-  for (PetscInt k = 0; k < 4 * n; k++)
-    sum[k % 4] += records[k];
+  m->n = 0;
+  PetscCall(SbReserve(n, sizeof(*m->pair), &m->size, &m->pair));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *record = records + STATE * k;
+    PairForce *at = &m->pair[m->n];
+
+    for (int i = 0; i < 4 && record[4] < 0.; i++)
+      sum[i] += record[i];
+    if (record[4] < 0.)
+      continue;
+    *at = (PairForce){.pair.kind = (SbPairKind)((int)record[4] / 2),
+                      .pair.side = (PetscBool)((int)record[4] % 2),
+                      .force = record[5]};
+    for (int i = 0; i < 4; i++)
+      at->pair.v[i] = (PetscInt)record[i];
+    m->n++;
+  }
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
   b->separation.stiffer = sum[2];
   if (sum[3] > 0. && b->options.width == 0.)
     set_scale(e, sum[3]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a solve: multipliers, then friction. */
+static PetscErrorCode update_barrier(SbContact contact, SbSpace s, const PetscReal u[],
+                                     PetscBool solved, PetscBool *again)
+{
+  Barrier *b = (Barrier *)contact;
+
+  PetscFunctionBeginUser;
+  if (solved && has_multipliers(b)) {
+    PetscCall(SbBarrierUpdate(b, u));
+    PetscCall(SbMultipliersUpdate(b, again));
+    if (*again)
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbContactUpdateFriction_Barrier(contact, s, u, solved, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -515,6 +582,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->columns.slot));
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
+  PetscCall(PetscFree(b->multipliers.pair));
   PetscCall(PetscFree(b->friction.pairs.pair));
   PetscCall(PetscFree(b->friction.next.pair));
   PetscCall(PetscFree(b->blocks.block));
@@ -541,6 +609,23 @@ static const SbContactOps barrier_ops = {
   .nearest = SbContactNearest_Barrier,
   .gap_forces = SbContactGapForces_Barrier,
   .scale_width = scale_width_barrier,
+};
+/* The same of springs, with multipliers or exact constraints. */
+static const SbContactOps spring_ops = {
+  .initial_contacts = initial_contacts_barrier,
+  .begin_step = begin_step_barrier,
+  .find_impacts = SbContactFindImpacts_Barrier,
+  .gradient = SbContactGradient_Barrier,
+  .hessian = SbContactHessian_Barrier,
+  .max_step = max_step_barrier,
+  .update_friction = update_barrier,
+  .constraints = SbContactConstraints_Pairs,
+  .impact_work = SbContactImpactWork_Barrier,
+  .scale_restitution = SbContactScaleRestitution_Barrier,
+  .gap = SbContactGap_Barrier,
+  .points = SbContactPoints_Barrier,
+  .nearest = SbContactNearest_Barrier,
+  .gap_forces = SbContactGapForces_Barrier,
 };
 static const SbEffectOps barrier_effect = {
   .setup = setup_barrier,
@@ -579,10 +664,13 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionInt(scope, "friction_solves", &b->options.friction_solves));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->options.friction_tolerance));
   e->ops = barrier_effect;
-  b->contact.base.ops = &barrier_ops;
+  PetscCall(SbOptionReal(scope, "stiffness", &b->options.stiffness));
+  b->contact.base.ops = is_barrier(b) ? &barrier_ops : &spring_ops;
+  b->contact.base.exact = is_exact(b);
+  b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->nstate = 4;
+  e->nstate = STATE;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

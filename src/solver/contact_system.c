@@ -19,7 +19,7 @@
   -sub_pc_type) apply here, too.
 */
 #include "sbpc.h"
-#include "sbsolver.h"
+#include "solver_impl.h"
 
 #define KEEP 20      /* solves after which an unused block is dropped from the pattern */
 #define SMALL 2000   /* unknowns up to which all is factored: same numbers on any number of ranks */
@@ -373,11 +373,28 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor of the current matrix; ok: it is positive definite. */
+static PetscErrorCode factor(SbContactSystem c, PetscBool *ok)
+{
+  const SbContactRows *rows = &c->rows;
+
+  PetscFunctionBeginUser;
+  *ok = PETSC_TRUE;
+  if (!c->factor)
+    PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
+  if (c->stale_values[FACTOR]) {
+    PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value,
+                                 c->stale_pattern[FACTOR], ok));
+    c->stale_pattern[FACTOR] = PETSC_FALSE;
+  }
+  c->stale_values[FACTOR] = (PetscBool)!*ok;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks,
                                     PetscBool fresh, Vec F, Vec Y, KSPConvergedReason *reason,
                                     PetscInt *iterations)
 {
-  const SbContactRows *rows = &c->rows;
   PetscBool factored, slow;
   PetscBool ok = PETSC_TRUE;
 
@@ -403,19 +420,68 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
     c->budget = 0;
   }
   if (factored || slow) {
-    if (!c->factor)
-      PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
-    if (c->stale_values[FACTOR]) {
-      PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value,
-                                   c->stale_pattern[FACTOR], &ok));
-      c->stale_pattern[FACTOR] = PETSC_FALSE;
-    }
-    c->stale_values[FACTOR] = (PetscBool)!ok;
+    PetscCall(factor(c, &ok));
     if (ok)
       PetscCall(SbBlockSolverSolve(c->factor, F, Y));
     *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
     ++*iterations;
   }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z = M^-1 r by the factor. */
+static PetscErrorCode apply_factor(PC pc, Vec r, Vec z)
+{
+  SbContactSystem c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &c));
+  PetscCall(SbBlockSolverSolve(c->factor, r, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSystemSolveConstrained(SbContactSystem c, Mat K, const SbBlocks *blocks,
+                                               PetscBool saddle, const SbConstraintRows *rows,
+                                               PetscReal weight, Vec F, Vec Y,
+                                               KSPConvergedReason *reason, PetscInt *iterations)
+{
+  PetscInt all = rows->n;
+  PetscBool factored;
+  PetscBool ok = PETSC_TRUE;
+  PC inner = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, c->space->comm));
+  if (!all) {
+    PetscCall(SbContactSystemSolve(c, K, blocks, PETSC_TRUE, F, Y, reason, iterations));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+  PetscCall(merge(c, K, blocks));
+  PetscCall(set_up_iteration(c));
+
+  /* a preconditioner of the matrix: its factor, or that of CG */
+  factored = (PetscBool)(is_factored(c->choice, c->type) ||
+                         (!c->type[0] && !c->choice && 3 * c->space->Nnode <= SB_DIRECT_SMALL));
+  if (factored) {
+    PetscCall(factor(c, &ok));
+    PetscCall(PCCreate(c->space->comm, &inner));
+    PetscCall(PCSetType(inner, PCSHELL));
+    PetscCall(PCSetOperators(inner, c->A, c->A));
+    PetscCall(PCShellSetContext(inner, c));
+    PetscCall(PCShellSetApply(inner, apply_factor));
+    PetscCall(PCShellSetName(inner, "factor"));
+  } else {
+    PetscCall(KSPSetUp(c->ksp));
+    PetscCall(KSPGetPC(c->ksp, &inner));
+    PetscCall(PetscObjectReference((PetscObject)inner));
+  }
+  *reason = KSP_DIVERGED_PC_FAILED;
+  *iterations = 0;
+  if (ok)
+    PetscCall(SbSolveConstrained(c->A, inner, saddle, rows, weight, F, Y, reason, iterations));
+  PetscCall(PCDestroy(&inner));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

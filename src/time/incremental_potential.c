@@ -35,6 +35,7 @@ struct _p_SbPotential {
   /* the last linear system with barrier contact */
   SbContactSystem system; /* owned; NULL before the first contact */
   SbBlocks blocks;        /* Hessian of the barriers; owned */
+  SbConstraintRows rows;  /* exact constraints; owned */
   PetscInt nblock;        /* number of its blocks, all ranks */
 };
 
@@ -154,6 +155,9 @@ static PetscErrorCode hessian(void *ctx, Vec X, Vec F, SbContactHessian kind, Ve
       q->blocks.block[k].H[i] *= weight;
   PetscCallMPI(MPI_Allreduce(&q->blocks.n, &q->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   *nblock = q->nblock;
+  q->rows.n = q->rows.nentry = 0;
+  if (q->nblock && m->contacts.nexact)
+    PetscCall(SbContactSetConstraints(&m->contacts, X, &q->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,7 +170,13 @@ static PetscErrorCode solve(void *ctx, Mat P, Vec rhs, Vec Y, KSPConvergedReason
   PetscFunctionBeginUser;
   if (!q->system)
     PetscCall(SbContactSystemCreate(run->model->space, run->solve.contact_choice, &q->system));
-  PetscCall(SbContactSystemSolve(q->system, P, &q->blocks, PETSC_TRUE, rhs, Y, reason, iterations));
+  if (run->model->contacts.nexact)
+    PetscCall(SbContactSystemSolveConstrained(
+      q->system, P, &q->blocks, run->model->contacts.saddle, &q->rows, run->solve.barrier_weight,
+      rhs, Y, reason, iterations));
+  else
+    PetscCall(
+      SbContactSystemSolve(q->system, P, &q->blocks, PETSC_TRUE, rhs, Y, reason, iterations));
   if (*reason < 0)
     PetscCall(SbSolverListContactFailed(run, *reason, *iterations));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -272,6 +282,7 @@ PetscErrorCode SbPotentialDestroy(SbPotential *potential)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbContactSystemDestroy(&q->system));
   PetscCall(PetscFree(q->blocks.block));
+  PetscCall(SbConstraintRowsFree(&q->rows));
   PetscCall(PetscFree(*potential));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,6 +7,7 @@
 #define NRANDOM 4000
 
 static const PetscReal width = 0.5, pressure = 3.;
+static SbPairLaw law = {.width = 0.5, .stiffness = 3.};
 
 /* b and its derivatives: positive, decreasing, convex; zero from the width on, infinite at zero
    gap. */
@@ -43,7 +44,7 @@ static PetscReal energy_at(SbContactSurface m, const SbContactPair *pair, const 
   gap = SbContactPairGap(m, pair, x, &distance);
   if (gap <= 0.)
     return PETSC_INFINITY;
-  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, PETSC_FALSE, NULL);
+  SbPairEnergy(m, pair, &law, gap, &distance, x, &energy, gradient, PETSC_FALSE, NULL);
   return energy;
 }
 
@@ -91,8 +92,7 @@ static void check_pair(SbContactSurface m, const SbContactPair *pair, PetscReal 
   if (gap <= 0.02 || gap >= width)
     return;
   for (int clamp = 0; clamp < 2; clamp++)
-    SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, (PetscBool)clamp,
-                  H[clamp]);
+    SbPairEnergy(m, pair, &law, gap, &distance, x, &energy, gradient, (PetscBool)clamp, H[clamp]);
   for (int k = 0; k < 3 * nv; k++) {
     PetscReal side[2], g[2][12];
 

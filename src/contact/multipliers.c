@@ -1,0 +1,132 @@
+/*
+  multipliers.c - multipliers of pairs, of the responses `augmented`, `projected` and `multiplier`.
+
+  The constraint of a pair is g >= 0, g its gap beyond the one that it keeps. Its force is that of
+  the augmented Lagrangian, <l - c g>, with the multiplier l and the stiffness c = k area
+  (pair_energy.c). The forces of a solution become the multipliers of the next solve of the step,
+  until they stay (Simo and Laursen 1992): the method of multipliers (Nocedal and Wright, section
+  17.4), whose Newton iterations find the active set l - c g > 0 (a semismooth Newton method:
+  Hueeber and Wohlmuth, A primal-dual active set strategy for non-linear multibody contact problems,
+  CMAME 194, 2005). It takes what redundant constraints, as of surfaces that lie flat on each
+  other, leave open.
+*/
+#include "barrier.h"
+
+#define SETTLED 1e-3     /* tolerance of gaps, over those that are kept */
+#define EXACT 1e-7       /* the same of exact constraints in static runs */
+#define EXACT_STEPS 1e-5 /* and in time steps */
+#define UPDATES 100      /* most updates of multipliers in a step */
+#define FALLS 0.7        /* the worst gap falls to this part in ... */
+#define STUCK 3          /* ... updates; else it settles no further */
+#define LOOSE 1e-2       /* then the tolerance without a warning */
+
+/* The order of pairs: those with a side of the obstacle last, then by kind and vertices. */
+static int compare(const SbContactPair *p, const SbContactPair *q)
+{
+  if (p->side != q->side)
+    return p->side ? 1 : -1;
+  if (p->kind != q->kind)
+    return p->kind < q->kind ? -1 : 1;
+  for (int k = 0; k < 4; k++)
+    if (p->v[k] != q->v[k])
+      return p->v[k] < q->v[k] ? -1 : 1;
+  return 0;
+}
+
+static int by_pair(const void *p, const void *q)
+{
+  return compare(&((const PairForce *)p)->pair, &((const PairForce *)q)->pair);
+}
+
+PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
+{
+  const Multipliers *m = &b->multipliers;
+  PetscInt low = 0;
+  PetscInt high = m->n;
+
+  while (low < high) {
+    const PetscInt middle = (low + high) / 2;
+    const int order = compare(pair, &m->pair[middle].pair);
+
+    if (!order)
+      return m->pair[middle].force;
+    if (order < 0)
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  return -1.;
+}
+
+/* The table of all ranks from entries that each rank counts. Collective. */
+static PetscErrorCode share(Barrier *b, PetscInt n, const PairForce mine[])
+{
+  Multipliers *m = &b->multipliers;
+  const PetscInt size = (PetscInt)sizeof(*mine);
+  PairForce *all;
+  PetscInt total;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    SbAllgatherv(b->surface->space->comm, MPI_BYTE, n * size, mine, &total, &all, NULL));
+  m->n = total / size;
+  PetscCall(SbReserve(m->n, sizeof(*all), &m->size, &m->pair));
+  PetscCall(PetscArraycpy(m->pair, all, m->n));
+  PetscCall(PetscFree(all));
+  if (m->n)
+    qsort(m->pair, (size_t)m->n, sizeof(*m->pair), by_pair);
+  b->motion.known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
+{
+  const MPI_Comm comm = b->surface->space->comm;
+  Multipliers *m = &b->multipliers;
+  const PetscReal exact = b->contact.base.effect->dynamic ? EXACT_STEPS : EXACT;
+  PetscReal worst = 0.;
+  PairForce *mine;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(b->active.n, &mine));
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
+    const SbPairLaw law = SbPairLawOf(b, a);
+    PetscReal d[3], wrong;
+
+    if (!counts(b, &a->pair))
+      continue;
+    SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
+    if (d[1] == 0. && a->force == 0.)
+      continue;
+    wrong = PetscAbsReal(d[1] + a->force) / (law.stiffness * a->pair.area * law.width);
+    worst = PetscMax(worst, wrong);
+    if (d[1] < 0.)
+      mine[n++] = (PairForce){a->pair, -d[1]};
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, comm));
+  PetscCall(PetscInfo(NULL,
+                      "multipliers, update %" PetscInt_FMT ": gaps are wrong by %g of their width\n",
+                      m->updates, (double)worst));
+  if (!m->updates || worst < FALLS * m->least) {
+    m->least = worst;
+    m->stuck = 0;
+  } else
+    m->stuck++;
+  if (worst > (is_exact(b) ? exact : SETTLED) && m->stuck < STUCK && m->updates < UPDATES) {
+    m->updates++;
+    PetscCall(share(b, n, mine));
+    *again = PETSC_TRUE;
+  } else if (worst > LOOSE && !m->said) {
+    m->said = PETSC_TRUE;
+    PetscCall(SbWarning(comm,
+                        "effect %s: after %" PetscInt_FMT
+                        " updates of its multipliers gaps are wrong by %.2g of the width of %.3g "
+                        "m; said once: a larger -effect_%s_stiffness settles sooner",
+                        b->contact.base.effect->name, m->updates, (double)worst,
+                        (double)b->widths.w[0], b->contact.base.effect->name));
+  }
+  PetscCall(PetscFree(mine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
