@@ -160,6 +160,8 @@ static PetscErrorCode factor_gram(Constrained *c)
   else
     PetscCall(PCSetType(c->gram, PCREDUNDANT));
   PetscCall(PCSetFromOptions(c->gram));
+  if (package)
+    PetscCall(SbPCCheckPivots(c->gram));
   PetscCall(PCSetUp(c->gram));
   PetscCall(MatDestroy(&G));
   PetscFunctionReturn(PETSC_SUCCESS);
