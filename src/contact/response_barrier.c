@@ -48,15 +48,14 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   const PetscInt nbody = s->mesh->nbody;
   PetscReal cube = PETSC_MAX_REAL;
   SbFacet *facet;
-  PetscInt n, nmove, nobstacle;
+  PetscInt n, nobstacle;
 
   PetscFunctionBeginUser;
   PetscCall(SbPartnerSetUp(e, s->comm, &b->contact.partner));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
   PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.partner.obstacle, &b->surface));
   PetscCall(PetscFree(facet));
-  nmove = 3 * b->surface->nvertex;
-  nobstacle = nmove - 3 * b->surface->nbody_vertex;
+  nobstacle = 3 * (b->surface->nvertex - b->surface->nbody_vertex);
   s->coupled = PETSC_TRUE;
   if (!b->contact.partner.obstacle)
     PetscCall(SbBarrierFindBodies(e, s->mesh));
@@ -64,8 +63,10 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++)
     cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc7(3 * nbody + 3, &b->widths.w, nmove, &b->motion.x, nmove, &b->motion.start,
-                         nmove, &b->motion.other, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.x));
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.start));
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.other));
+  PetscCall(PetscMalloc4(3 * nbody + 3, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
                          &b->motion.from, nobstacle, &b->motion.to));
   b->widths.k = b->widths.w + nbody + 1;
   b->widths.mass = b->widths.k + nbody + 1;
@@ -155,9 +156,9 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
   PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
   PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
   b->separation.searched = PETSC_TRUE;
-  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
-  SbContactSurfaceNormals(m, b->motion.x, normal);
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
+  PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
@@ -197,14 +198,13 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  PetscCall(PetscMalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
-    SbContactSurfaceNormals(m, b->motion.x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
-    PetscCall(PetscArrayzero(push, 4 * m->nvertex));
+    PetscCall(PetscCalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
+    PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->widths.w, pair);
@@ -243,19 +243,19 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
-    if (!n)
-      break;
-    *moved = PETSC_TRUE;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL,
-                               MPI_SUM, s->comm));
+    *moved = (PetscBool)(*moved || n);
+    PetscCall(SbContactSurfaceSum(m, 4, push));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
-        for (int i = 0; i < 3 && m->node[j] >= 0; i++)
+        for (int i = 0; i < 3 && m->node[j] >= 0 && m->node[j] < s->nnode_owned; i++)
           if (!(m->fixed[j] >> i & 1))
             u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
     }
+    PetscCall(PetscFree2(push, normal));
+    if (!n)
+      break;
+    PetscCall(SbSpaceUpdateGhosts(s, u));
   }
-  PetscCall(PetscFree2(push, normal));
   b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -315,8 +315,7 @@ static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, P
   b->widths.growth = growth;
   if (factor > 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < 3 * b->surface->nbody_vertex; k++)
-    far = PetscMax(far, PetscAbsReal(b->surface->X[k]));
+  far = PetscMax(far, b->surface->farthest);
   least = WIDTH_LEAST * far / b->contact.base.width;
   if (least >= 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -338,7 +337,9 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscFunctionBeginUser;
   find_path(b, t, dt);
   b->contact.base.progress = 0.;
-  b->friction.pairs.n = b->springs.n = b->springs.nbounce = 0;
+  b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;
+  SbContactPairsForget(b->pairs);
+  b->motion.known = (PetscBool)(b->motion.known && b->pairs->known);
   if (!b->motion.begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
   if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
@@ -405,8 +406,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   Barrier *b = (Barrier *)e->data;
   const SbContactSurface m = b->surface;
   PetscReal power;
-  PetscReal gained = 0.;
-  PetscReal asked = 0.;
+  PetscReal progress[2] = {0., 0.}; /* of springs: what they opened, what they should */
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
@@ -438,17 +438,19 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->at.v[0]])
-      b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
+    if (!counts_spring(b, spring))
+      continue;
+    b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->springs.n - b->springs.nbounce)
       continue;
-    gained += PetscMin(way, spring->goal - spring->start);
-    asked += spring->goal - spring->start;
+    progress[0] += PetscMin(way, spring->goal - spring->start);
+    progress[1] += spring->goal - spring->start;
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, progress, 2, MPIU_REAL, MPI_SUM, s->comm));
   b->sums.work += b->contact.base.work;
   b->separation.parted = PETSC_FALSE;
-  if (asked > 0.)
-    b->separation.stiffer = gained < HALF * asked ? 2. * b->separation.stiffer
+  if (progress[1] > 0.)
+    b->separation.stiffer = progress[0] < HALF * progress[1] ? 2. * b->separation.stiffer
                                                   : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
@@ -508,10 +510,9 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSurfaceDestroy(&b->surface));
   PetscCall(SbContactPairsDestroy(&b->pairs));
-  PetscCall(PetscFree7(b->widths.w, b->motion.x, b->motion.start, b->motion.other, b->motion.u,
-                       b->motion.from, b->motion.to));
+  PetscCall(SbContactSurfaceDestroy(&b->surface)); /* with positions */
+  PetscCall(PetscFree4(b->widths.w, b->motion.u, b->motion.from, b->motion.to));
   PetscCall(PetscFree(b->columns.slot));
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
