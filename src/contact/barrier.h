@@ -48,9 +48,10 @@ typedef struct {
 
 /* Positions of the surfaces' vertices within a step. */
 typedef struct {
-  PetscBool begun;  /* the run has begun */
-  PetscReal *x, *u; /* [nvertex][3], of SbContactSurfaceCreateArray(): current ones, m; [nnode_owned][3] displacements of them, m */
-  PetscReal *start; /* [nvertex][3] at the start of the step, m */
+  PetscBool begun; /* the run has begun */
+  PetscReal *x,
+    *u; /* [nvertex][3], of SbContactSurfaceCreateArray(): current ones, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start;     /* [nvertex][3] at the start of the step, m */
   PetscReal *from, *to; /* [obstacle's vertices][3] at the start and the end of the step, m */
   PetscReal *other;     /* [nvertex][3] end of a motion, m */
   PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */

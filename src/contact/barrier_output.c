@@ -157,7 +157,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   if (s->rank)
     PetscFunctionReturn(PETSC_SUCCESS);
   values[at[GAP]] = least[0] == PETSC_MAX_REAL ? 0. : least[0];
-  values[at[PENETRATION]] = -least[1];
+  values[at[PENETRATION]] = 0. - least[1]; /* not -0 */
   values[at[LAG]] = b->friction.lag;
   values[at[UNGUARDED]] =
     b->separation.overlapping ? (PetscReal)b->separation.overlap.ncrossing : 0.;

@@ -77,8 +77,8 @@ static PetscErrorCode connect(SbContactSurface m)
   }
   PetscCall(PetscSFDestroy(&m->sf));
   PetscCall(PetscSFCreate(m->space->comm, &m->sf));
-  PetscCall(PetscSFSetGraph(m->sf, m->nkept_vertex, n, leaf, PETSC_COPY_VALUES, root,
-                            PETSC_COPY_VALUES));
+  PetscCall(
+    PetscSFSetGraph(m->sf, m->nkept_vertex, n, leaf, PETSC_COPY_VALUES, root, PETSC_COPY_VALUES));
   PetscCall(PetscSFSetUp(m->sf));
   PetscCall(PetscFree2(leaf, root));
 
@@ -160,9 +160,9 @@ PetscErrorCode SbContactSurfaceNormals(SbContactSurface m, const PetscReal x[], 
 }
 
 /*
-  A message holds blocks of features. Integers: numbers of vertices, triangles, edges; of each vertex
-  number, part, owner, number there, whether it is driven, number n of nodes, n nodes, n bits of
-  prescribed components; of each triangle its number and those of its vertices; of each edge
+  A message holds blocks of features. Integers: numbers of vertices, triangles, edges; of each
+  vertex number, part, owner, number there, whether it is driven, number n of nodes, n nodes, n bits
+  of prescribed components; of each triangle its number and those of its vertices; of each edge
   likewise. Reals: of each vertex position at rest, area, n weights; of each edge its area.
 */
 typedef struct {
@@ -491,7 +491,7 @@ static PetscErrorCode pack_triangles(SbContactSurface m, PetscInt n, PetscInt (*
       const PetscInt item[2] = {m->triangle[3 * t + i], side[3 * t + i]};
 
       for (int kind = 0; kind < 2; kind++) {
-        if (item[kind] < 0 || stamp[kind][item[kind]] == pairs[0][0])
+        if (stamp[kind][item[kind]] == pairs[0][0])
           continue;
         stamp[kind][item[kind]] = pairs[0][0];
         list[2 * kind][count[2 * kind]++] = item[kind];
@@ -517,7 +517,6 @@ static PetscErrorCode find_sides(SbContactSurface m, PetscInt side[])
     const PetscInt a = m->triangle[k];
     const PetscInt b = m->triangle[3 * (k / 3) + (k + 1) % 3];
 
-    side[k] = -1; /* between two vertices of others: another rank sends it */
     for (PetscInt i = start[PetscMin(a, b)]; i < start[PetscMin(a, b) + 1]; i++)
       if (m->edge[2 * edge[i] + 1] == PetscMax(a, b))
         side[k] = edge[i];
@@ -663,8 +662,7 @@ PetscErrorCode SbContactSurfaceHold(SbContactSurface m, PetscInt n, const PetscI
   PetscCall(pack(m, count, list, &out));
   PetscCall(PetscFree(list[0]));
   if (m->halo) {
-    PetscCall(
-      SbAllgatherv(m->space->comm, MPIU_INT, out.n, out.integer, &in.n, &in.integer, NULL));
+    PetscCall(SbAllgatherv(m->space->comm, MPIU_INT, out.n, out.integer, &in.n, &in.integer, NULL));
     PetscCall(
       SbAllgatherv(m->space->comm, MPIU_REAL, out.nreal, out.real, &in.nreal, &in.real, NULL));
     PetscCall(take_vertices(m, &in));
@@ -674,12 +672,11 @@ PetscErrorCode SbContactSurfaceHold(SbContactSurface m, PetscInt n, const PetscI
   }
   PetscCall(free_message(&out));
   PetscCall(free_message(&in));
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n; k++)
     if (number[k] >= m->Nbody_vertex)
       v[k] = m->nbody_vertex + number[k] - m->Nbody_vertex;
     else
       PetscCall(find_vertex(m, number[k], &v[k]));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

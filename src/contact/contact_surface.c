@@ -10,8 +10,8 @@
   forest brings its position to the ranks that hold it, too. Numbers follow the original ones:
   nothing depends on the partition.
 
-  The whole surface is on every rank while it is set up, and released then. A rank keeps the vertices
-  that have a node of it, the triangles and edges around these, and the other vertices of them.
+  The whole surface is on every rank while it is set up, and released then. A rank keeps the
+  vertices that have a node of it, the triangles around these, and the edges and vertices of them.
 
   The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are
   triangles. A half-space and a bowl touch vertices only; they are stored as two vertices, a point
@@ -393,8 +393,9 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
 {
   const SbContactSurface w = *mesh;
   PetscInt nentry = 0;
-  PetscInt *at; /* [nvertex] of the whole surface: number here, -1: not kept */
+  PetscInt *at;    /* [nvertex] of the whole surface: number here, -1: not kept */
   PetscInt *index; /* [nbody_vertex] number at the owner */
+  PetscInt(*side)[2];
   SbContactSurface m;
 
   PetscFunctionBeginUser;
@@ -419,14 +420,8 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
     if (w->mine[v[0]] | w->mine[v[1]] | w->mine[v[2]] || t >= w->nbody_triangle)
       m->ntriangle++;
   }
-  for (PetscInt e = 0; e < w->nedge; e++) {
-    const PetscInt *v = w->edge + 2 * e;
-
-    if (w->mine[v[0]] | w->mine[v[1]] || v[0] >= w->nbody_vertex)
-      m->nedge++;
-  }
-  PetscCall(SbContactSurfaceRoom(m, 0, 0, m->ntriangle, m->nedge));
-  m->ntriangle = m->nedge = 0;
+  PetscCall(SbContactSurfaceRoom(m, 0, 0, m->ntriangle, 3 * m->ntriangle + 1));
+  m->ntriangle = 0;
   for (PetscInt t = 0; t < w->ntriangle; t++) {
     const PetscInt *v = w->triangle + 3 * t;
 
@@ -439,16 +434,32 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
     m->triangle_number[m->ntriangle++] = t;
     m->nbody_triangle += t < w->nbody_triangle;
   }
-  for (PetscInt e = 0; e < w->nedge; e++) {
+
+  /* the edges of these triangles: both lists ascend */
+  PetscCall(PetscMalloc1(3 * m->ntriangle, &side));
+  for (PetscInt k = 0; k < 3 * m->ntriangle; k++) {
+    const PetscInt a = m->triangle[k];
+    const PetscInt b = m->triangle[3 * (k / 3) + (k + 1) % 3];
+
+    side[k][0] = PetscMin(a, b);
+    side[k][1] = PetscMax(a, b);
+  }
+  PetscCall(SbSortByKeys(3 * m->ntriangle, sizeof(*side), 2, side));
+  for (PetscInt e = 0, k = 0; e < w->nedge; e++) {
     const PetscInt *v = w->edge + 2 * e;
 
-    if (!(w->mine[v[0]] | w->mine[v[1]]) && v[0] < w->nbody_vertex)
+    while (k < 3 * m->ntriangle && (side[k][0] < v[0] || (side[k][0] == v[0] && side[k][1] < v[1])))
+      k++;
+    if (v[0] < w->nbody_vertex &&
+        (k == 3 * m->ntriangle || side[k][0] != v[0] || side[k][1] != v[1]))
       continue;
     m->edge[2 * m->nedge] = v[0];
     m->edge[2 * m->nedge + 1] = v[1];
     m->edge_number[m->nedge] = e;
     m->edge_area[m->nedge++] = w->edge_area[e];
   }
+
+  PetscCall(PetscFree(side));
 
   /* their vertices */
   for (PetscInt v = 0; v < w->nvertex; v++) {

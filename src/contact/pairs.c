@@ -114,8 +114,7 @@ static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
   int near[2] = {0, 0};
 
   for (int k = 0; p->near && k < 4; k++)
-    near[k >= split] =
-      PetscMax(near[k >= split], p->near[SbContactNumber(p->mesh, pair->v[k])]);
+    near[k >= split] = PetscMax(near[k >= split], p->near[SbContactNumber(p->mesh, pair->v[k])]);
   if (!near[0] || !near[1])
     return PETSC_FALSE;
   return (PetscBool)(split == 1 ? near[0] == SB_OVERLAP_INSIDE
@@ -476,13 +475,12 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     PetscCall(order_pairs(p));
   if (p->hash)
     SbSpatialHashCount(p->hash, count);
-  PetscCall(PetscInfo(NULL,
-                      "search for pairs: %" PetscInt_FMT " boxes in %" PetscInt_FMT
-                      " entries of the hash; %" PetscInt_FMT " pairs of boxes meet, %" PetscInt_FMT
-                      " are kept; %" PetscInt_FMT " vertices held, %" PetscInt_FMT
-                      " of other ranks\n",
-                      count[0], count[1], p->ncandidate, p->n, m->nbody_vertex,
-                      m->nbody_vertex - m->nkept_vertex));
+  PetscCall(PetscInfo(
+    NULL,
+    "search for pairs: %" PetscInt_FMT " boxes in %" PetscInt_FMT
+    " entries of the hash; %" PetscInt_FMT " pairs of boxes meet, %" PetscInt_FMT
+    " are kept; %" PetscInt_FMT " vertices held, %" PetscInt_FMT " of other ranks\n",
+    count[0], count[1], p->ncandidate, p->n, m->nbody_vertex, m->nbody_vertex - m->nkept_vertex));
 
   /* a half-space or a bowl: vertices whose boxes come within the reach */
   for (PetscInt v = 0; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v++) {
@@ -492,7 +490,8 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     PetscReal away;
     SbDistance g;
 
-    if (!m->mine[v] || m->driven[v] || (p->near && p->near[SbContactNumber(m, v)] == SB_OVERLAP_INSIDE))
+    if (!m->mine[v] || m->driven[v] ||
+        (p->near && p->near[SbContactNumber(m, v)] == SB_OVERLAP_INSIDE))
       continue;
     for (int i = 0; i < 3; i++)
       way += PetscSqr(x1[3 * v + i] - x0[3 * v + i] - x1[3 * m->nbody_vertex + i] +
@@ -566,7 +565,8 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
 {
   const SbContactSurface m = p->mesh;
   PetscReal *const *follow[2] = {SbContactSurfaceFollow(m, x0), SbContactSurfaceFollow(m, x1)};
-  const PetscInt nvertex = m->nvertex - m->nbody_vertex + PetscMax(m->nbody_vertex, m->Nbody_vertex);
+  const PetscInt nvertex =
+    m->nvertex - m->nbody_vertex + PetscMax(m->nbody_vertex, m->Nbody_vertex);
   PetscReal whole = 1.;
   PetscReal safe;
 

@@ -14,46 +14,47 @@
 typedef struct _p_SbContactSurface *SbContactSurface;
 #define SB_CONTACT_ARRAYS 16 /* most arrays of a surface */
 struct _p_SbContactSurface {
-  SbSpace space;                  /* borrowed */
-  PetscBool self;                 /* self-contact, too; set by the caller, false at first */
+  SbSpace space;  /* borrowed */
+  PetscBool self; /* self-contact, too; set by the caller, false at first */
   /* what this rank holds. Kept features come first, in the order of their numbers, then those of
      other ranks, last the obstacle's; of vertices: a number stays the same within a step */
   PetscInt nvertex, nbody_vertex;
   PetscInt ntriangle, nbody_triangle, nedge;
   PetscInt nkept_vertex, nkept_triangle, nkept_edge; /* without the obstacle's; all its edges */
-  PetscInt *start, *gnode; /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those
+  PetscInt *start, *gnode;   /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those
                               below, global numbers ascending */
-  PetscInt *node;          /* the same as local nodes, -1: not known here */
+  PetscInt *node;            /* the same as local nodes, -1: not known here */
   PetscInt *column, ncolumn; /* the same by numbers 0 to ncolumn - 1; NULL: gnode below Nnode */
   PetscReal *weight;
-  uint8_t *fixed; /* bit c: component c of the node is prescribed; SbContactSurfaceMarkDriven() */
-  PetscInt *part; /* [nvertex] body, nbody: the obstacle */
+  uint8_t *fixed;   /* bit c: component c of the node is prescribed; SbContactSurfaceMarkDriven() */
+  PetscInt *part;   /* [nvertex] body, nbody: the obstacle */
   PetscInt *number; /* [nvertex] among those of all ranks, no partition changes it; NULL: as here */
   PetscSFNode *remote; /* [nbody_vertex] rank that owns it, number there */
   uint8_t *mine;       /* [nvertex] some node is owned here */
-  uint8_t *own;    /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
-  uint8_t *driven; /* [nvertex] its motion is prescribed in all directions */
-  PetscInt *triangle;         /* [ntriangle][3] counter-clockwise seen from outside */
-  PetscInt *edge;             /* [nedge][2], the lower number first */
-  PetscInt *triangle_number;  /* [ntriangle], as number[] */
-  PetscInt *edge_number;      /* [nedge] */
-  PetscReal *X;               /* [nvertex][3] at rest, m; obstacle: its rest frame */
-  PetscReal *area, *edge_area; /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
-  PetscReal radius;    /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side; /* half-space or bowl, whose vertices are described there */
-  PetscInt Nbody_vertex;         /* of all ranks */
+  uint8_t *own; /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
+  uint8_t *driven;           /* [nvertex] its motion is prescribed in all directions */
+  PetscInt *triangle;        /* [ntriangle][3] counter-clockwise seen from outside */
+  PetscInt *edge;            /* [nedge][2], the lower number first */
+  PetscInt *triangle_number; /* [ntriangle], as number[] */
+  PetscInt *edge_number;     /* [nedge] */
+  PetscReal *X;              /* [nvertex][3] at rest, m; obstacle: its rest frame */
+  PetscReal *area,
+    *edge_area;          /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscReal radius;      /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side;   /* half-space or bowl, whose vertices are described there */
+  PetscInt Nbody_vertex; /* of all ranks */
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
   PetscReal farthest;            /* largest coordinate at rest, m */
   /* several ranks (contact_halo.c) */
-  PetscBool halo;              /* features of other ranks are held */
-  PetscBool drop;              /* the next search drops vertices that are no longer near */
-  PetscInt nneeded;            /* of other ranks in the last search */
-  PetscSF sf;                  /* from own vertices to those that others hold; NULL: one rank */
+  PetscBool halo;   /* features of other ranks are held */
+  PetscBool drop;   /* the next search drops vertices that are no longer near */
+  PetscInt nneeded; /* of other ranks in the last search */
+  PetscSF sf;       /* from own vertices to those that others hold; NULL: one rank */
   PetscInt *halo_number, *halo_vertex; /* [nbody_vertex - nkept_vertex] of other ranks, ascending */
-  PetscInt *group;             /* [nkept_triangle] group of neighbours of one body */
-  PetscMPIInt *ngroup;         /* [ranks] */
-  PetscInt room[4];            /* of vertices, nodes of vertices, triangles, edges */
+  PetscInt *group;                     /* [nkept_triangle] group of neighbours of one body */
+  PetscMPIInt *ngroup;                 /* [ranks] */
+  PetscInt room[4];                    /* of vertices, nodes of vertices, triangles, edges */
   int narray;
   PetscReal **array[SB_CONTACT_ARRAYS]; /* of SbContactSurfaceCreateArray() */
 };
@@ -169,10 +170,9 @@ struct _p_SbContactPairs {
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   SbSpatialHash hash; /* NULL: trees */
   struct SbContactFeatures
-    *features;     /* [6] vertices, triangles and edges, each of this rank and of others */
-  PetscBool known; /* cleared by who changes `near` */
-  const uint8_t
-    *near; /* [all] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
+    *features;         /* [6] vertices, triangles and edges, each of this rank and of others */
+  PetscBool known;     /* cleared by who changes `near` */
+  const uint8_t *near; /* [all] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
   SbContactPair *pair; /* [n] all that have nodes of this rank; by kind, then vertices; last those
                           with a side of the obstacle */
@@ -246,8 +246,8 @@ typedef struct {
     ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
   PetscInt part[2];            /* of the first of them: body, or nbody for the obstacle */
   PetscReal place[3], deepest; /* position of it; largest penetration, m */
-  PetscInt npoint, n, size; /* of all ranks, of this one */
-  SbPenetration *point;     /* [n] with a separation direction */
+  PetscInt npoint, n, size;    /* of all ranks, of this one */
+  SbPenetration *point;        /* [n] with a separation direction */
   uint8_t *near; /* by number, of all ranks: SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
 /* Penetration at x, which may move (SbContactSurfaceReach()); `inside`: there is some, even if no

@@ -450,8 +450,9 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   b->sums.work += b->contact.base.work;
   b->separation.parted = PETSC_FALSE;
   if (progress[1] > 0.)
-    b->separation.stiffer = progress[0] < HALF * progress[1] ? 2. * b->separation.stiffer
-                                                  : PetscMax(1., 0.5 * b->separation.stiffer);
+    b->separation.stiffer = progress[0] < HALF * progress[1]
+                              ? 2. * b->separation.stiffer
+                              : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
     PetscCall(SbBarrierLag(b));
