@@ -174,8 +174,8 @@ PetscErrorCode SbConstraintRowsFree(SbConstraintRows *rows);
   SbContactSystemSolveConstrained - SbContactSystemSolve() with stiff constraints: in their null
   space, or (saddle) with their forces as unknowns.
 
-  Collective. Input: blocks, without the stiffness of the rows, and F with their forces at the goals;
-  weight, on the stiffness of rows and blocks.
+  Collective. Input: blocks, without the stiffness of the rows, and F with their forces at the
+  goals; weight, on the stiffness of rows and blocks.
 */
 PetscErrorCode SbContactSystemSolveConstrained(SbContactSystem system, Mat K,
                                                const SbBlocks *blocks, PetscBool saddle,

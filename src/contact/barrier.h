@@ -15,10 +15,11 @@ typedef struct {
   SbDistance at;
 } Active;
 
-/* The multiplier of a pair; its area is not used. */
+/* The multiplier of a pair. */
+#define PAIR_KEY 6
 typedef struct {
-  SbContactPair pair;
-  PetscReal force; /* N */
+  PetscInt key[PAIR_KEY]; /* side, kind, numbers of its vertices (SbContactNumber()) */
+  PetscReal force;        /* N */
 } PairForce;
 
 /* Multipliers above zero, the same on every rank. */
@@ -68,9 +69,10 @@ typedef struct {
 
 /* Positions of the surfaces' vertices within a step. */
 typedef struct {
-  PetscBool begun;  /* the run has begun */
-  PetscReal *x, *u; /* [nvertex][3] current ones, m; [nnode_owned][3] displacements of them, m */
-  PetscReal *start; /* [nvertex][3] at the start of the step, m */
+  PetscBool begun; /* the run has begun */
+  PetscReal *x,
+    *u; /* [nvertex][3], of SbContactSurfaceCreateArray(): current ones, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start;     /* [nvertex][3] at the start of the step, m */
   PetscReal *from, *to; /* [obstacle's vertices][3] at the start and the end of the step, m */
   PetscReal *other;     /* [nvertex][3] end of a motion, m */
   PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */
@@ -114,8 +116,8 @@ typedef struct {
 } Separation;
 
 typedef struct {
-  PetscInt n, size; /* those of overlap, the same on every rank, */
-  PetscInt nbounce; /* then those of restitution, of this rank's pairs */
+  PetscInt n, size; /* those of overlap, then those of restitution: of this rank's points, pairs */
+  PetscInt nbounce; /* the latter */
   Spring *spring;   /* [n] */
 } Springs;
 
@@ -200,6 +202,16 @@ SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row);
 static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
 {
   return (PetscBool)b->surface->own[pair->v[pair->v[0] < b->surface->nbody_vertex ? 0 : 1]];
+}
+
+/* Whether this rank counts the spring: by its first vertex of a body. */
+static inline PetscBool counts_spring(const Barrier *b, const Spring *spring)
+{
+  PetscInt k = 0;
+
+  while (k < spring->at.n - 1 && spring->at.v[k] >= b->surface->nbody_vertex)
+    k++;
+  return (PetscBool)b->surface->own[spring->at.v[k]];
 }
 
 /* Makes e, with its Contact, an effect of the response `barrier`. Not collective. */

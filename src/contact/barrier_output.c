@@ -26,6 +26,8 @@ PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh)
     p->columns.slot[i] = -1;
   for (PetscInt v = 0; v < p->surface->nbody_vertex; v++)
     p->columns.slot[p->surface->part[v]] = 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, p->columns.slot, (PetscMPIInt)mesh->nbody, MPIU_INT,
+                             MPI_MAX, mesh->comm));
   for (PetscInt i = 0; i < mesh->nbody; i++)
     if (p->columns.slot[i] == 0)
       p->columns.slot[i] = p->columns.nsurface++;
@@ -90,7 +92,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
   Barrier *b = (Barrier *)e->data;
   const int *at = places[b->contact.partner.obstacle != NULL];
-  PetscReal least = PETSC_MAX_REAL;
+  PetscReal least[2] = {PETSC_MAX_REAL, 0.}; /* gap, minus depth */
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -100,8 +102,11 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->active.n; i++)
-    least = PetscMin(least, b->active.pair[i].gap);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
+    least[0] = PetscMin(least[0], b->active.pair[i].gap);
+  for (PetscInt i = 0; i < b->springs.n; i++) /* of the overlaps found at the start of the step */
+    least[1] = PetscMin(least[1], SbBarrierSpringPlace(b, &b->springs.spring[i]) -
+                                    b->springs.spring[i].at.depth - b->springs.spring[i].start);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 2, MPIU_REAL, MPI_MIN, s->comm));
   if (b->contact.partner.obstacle)
     SbPartnerPose(&b->contact.partner, stage->t, &pose);
   for (PetscInt i = 0; i < nterm(b); i++) {
@@ -151,14 +156,11 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   values[at[LOSS]] = b->friction.loss;
   if (s->rank)
     PetscFunctionReturn(PETSC_SUCCESS);
-  values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
+  values[at[GAP]] = least[0] == PETSC_MAX_REAL ? 0. : least[0];
+  values[at[PENETRATION]] = 0. - least[1]; /* not -0 */
   values[at[LAG]] = b->friction.lag;
   values[at[UNGUARDED]] =
     b->separation.overlapping ? (PetscReal)b->separation.overlap.ncrossing : 0.;
-  for (PetscInt i = 0; i < b->springs.n; i++) /* of the overlaps found at the start of the step */
-    values[at[PENETRATION]] =
-      PetscMax(values[at[PENETRATION]], b->springs.spring[i].at.depth + b->springs.spring[i].start -
-                                          SbBarrierSpringPlace(b, &b->springs.spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,7 +174,8 @@ static SbContactPoint point_of(const Barrier *b, const Term *t)
   const PetscInt second = part[t->v[t->nfirst]];
   const PetscBool turned = (PetscBool)(first == nbody);
   SbContactPoint p = {
-    .id = {t->v[0], t->v[1], t->v[2]},
+    .id = {SbContactNumber(b->surface, t->v[0]), SbContactNumber(b->surface, t->v[1]),
+           t->n > 2 ? SbContactNumber(b->surface, t->v[2]) : 0},
     .body = {turned ? second : first, turned || second == nbody ? -1 : second},
   };
   PetscReal sum = 0.;
@@ -212,9 +215,9 @@ PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbSta
       continue;
     p = point_of(b, &t);
     if (spring >= 0) { /* separates an overlap, or rebounds */
-      p.id[0] = -1 - spring;
-      p.id[1] = t.v[0];
-      p.id[2] = t.v[t.n - 1];
+      p.id[0] = -1 - b->springs.spring[spring].at.number;
+      p.id[1] = SbContactNumber(b->surface, t.v[0]);
+      p.id[2] = SbContactNumber(b->surface, t.v[t.n - 1]);
       p.gap = SbBarrierSpringPlace(b, &b->springs.spring[spring]);
       if (spring < b->springs.n - b->springs.nbounce)
         p.gap -= b->springs.spring[spring].start + b->springs.spring[spring].at.depth;

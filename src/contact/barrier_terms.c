@@ -159,7 +159,7 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->v = spring->at.v;
     t->weight = spring->at.weight;
     t->normal = spring->at.normal;
-    t->counts = (PetscBool)b->surface->own[spring->at.v[0]];
+    t->counts = counts_spring(b, spring);
     t->force = SbBarrierSpring(b, spring, t->gradient);
     t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
   }

@@ -1,14 +1,17 @@
 /*
-  contact_surface.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, on
-  every rank.
+  contact_surface.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles: of
+  each rank its own features, to which contact_halo.c adds those of other ranks that may meet them.
 
   A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose
   displacement is discontinuous, the mean over the cells behind the facets around it, so that the
   surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its
   six nodes: its corners and the middles of its sides are vertices. The rank that owns the vertex in
-  the mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions
-  are gathered by all ranks, 24 bytes per vertex of the surface. Numbers follow the original ones:
+  the mesh knows all facets around it (the overlap), makes its list of nodes and moves it; a star
+  forest brings its position to the ranks that hold it, too. Numbers follow the original ones:
   nothing depends on the partition.
+
+  The whole surface is on every rank while it is set up, and released then. A rank keeps the
+  vertices that have a node of it, the triangles around these, and the edges and vertices of them.
 
   The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are
   triangles. A half-space and a bowl touch vertices only; they are stored as two vertices, a point
@@ -78,7 +81,6 @@ static PetscErrorCode list_own(SbContactSurface m, PetscInt n, const SbFacet fac
 
     if (first == last)
       continue;
-    m->nlocal++;
     PetscCall(SbReserve(*size + 7 + 8 * (last - first), sizeof(**records), &room, records));
     record = *records + *size;
     entry = record + 7;
@@ -124,89 +126,163 @@ static PetscErrorCode list_own(SbContactSurface m, PetscInt n, const SbFacet fac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSurfaceRoom(SbContactSurface m, PetscInt nvertex, PetscInt nentry,
+                                    PetscInt ntriangle, PetscInt nedge)
+{
+  const PetscInt need[] = {nvertex, nentry, ntriangle, nedge};
+  const struct {
+    int of;
+    size_t unit;
+    void *array;
+  } table[] = {
+    {0, sizeof(*m->start), &m->start},
+    {0, sizeof(*m->part), &m->part},
+    {0, sizeof(*m->number), &m->number},
+    {0, sizeof(*m->remote), &m->remote},
+    {0, sizeof(*m->mine), &m->mine},
+    {0, sizeof(*m->own), &m->own},
+    {0, sizeof(*m->driven), &m->driven},
+    {0, 3 * sizeof(*m->X), &m->X},
+    {0, sizeof(*m->area), &m->area},
+    {1, sizeof(*m->gnode), &m->gnode},
+    {1, sizeof(*m->node), &m->node},
+    {1, sizeof(*m->column), &m->column},
+    {1, sizeof(*m->weight), &m->weight},
+    {1, sizeof(*m->fixed), &m->fixed},
+    {2, 3 * sizeof(*m->triangle), &m->triangle},
+    {2, sizeof(*m->triangle_number), &m->triangle_number},
+    {3, 2 * sizeof(*m->edge), &m->edge},
+    {3, sizeof(*m->edge_number), &m->edge_number},
+    {3, sizeof(*m->edge_area), &m->edge_area},
+  };
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 4; k++) {
+    if (need[k] < m->room[k])
+      continue;
+    m->room[k] = need[k] + m->room[k] / 2 + 1;
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(table); i++)
+      if (table[i].of == k)
+        PetscCall(PetscRealloc((size_t)m->room[k] * table[i].unit, table[i].array));
+    for (int i = 0; i < m->narray && k == 0; i++)
+      PetscCall(PetscRealloc(3 * (size_t)m->room[0] * sizeof(PetscReal), m->array[i]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSurfaceCreateArray(SbContactSurface m, PetscReal **x)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(m->narray < SB_CONTACT_ARRAYS, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "More than %d arrays of a surface", SB_CONTACT_ARRAYS);
+  PetscCall(PetscCalloc1(3 * PetscMax(m->room[0], m->nvertex), x));
+  m->array[m->narray++] = x;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSurfaceDestroyArray(SbContactSurface m, PetscReal **x)
+{
+  int n = 0;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < m->narray; i++)
+    if (m->array[i] != x)
+      m->array[n++] = m->array[i];
+  m->narray = n;
+  PetscCall(PetscFree(*x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSurfaceFindNodes(SbContactSurface m, PetscInt v)
+{
+  const SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  m->mine[v] = m->own[v];
+  for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
+    const PetscInt node = m->gnode[e] - s->gnode_start;
+
+    if (node >= 0 && node < s->nnode_owned) {
+      m->node[e] = node;
+      m->mine[v] = 1;
+      continue;
+    }
+    PetscCall(PetscFindInt(m->gnode[e], s->nnode_cell - s->nnode_owned, s->gnode + s->nnode_owned,
+                           &m->node[e]));
+    m->node[e] = m->node[e] < 0 ? -1 : s->nnode_owned + m->node[e];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The vertices of all ranks in the order of their numbers, and room for `nobstacle` of the
-   obstacle. */
+   obstacle; id[nbody_vertex], their numbers in the mesh, which the caller frees. */
 static PetscErrorCode make_vertices(SbContactSurface m, PetscInt n, const SbFacet facet[],
-                                    PetscInt nobstacle)
+                                    PetscInt nobstacle, PetscInt **id)
 {
   const SbSpace s = m->space;
   PetscInt nown = 0;
   PetscInt nall;
   PetscInt nv = 0;
-  PetscInt *id, *arrival;
+  PetscInt nentry = 0;
+  PetscInt *order, *arrival, *before;
   PetscReal *own, *all;
-  PetscMPIInt nlocal;
 
   PetscFunctionBeginUser;
   PetscCall(list_own(m, n, facet, &nown, &own));
+  PetscCall(PetscMalloc1(s->size, &before));
+  PetscCallMPI(MPI_Allgather(&nown, 1, MPIU_INT, before, 1, MPIU_INT, s->comm));
   PetscCall(SbAllgatherv(s->comm, MPIU_REAL, nown, own, &nall, &all, NULL));
   PetscCall(PetscFree(own));
 
-  /* how many vertices each rank moves */
-  PetscCall(PetscMPIIntCast(3 * m->nlocal, &nlocal));
-  PetscCall(PetscMalloc2(s->size, &m->count, s->size, &m->first));
-  PetscCallMPI(MPI_Allgather(&nlocal, 1, MPI_INT, m->count, 1, MPI_INT, s->comm));
-  m->first[0] = 0;
-  for (PetscMPIInt r = 1; r < s->size; r++)
-    m->first[r] = m->first[r - 1] + m->count[r - 1];
-
   /* the order of numbers: vertex order[k] arrives as number k */
-  for (PetscInt i = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2])
-    nv++;
-  m->nbody_vertex = nv;
+  for (PetscInt i = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], nv++)
+    nentry += (PetscInt)all[i + 2];
+  m->nbody_vertex = m->Nbody_vertex = nv;
   m->nvertex = nv + nobstacle;
-  PetscCall(PetscMalloc2(nv, &id, nv, &arrival));
+  PetscCall(SbContactSurfaceRoom(m, m->nvertex, nentry, 0, 0));
+  PetscCall(PetscMalloc1(nv, id));
+  PetscCall(PetscMalloc2(nv, &arrival, nv, &order));
   for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++) {
-    id[k] = (PetscInt)all[i];
+    (*id)[k] = (PetscInt)all[i];
     arrival[k] = k;
   }
-  PetscCall(PetscSortIntWithArray(nv, id, arrival));
-  PetscCall(PetscCalloc3(nv, &m->order, 6 * nv, &m->buffer, nv + 1, &m->start));
+  PetscCall(PetscSortIntWithArray(nv, *id, arrival));
   for (PetscInt v = 0; v < nv; v++)
-    m->order[arrival[v]] = v;
-  PetscCall(PetscFree2(id, arrival));
+    order[arrival[v]] = v;
 
   /* their records in that order */
+  m->start[0] = 0;
   for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++)
-    m->start[m->order[k] + 1] = (PetscInt)all[i + 2];
+    m->start[order[k] + 1] = (PetscInt)all[i + 2];
   for (PetscInt v = 0; v < nv; v++)
     m->start[v + 1] += m->start[v];
-  PetscCall(PetscMalloc4(m->start[nv], &m->gnode, m->start[nv], &m->node, m->start[nv], &m->weight,
-                         m->start[nv], &m->fixed));
-  PetscCall(
-    PetscMalloc4(m->nvertex, &m->part, nv, &m->id, 3 * m->nvertex, &m->X, m->nvertex, &m->area));
-  PetscCall(PetscCalloc3(m->nvertex, &m->mine, m->nvertex, &m->own, m->nvertex, &m->driven));
-  for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++) {
-    const PetscInt v = m->order[k];
+  for (PetscInt i = 0, k = 0, rank = 0, next = before[0]; i < nall;
+       i += 7 + 2 * (PetscInt)all[i + 2], k++) {
+    const PetscInt v = order[k];
     const PetscInt start = m->start[v];
     const PetscInt count = m->start[v + 1] - start;
 
-    m->id[v] = (PetscInt)all[i];
+    while (i >= next)
+      next += before[++rank];
+    m->remote[v] = (PetscSFNode){.rank = rank, .index = v};
+    m->own[v] = rank == s->rank;
+    m->driven[v] = 0;
     m->part[v] = (PetscInt)all[i + 1];
     PetscCall(PetscArraycpy(m->X + 3 * v, all + i + 3, 3));
     m->area[v] = all[i + 6];
     for (PetscInt e = 0; e < count; e++) {
       m->gnode[start + e] = (PetscInt)all[i + 7 + 2 * e];
       m->weight[start + e] = all[i + 8 + 2 * e];
+      m->fixed[start + e] = 0;
     }
     PetscCall(PetscSortIntWithScalarArray(count, m->gnode + start, m->weight + start));
-    for (PetscInt e = start; e < start + count; e++) {
-      const PetscInt node = m->gnode[e] - s->gnode_start;
-
-      if (node >= 0 && node < s->nnode_owned) {
-        m->node[e] = node;
-        m->mine[v] = 1;
-        continue;
-      }
-      PetscCall(PetscFindInt(m->gnode[e], s->nnode_cell - s->nnode_owned, s->gnode + s->nnode_owned,
-                             &m->node[e]));
-      m->node[e] = m->node[e] < 0 ? -1 : s->nnode_owned + m->node[e];
-    }
+    PetscCall(SbContactSurfaceFindNodes(m, v));
   }
+  for (PetscInt v = 0; v < m->nvertex; v++)
+    m->number[v] = v;
   PetscCall(PetscFree(all));
-  m->local = m->order + m->first[s->rank] / 3;
-  for (PetscInt k = 0; k < m->nlocal; k++)
-    m->own[m->local[k]] = m->mine[m->local[k]] = 1;
+  PetscCall(PetscFree(before));
+  PetscCall(PetscFree2(arrival, order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -214,7 +290,7 @@ static PetscErrorCode make_vertices(SbContactSurface m, PetscInt n, const SbFace
    with P2 four. Corners go by the number of the vertex, or, in the middle of a side, by that of its
    node. */
 static PetscErrorCode make_triangles(SbContactSurface m, PetscInt n, const SbFacet facet[],
-                                     PetscInt nobstacle)
+                                     PetscInt nobstacle, const PetscInt id[])
 {
   static const int part[5][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}, {0, 1, 2}};
   const SbSpace s = m->space;
@@ -244,7 +320,7 @@ static PetscErrorCode make_triangles(SbContactSurface m, PetscInt n, const SbFac
   /* vertices by their nodes, where they are in the middle of sides */
   PetscCall(PetscMalloc2(m->nbody_vertex, &gnode, m->nbody_vertex, &vertex));
   for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-    if (m->id[v] < s->mesh->Nvert)
+    if (id[v] < s->mesh->Nvert)
       continue;
     gnode[nmiddle] = m->gnode[m->start[v]];
     vertex[nmiddle++] = v;
@@ -252,13 +328,15 @@ static PetscErrorCode make_triangles(SbContactSurface m, PetscInt n, const SbFac
   PetscCall(PetscSortIntWithArray(nmiddle, gnode, vertex));
   m->nbody_triangle = total / 4;
   m->ntriangle = m->nbody_triangle + nobstacle;
-  PetscCall(PetscMalloc1(3 * m->ntriangle, &m->triangle));
+  PetscCall(SbContactSurfaceRoom(m, 0, 0, m->ntriangle, 0));
+  for (PetscInt t = 0; t < m->ntriangle; t++)
+    m->triangle_number[t] = t;
   for (PetscInt i = 0; i < 3 * m->nbody_triangle; i++) {
     const PetscInt corner = all[4 * (i / 3) + 1 + i % 3];
     PetscInt at;
 
     if (corner >= 0)
-      PetscCall(PetscFindInt(corner, m->nbody_vertex, m->id, &at));
+      PetscCall(PetscFindInt(corner, m->nbody_vertex, id, &at));
     else
       PetscCall(PetscFindInt(-1 - corner, nmiddle, gnode, &at));
     m->triangle[i] = corner >= 0 ? at : vertex[at];
@@ -285,7 +363,7 @@ static PetscErrorCode make_edges(SbContactSurface m, PetscBool lone)
     side[i][2] = i / 3;
   }
   PetscCall(SbSortByKeys(3 * m->ntriangle, sizeof(*side), 3, side));
-  PetscCall(PetscMalloc2(6 * m->ntriangle + 2, &m->edge, 3 * m->ntriangle + 1, &m->edge_area));
+  PetscCall(SbContactSurfaceRoom(m, 0, 0, 0, 3 * m->ntriangle + 1));
   for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
     PetscReal n[3];
     const PetscReal area = SbContactTriangleArea(m->X, m->triangle + 3 * side[i][2], n) / 3.;
@@ -304,6 +382,134 @@ static PetscErrorCode make_edges(SbContactSurface m, PetscBool lone)
     m->edge[2 * m->nedge + 1] = m->nbody_vertex + 1;
     m->edge_area[m->nedge++] = 0.;
   }
+  for (PetscInt e = 0; e < m->nedge; e++)
+    m->edge_number[e] = e;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What this rank keeps of the whole surface, which is released. The numbers are those of the whole
+   surface, the order as well. */
+static PetscErrorCode keep_own(SbContactSurface *mesh)
+{
+  const SbContactSurface w = *mesh;
+  PetscInt nentry = 0;
+  PetscInt *at;    /* [nvertex] of the whole surface: number here, -1: not kept */
+  PetscInt *index; /* [nbody_vertex] number at the owner */
+  PetscInt(*side)[2];
+  SbContactSurface m;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&m));
+  *m = *w;
+  m->nvertex = m->nbody_vertex = m->ntriangle = m->nbody_triangle = m->nedge = 0;
+  for (int k = 0; k < 4; k++)
+    m->room[k] = 0;
+  m->start = m->part = m->number = m->gnode = m->node = m->column = m->triangle =
+    m->triangle_number = m->edge = m->edge_number = NULL;
+  m->X = m->area = m->weight = m->edge_area = NULL;
+  m->mine = m->own = m->driven = m->fixed = NULL;
+  m->remote = NULL;
+
+  /* triangles and edges of own vertices; those of an obstacle on all ranks */
+  PetscCall(PetscMalloc2(w->nvertex, &at, w->nbody_vertex, &index));
+  for (PetscInt v = 0; v < w->nvertex; v++)
+    at[v] = w->mine[v] || v >= w->nbody_vertex ? 0 : -1;
+  for (PetscInt t = 0; t < w->ntriangle; t++) {
+    const PetscInt *v = w->triangle + 3 * t;
+
+    if (w->mine[v[0]] | w->mine[v[1]] | w->mine[v[2]] || t >= w->nbody_triangle)
+      m->ntriangle++;
+  }
+  PetscCall(SbContactSurfaceRoom(m, 0, 0, m->ntriangle, 3 * m->ntriangle + 1));
+  m->ntriangle = 0;
+  for (PetscInt t = 0; t < w->ntriangle; t++) {
+    const PetscInt *v = w->triangle + 3 * t;
+
+    if (!(w->mine[v[0]] | w->mine[v[1]] | w->mine[v[2]]) && t < w->nbody_triangle)
+      continue;
+    for (int k = 0; k < 3; k++) {
+      at[v[k]] = 0;
+      m->triangle[3 * m->ntriangle + k] = v[k];
+    }
+    m->triangle_number[m->ntriangle++] = t;
+    m->nbody_triangle += t < w->nbody_triangle;
+  }
+
+  /* the edges of these triangles: both lists ascend */
+  PetscCall(PetscMalloc1(3 * m->ntriangle, &side));
+  for (PetscInt k = 0; k < 3 * m->ntriangle; k++) {
+    const PetscInt a = m->triangle[k];
+    const PetscInt b = m->triangle[3 * (k / 3) + (k + 1) % 3];
+
+    side[k][0] = PetscMin(a, b);
+    side[k][1] = PetscMax(a, b);
+  }
+  PetscCall(SbSortByKeys(3 * m->ntriangle, sizeof(*side), 2, side));
+  for (PetscInt e = 0, k = 0; e < w->nedge; e++) {
+    const PetscInt *v = w->edge + 2 * e;
+
+    while (k < 3 * m->ntriangle && (side[k][0] < v[0] || (side[k][0] == v[0] && side[k][1] < v[1])))
+      k++;
+    if (v[0] < w->nbody_vertex &&
+        (k == 3 * m->ntriangle || side[k][0] != v[0] || side[k][1] != v[1]))
+      continue;
+    m->edge[2 * m->nedge] = v[0];
+    m->edge[2 * m->nedge + 1] = v[1];
+    m->edge_number[m->nedge] = e;
+    m->edge_area[m->nedge++] = w->edge_area[e];
+  }
+
+  PetscCall(PetscFree(side));
+
+  /* their vertices */
+  for (PetscInt v = 0; v < w->nvertex; v++) {
+    if (at[v] < 0)
+      continue;
+    at[v] = m->nvertex++;
+    if (v < w->nbody_vertex)
+      nentry += w->start[v + 1] - w->start[v];
+  }
+  PetscCall(SbContactSurfaceRoom(m, m->nvertex, nentry, 0, 0));
+  m->start[0] = 0;
+  for (PetscInt v = 0; v < w->nvertex; v++) {
+    const PetscInt k = at[v];
+
+    if (k < 0)
+      continue;
+    m->part[k] = w->part[v];
+    m->number[k] = v;
+    m->mine[k] = w->mine[v];
+    m->own[k] = w->own[v];
+    m->driven[k] = w->driven[v];
+    m->area[k] = w->area[v];
+    PetscCall(PetscArraycpy(m->X + 3 * k, w->X + 3 * v, 3));
+    if (v >= w->nbody_vertex)
+      continue;
+    m->nbody_vertex++;
+    m->remote[k] = w->remote[v];
+    m->start[k + 1] = m->start[k];
+    for (PetscInt e = w->start[v]; e < w->start[v + 1]; e++) {
+      m->gnode[m->start[k + 1]] = w->gnode[e];
+      m->node[m->start[k + 1]] = w->node[e];
+      m->weight[m->start[k + 1]] = w->weight[e];
+      m->fixed[m->start[k + 1]++] = w->fixed[e];
+    }
+  }
+  for (PetscInt k = 0; k < 3 * m->ntriangle; k++)
+    m->triangle[k] = at[m->triangle[k]];
+  for (PetscInt k = 0; k < 2 * m->nedge; k++)
+    m->edge[k] = at[m->edge[k]];
+
+  /* where their owners have them */
+  for (PetscInt v = 0; v < w->nbody_vertex; v++)
+    index[v] = w->own[v] ? at[v] : 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, index, (PetscMPIInt)w->nbody_vertex, MPIU_INT, MPI_SUM,
+                             m->space->comm));
+  for (PetscInt k = 0; k < m->nbody_vertex; k++)
+    m->remote[k].index = index[m->number[k]];
+  PetscCall(PetscFree2(at, index));
+  PetscCall(SbContactSurfaceDestroy(mesh));
+  *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -313,6 +519,7 @@ PetscErrorCode SbContactSurfaceCreate(SbSpace s, PetscInt n, const SbFacet facet
   SbTriangles o = {0};
   SbContactSurface m;
   PetscInt nbody_edge = 0;
+  PetscInt *id;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&m));
@@ -330,14 +537,16 @@ PetscErrorCode SbContactSurfaceCreate(SbSpace s, PetscInt n, const SbFacet facet
     if (shape == CAPSULE)
       m->radius = obstacle->p[6];
   }
-  PetscCall(make_vertices(m, n, facet, o.nvert));
-  PetscCall(make_triangles(m, n, facet, o.ntri));
+  PetscCall(make_vertices(m, n, facet, o.nvert, &id));
+  PetscCall(make_triangles(m, n, facet, o.ntri, id));
+  PetscCall(PetscFree(id));
   PetscCall(PetscArraycpy(m->X + 3 * m->nbody_vertex, o.x, 3 * o.nvert));
   for (PetscInt i = 0; i < 3 * o.ntri; i++)
     m->triangle[3 * m->nbody_triangle + i] = m->nbody_vertex + o.tri[i];
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     m->part[v] = s->mesh->nbody;
     m->area[v] = 0.;
+    m->mine[v] = 0;
     m->own[v] = (uint8_t)!s->rank;
     m->driven[v] = 1;
   }
@@ -354,49 +563,58 @@ PetscErrorCode SbContactSurfaceCreate(SbSpace s, PetscInt n, const SbFacet facet
   }
   m->mean_edge /= (PetscReal)PetscMax(1, nbody_edge);
   m->size = SbBodySmallest(s->mesh->nbody, s->mesh->body);
+  for (PetscInt k = 0; k < 3 * m->nbody_vertex; k++)
+    m->farthest = PetscMax(m->farthest, PetscAbsReal(m->X[k]));
+
+  /* on several ranks what each keeps */
+  if (s->size > 1) {
+    PetscCall(keep_own(mesh));
+    m = *mesh;
+    m->halo = (PetscBool)!obstacle;
+  }
+  m->nkept_vertex = m->nbody_vertex;
+  m->nkept_triangle = m->nbody_triangle;
+  m->nkept_edge = m->nedge;
+  PetscCall(SbContactSurfaceShareOut(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbContactSurfaceMarkDriven(SbContactSurface m)
 {
   const SbSpace s = m->space;
-  const PetscInt n = m->start[m->nbody_vertex];
+  uint8_t *fixed; /* [Nnode] of all ranks */
 
   PetscFunctionBeginUser;
-  for (PetscInt j = 0; j < n; j++)
-    m->fixed[j] =
-      (uint8_t)(m->node[j] >= 0 && m->node[j] < s->nnode_owned ? s->fixed[m->node[j]] : 0);
+  PetscCall(PetscCalloc1(s->Nnode, &fixed));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    fixed[s->gnode_start + i] = (uint8_t)s->fixed[i];
   PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, m->fixed, (PetscMPIInt)n, MPI_UINT8_T, MPI_MAX, s->comm));
+    MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)s->Nnode, MPI_UINT8_T, MPI_MAX, s->comm));
   for (PetscInt v = 0; v < m->nbody_vertex; v++) {
     m->driven[v] = 1;
-    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++)
+    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+      m->fixed[j] = fixed[m->gnode[j]];
       if ((m->fixed[j] & 7) != 7)
         m->driven[v] = 0;
+    }
   }
+  PetscCall(PetscFree(fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbContactSurfaceGetPositions(SbContactSurface m, const PetscReal u[], PetscReal x[])
 {
-  PetscReal *mine = m->buffer;
-  PetscReal *all = m->buffer + 3 * m->nlocal;
-
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < m->nlocal; k++) {
-    const PetscInt v = m->local[k];
-
+  for (PetscInt v = 0; v < m->nkept_vertex; v++) {
+    if (!m->own[v])
+      continue;
     for (int i = 0; i < 3; i++)
-      mine[3 * k + i] = m->X[3 * v + i];
+      x[3 * v + i] = m->X[3 * v + i];
     for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++)
       for (int i = 0; i < 3; i++)
-        mine[3 * k + i] += m->weight[e] * u[3 * m->node[e] + i];
+        x[3 * v + i] += m->weight[e] * u[3 * m->node[e] + i];
   }
-  PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count,
-                              m->first, MPIU_REAL, m->space->comm));
-  for (PetscInt k = 0; k < m->nbody_vertex; k++)
-    for (int i = 0; i < 3; i++)
-      x[3 * m->order[k] + i] = all[3 * k + i];
+  PetscCall(SbContactSurfaceUpdate(m, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -407,13 +625,32 @@ PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *mesh)
   PetscFunctionBeginUser;
   if (!m)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree4(m->gnode, m->node, m->weight, m->fixed));
-  PetscCall(PetscFree4(m->part, m->id, m->X, m->area));
-  PetscCall(PetscFree3(m->mine, m->own, m->driven));
+  while (m->narray)
+    PetscCall(SbContactSurfaceDestroyArray(m, m->array[m->narray - 1]));
+  PetscCall(PetscFree(m->start));
+  PetscCall(PetscFree(m->gnode));
+  PetscCall(PetscFree(m->node));
+  PetscCall(PetscFree(m->column));
+  PetscCall(PetscFree(m->weight));
+  PetscCall(PetscFree(m->fixed));
+  PetscCall(PetscFree(m->part));
+  PetscCall(PetscFree(m->number));
+  PetscCall(PetscFree(m->remote));
+  PetscCall(PetscFree(m->X));
+  PetscCall(PetscFree(m->area));
+  PetscCall(PetscFree(m->mine));
+  PetscCall(PetscFree(m->own));
+  PetscCall(PetscFree(m->driven));
   PetscCall(PetscFree(m->triangle));
-  PetscCall(PetscFree2(m->edge, m->edge_area));
-  PetscCall(PetscFree2(m->count, m->first));
-  PetscCall(PetscFree3(m->order, m->buffer, m->start));
+  PetscCall(PetscFree(m->triangle_number));
+  PetscCall(PetscFree(m->edge));
+  PetscCall(PetscFree(m->edge_number));
+  PetscCall(PetscFree(m->edge_area));
+  PetscCall(PetscFree(m->group));
+  PetscCall(PetscFree(m->ngroup));
+  PetscCall(PetscFree(m->halo_number));
+  PetscCall(PetscFree(m->halo_vertex));
+  PetscCall(PetscSFDestroy(&m->sf));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

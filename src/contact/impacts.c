@@ -89,12 +89,14 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
   b->contact.bounce.dt = dt;
 
   /* free flight */
-  PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
+  PetscCall(PetscMalloc1(3 * s->nnode, &u1));
   for (PetscInt i = 0; i < 3 * s->nnode; i++)
     u1[i] = u0[i] + dt * v0[i];
   PetscCall(SbBarrierUpdate(b, u0));
   PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(PetscFree(u1));
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.other));
+  PetscCall(PetscMalloc1(3 * m->nvertex, &x));
 
   /* impacts on it */
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -117,11 +119,12 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
       continue;
     spring.stiffness = RIGID * of_pair(b, b->widths.mass, pair) / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact.bounce, 0., spring.approach);
+    spring.at.number = b->springs.n;
     PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
     b->springs.spring[b->springs.n++] = spring;
     b->springs.nbounce++;
   }
-  PetscCall(PetscFree2(u1, x));
+  PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,7 +137,7 @@ PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work)
   for (PetscInt i = b->springs.n - b->springs.nbounce; i < b->springs.n; i++) {
     const Spring *spring = &b->springs.spring[i];
 
-    if (b->surface->own[spring->at.v[0]])
+    if (counts_spring(b, spring))
       *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

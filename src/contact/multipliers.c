@@ -20,33 +20,38 @@
 #define STUCK 3          /* ... updates; else it settles no further */
 #define LOOSE 1e-2       /* then the tolerance without a warning */
 
-/* The order of pairs: those with a side of the obstacle last, then by kind and vertices. */
-static int compare(const SbContactPair *p, const SbContactPair *q)
+static void find_key(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY])
 {
-  if (p->side != q->side)
-    return p->side ? 1 : -1;
-  if (p->kind != q->kind)
-    return p->kind < q->kind ? -1 : 1;
+  key[0] = pair->side;
+  key[1] = pair->kind;
   for (int k = 0; k < 4; k++)
-    if (p->v[k] != q->v[k])
-      return p->v[k] < q->v[k] ? -1 : 1;
+    key[2 + k] = SbContactNumber(b->surface, pair->v[k]);
+}
+
+static int compare(const PetscInt p[PAIR_KEY], const PetscInt q[PAIR_KEY])
+{
+  for (int k = 0; k < PAIR_KEY; k++)
+    if (p[k] != q[k])
+      return p[k] < q[k] ? -1 : 1;
   return 0;
 }
 
 static int by_pair(const void *p, const void *q)
 {
-  return compare(&((const PairForce *)p)->pair, &((const PairForce *)q)->pair);
+  return compare(((const PairForce *)p)->key, ((const PairForce *)q)->key);
 }
 
 PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
 {
   const Multipliers *m = &b->multipliers;
+  PetscInt key[PAIR_KEY];
   PetscInt low = 0;
   PetscInt high = m->n;
 
+  find_key(b, pair, key);
   while (low < high) {
     const PetscInt middle = (low + high) / 2;
-    const int order = compare(pair, &m->pair[middle].pair);
+    const int order = compare(key, m->pair[middle].key);
 
     if (!order)
       return m->pair[middle].force;
@@ -67,8 +72,7 @@ static PetscErrorCode share(Barrier *b, PetscInt n, const PairForce mine[])
   PetscInt total;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    SbAllgatherv(b->surface->space->comm, MPI_BYTE, n * size, mine, &total, &all, NULL));
+  PetscCall(SbAllgatherv(b->surface->space->comm, MPI_BYTE, n * size, mine, &total, &all, NULL));
   m->n = total / size;
   PetscCall(SbReserve(m->n, sizeof(*all), &m->size, &m->pair));
   PetscCall(PetscArraycpy(m->pair, all, m->n));
@@ -102,13 +106,15 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
       continue;
     wrong = PetscAbsReal(d[1] + a->force) / (law.stiffness * a->pair.area * law.width);
     worst = PetscMax(worst, wrong);
-    if (d[1] < 0.)
-      mine[n++] = (PairForce){a->pair, -d[1]};
+    if (d[1] >= 0.)
+      continue;
+    find_key(b, &a->pair, mine[n].key);
+    mine[n++].force = -d[1];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, comm));
-  PetscCall(PetscInfo(NULL,
-                      "multipliers, update %" PetscInt_FMT ": gaps are wrong by %g of their width\n",
-                      m->updates, (double)worst));
+  PetscCall(
+    PetscInfo(NULL, "multipliers, update %" PetscInt_FMT ": gaps are wrong by %g of their width\n",
+              m->updates, (double)worst));
   if (!m->updates || worst < FALLS * m->least) {
     m->least = worst;
     m->stuck = 0;

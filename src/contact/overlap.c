@@ -13,8 +13,10 @@
   collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the
   inner part counts as inside. The depth is the distance to the surface along the direction.
 
-  For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all
-  of it.
+  For a half-space, bowl, sphere and capsule, they follow from the distance.
+
+  Each rank tests its own edges against the triangles near them. Only if some rank finds a
+  penetration is the whole surface gathered, and all ranks compute all of it.
 */
 #include "pairs.h"
 #include "sbgeometry.h"
@@ -263,20 +265,6 @@ static PetscErrorCode add_inside(SbContactSurface m, const PetscReal x[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactSurfaceNormals(SbContactSurface m, const PetscReal x[], PetscReal normal[])
-{
-  for (PetscInt k = 0; k < 3 * m->nvertex; k++)
-    normal[k] = 0.;
-  for (PetscInt t = 0; t < m->ntriangle; t++) {
-    const PetscInt *v = m->triangle + 3 * t;
-    PetscReal n[3];
-
-    (void)SbContactTriangleArea(x, v, n);
-    for (int k = 0; k < 9; k++)
-      normal[3 * v[k / 3] + k % 3] += n[k % 3];
-  }
-}
-
 /* Propagates directions from the n vertices of list[], layer by layer along edges that intersect
    nothing. */
 static void spread_ways(SbContactSurface m, Ways *w, PetscInt n, PetscInt list[])
@@ -332,7 +320,7 @@ static PetscErrorCode begin_search(SbContactSurface m, const PetscReal x[], Sear
                          m->nvertex, &w->depth, m->nvertex, &w->sum, m->nvertex, &w->layer,
                          m->nedge, &w->through));
   PetscCall(PetscMalloc1(3 * m->nvertex, &w->normal));
-  SbContactSurfaceNormals(m, x, w->normal);
+  PetscCall(SbContactSurfaceNormals(m, x, w->normal));
   for (PetscInt v = 0; v < m->nvertex; v++) {
     (void)SbNormalise(w->normal + 3 * v);
     w->in[v] = -1;
@@ -535,7 +523,7 @@ static PetscErrorCode add_behind(SbContactSurface m, const PetscReal x[], const 
     for (int k = 0; k < 4; k++) {
       if (d.weight[k] == 0. || (pair->v[k] < m->nbody_vertex) != !pass)
         continue;
-      o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
+      o->near[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
       point.v[point.n] = pair->v[k];
       point.weight[point.n++] = sign * d.weight[k];
     }
@@ -582,16 +570,13 @@ static PetscErrorCode find_behind(SbContactSurface m, const PetscReal x[], SbCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
-                                    SbContactOverlap *o)
+/* The same of the whole surface, on every rank. */
+static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], PetscBool inside,
+                                   SbContactOverlap *o)
 {
   PetscInt n, *hit;
 
   PetscFunctionBeginUser;
-  o->n = 0;
-  if (!o->near)
-    PetscCall(PetscMalloc1(m->nvertex, &o->near));
-  PetscCall(PetscArrayzero(o->near, m->nvertex));
   PetscCall(find_crossings(m, x, &n, &hit));
 
   /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every
@@ -631,9 +616,11 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
     PetscCall(PetscArraycpy(o->place, x + 3 * v, 3));
   }
   PetscCall(PetscFree(hit));
-  o->deepest = 0.;
-  for (PetscInt i = 0; i < o->n; i++)
+  o->npoint = o->n;
+  for (PetscInt i = 0; i < o->n; i++) {
+    o->point[i].number = i;
     o->deepest = PetscMax(o->deepest, o->point[i].depth);
+  }
 
   /* vertices next to the overlap may enter while it separates */
   for (PetscInt e = 0; e < m->nedge; e++) {
@@ -643,6 +630,99 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
       if (o->near[v[k]] > SB_OVERLAP_ADJACENT && !o->near[v[1 - k]])
         o->near[v[1 - k]] = SB_OVERLAP_ADJACENT;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether an edge of this rank intersects a triangle, or a feature penetrates a round or one-sided
+   obstacle, on some rank. */
+static PetscErrorCode is_crossed(SbContactSurface m, const PetscReal x[], SbContactOverlap *o,
+                                 PetscBool *found)
+{
+  SbBoxTree tree;
+  PetscInt t;
+
+  PetscFunctionBeginUser;
+  *found = PETSC_FALSE;
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
+  for (PetscInt e = 0; e < m->nkept_edge && !*found; e++) {
+    PetscReal around[6];
+    SbBoxNearest query;
+
+    SbBoxClear(around);
+    for (int k = 0; k < 2; k++)
+      SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
+    for (SbBoxNearestBegin(&tree, around, 0, &query); !*found && SbBoxNearestNext(&query, &t);)
+      *found = goes_through(m, x, e, t);
+  }
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(find_behind(m, x, o));
+  *found = (PetscBool)(*found || o->n);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found, 1, SB_MPI_BOOL, MPI_LOR, m->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of the whole surface by the numbers here: those of which this rank has all vertices,
+   one of them with a node of it. */
+static PetscErrorCode take_points(SbContactSurface m, SbContactOverlap *o)
+{
+  PetscInt n = 0;
+  PetscInt *number, *v;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(5 * o->n, &number, 5 * o->n, &v));
+  for (PetscInt i = 0; i < o->n; i++)
+    for (PetscInt k = 0; k < 5; k++)
+      number[5 * i + k] = o->point[i].v[k < o->point[i].n ? k : 0];
+  PetscCall(SbContactSurfaceHold(m, 5 * o->n, number, v));
+  for (PetscInt i = 0; i < o->n; i++) {
+    PetscBool all = PETSC_TRUE;
+    PetscBool mine = PETSC_FALSE;
+
+    for (PetscInt k = 0; k < o->point[i].n; k++) {
+      all = (PetscBool)(all && v[5 * i + k] >= 0);
+      mine = (PetscBool)(mine || (all && m->mine[v[5 * i + k]]));
+    }
+    if (!all || !mine)
+      continue;
+    o->point[n] = o->point[i];
+    PetscCall(PetscArraycpy(o->point[n++].v, v + 5 * i, 5));
+  }
+  o->n = n;
+  PetscCall(PetscFree2(number, v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
+                                    SbContactOverlap *o)
+{
+  const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
+  PetscReal *const *follow = SbContactSurfaceFollow(m, x);
+  SbContactSurface whole;
+  PetscReal *y;
+  PetscBool found;
+
+  PetscFunctionBeginUser;
+  o->n = o->npoint = o->ncrossing = 0;
+  o->deepest = 0.;
+  if (!o->near)
+    PetscCall(PetscMalloc1(N, &o->near));
+  PetscCall(PetscArrayzero(o->near, N));
+  if (!m->sf) {
+    PetscCall(find_overlap(m, x, inside, o));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbContactSurfaceReach(m, 0., x, x));
+  x = m->halo ? *follow : x;
+  PetscCall(is_crossed(m, x, o, &found));
+  o->n = 0;
+  PetscCall(PetscArrayzero(o->near, N));
+  if (!found && !inside)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactSurfaceGather(m, x, &whole, &y));
+  PetscCall(find_overlap(whole, y, inside, o));
+  PetscCall(PetscFree(y));
+  PetscCall(SbContactSurfaceDestroy(&whole));
+  PetscCall(take_points(m, o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -678,14 +758,16 @@ PetscErrorCode SbContactSurfaceIsInside(SbContactSurface m, const PetscReal x[],
                              m->space->comm));
 
   /* winding number of each surface about it */
-  for (PetscInt t = 0; t < m->nbody_triangle; t++) {
+  for (PetscInt t = 0; t < m->nkept_triangle; t++) {
     const PetscInt *v = m->triangle + 3 * t;
     const PetscInt to = m->part[v[0]];
 
     for (PetscInt b = 0; b < nbody; b++)
-      if (b != to)
+      if (b != to && m->own[v[0]])
         winding[nbody * b + to] += SbTriangleSolidAngle(x, v, point + 3 * b) / (4. * PETSC_PI);
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, winding, (PetscMPIInt)(nbody * nbody), MPIU_REAL,
+                             MPI_SUM, m->space->comm));
   for (PetscInt k = 0; k < nbody * nbody && !*found; k++) {
     if (PetscAbsReal(winding[k]) < 0.5)
       continue;

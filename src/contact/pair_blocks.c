@@ -63,7 +63,7 @@ PetscErrorCode SbContactBlocksToNodes(SbContactSurface m, SbContactBlocks *b, Sb
   PetscInt n = 0;
   PetscInt size = 0;
   struct {
-    PetscInt column;
+    PetscInt column, gnode;
     PetscReal H[9];
   } *T = NULL;
 
@@ -73,7 +73,7 @@ PetscErrorCode SbContactBlocksToNodes(SbContactSurface m, SbContactBlocks *b, Sb
 
   /* blocks by their rows, of vertices that have nodes here: twice the number, odd for the
      transpose */
-  PetscCall(PetscCalloc1(s->Nnode, &at));
+  PetscCall(PetscCalloc1(m->column ? m->ncolumn : s->Nnode, &at));
   PetscCall(
     PetscMalloc4(2 * b->n, &row_of, nv + 1, &start, m->start[nv], &key, m->start[nv], &vertex));
   for (PetscInt k = 0; k < 2 * b->n; k++) {
@@ -92,13 +92,14 @@ PetscErrorCode SbContactBlocksToNodes(SbContactSurface m, SbContactBlocks *b, Sb
 
       PetscCall(SbReserve(n + m->start[w + 1] - m->start[w], sizeof(*T), &size, &T));
       for (PetscInt j = m->start[w]; j < m->start[w + 1]; j++) {
-        const PetscInt g = m->gnode[j];
+        const PetscInt g = m->column ? m->column[j] : m->gnode[j];
 
         if (m->fixed[j] == 7)
           continue;
         if (at[g] < start[v] || at[g] >= n || T[at[g]].column != g) {
           at[g] = n;
           T[n].column = g;
+          T[n].gnode = m->gnode[j];
           for (int e = 0; e < 9; e++)
             T[n].H[e] = 0.;
           n++;
@@ -137,9 +138,9 @@ PetscErrorCode SbContactBlocksToNodes(SbContactSurface m, SbContactBlocks *b, Sb
         const PetscInt g = T[k].column;
         PetscReal *sum;
 
-        if (at[g] < row || at[g] >= to->n || to->block[at[g]].v[1] != g) {
+        if (at[g] < row || at[g] >= to->n || to->block[at[g]].v[1] != T[k].gnode) {
           at[g] = to->n;
-          to->block[to->n++] = (SbBlock){.v = {i, g}};
+          to->block[to->n++] = (SbBlock){.v = {i, T[k].gnode}};
         }
         sum = to->block[at[g]].H;
         for (int e = 0; e < 9; e++)

@@ -71,6 +71,7 @@ static const int corners[] = {1, 3, 2};
 struct SbContactFeatures {
   PetscInt n, *item;   /* [n] numbers in the mesh */
   PetscReal (*box)[6]; /* [n] */
+  PetscInt room[2];
   SbBoxTree tree;
 };
 
@@ -113,7 +114,7 @@ static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
   int near[2] = {0, 0};
 
   for (int k = 0; p->near && k < 4; k++)
-    near[k >= split] = PetscMax(near[k >= split], p->near[pair->v[k]]);
+    near[k >= split] = PetscMax(near[k >= split], p->near[SbContactNumber(p->mesh, pair->v[k])]);
   if (!near[0] || !near[1])
     return PETSC_FALSE;
   return (PetscBool)(split == 1 ? near[0] == SB_OVERLAP_INSIDE
@@ -125,8 +126,10 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
 {
   const SbContactSurface m = p->mesh;
   const PetscBool edges = (PetscBool)(kind == SB_PAIR_EDGE_EDGE);
-  const PetscInt low = PetscMin(i, j);
-  const PetscInt high = PetscMax(i, j);
+  const PetscBool turned =
+    (PetscBool)(m->edge_number && edges ? m->edge_number[i] > m->edge_number[j] : i > j);
+  const PetscInt low = turned ? j : i;
+  const PetscInt high = turned ? i : j;
   const PetscInt *a = edges ? m->edge + 2 * low : &i;
   const PetscInt *b = edges ? m->edge + 2 * high : m->triangle + 3 * j;
   SbContactPair pair = {.kind = kind,
@@ -164,11 +167,38 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Features by kind, those of this rank first; `all`, or only those of others. */
+static PetscErrorCode list_features(SbContactPairs p, PetscBool all)
+{
+  const SbContactSurface m = p->mesh;
+  const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle,
+                            m->nedge};
+
+  PetscFunctionBeginUser;
+  for (int k = all ? 0 : OTHERS; k < 2 * OTHERS; k++) {
+    struct SbContactFeatures *f = &p->features[k];
+
+    f->n = 0;
+    for (PetscInt i = 0; i < count[k % OTHERS]; i++) {
+      PetscInt own;
+      const PetscInt *v = vertices_of(m, k % OTHERS, i, &own);
+      PetscBool mine = PETSC_FALSE;
+
+      for (int a = 0; a < corners[k % OTHERS]; a++)
+        mine = (PetscBool)(mine || m->mine[v[a]]);
+      if (mine != (PetscBool)(k < OTHERS))
+        continue;
+      PetscCall(SbReserve(f->n + 1, sizeof(*f->item), &f->room[0], &f->item));
+      f->item[f->n++] = i;
+    }
+    PetscCall(SbReserve(f->n, sizeof(*f->box), &f->room[1], &f->box));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbContactSearch search,
                                     SbContactPairs *pairs)
 {
-  const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle,
-                            m->nedge};
   SbContactPairs p;
 
   PetscFunctionBeginUser;
@@ -180,27 +210,20 @@ PetscErrorCode SbContactPairsCreate(SbContactSurface m, PetscReal reach, SbConta
   p->margin = PetscMax(2. * reach, MARGIN * m->mean_edge);
   if (search == SB_SEARCH_HASH)
     PetscCall(SbSpatialHashCreate(CELL * (m->mean_edge + 2. * p->margin + reach), &p->hash));
-  PetscCall(
-    PetscMalloc3(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter, 2 * m->nvertex, &p->first));
-
-  /* features by kind, those of this rank first */
+  PetscCall(SbContactSurfaceCreateArray(m, &p->shorter));
   PetscCall(PetscCalloc1(6, &p->features));
-  for (int k = 0; k < 6; k++) {
-    struct SbContactFeatures *f = &p->features[k];
-
-    PetscCall(PetscMalloc2(count[k % OTHERS], &f->item, count[k % OTHERS], &f->box));
-    for (PetscInt i = 0; i < count[k % OTHERS]; i++) {
-      PetscInt own;
-      const PetscInt *v = vertices_of(m, k % OTHERS, i, &own);
-      PetscBool mine = PETSC_FALSE;
-
-      for (int a = 0; a < corners[k % OTHERS]; a++)
-        mine = (PetscBool)(mine || m->mine[v[a]]);
-      if (mine == (PetscBool)(k < OTHERS))
-        f->item[f->n++] = i;
-    }
-  }
+  PetscCall(list_features(p, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbContactPairsForget(SbContactPairs p)
+{
+  SbContactSurface m = p->mesh;
+
+  if (m->nbody_vertex - m->nkept_vertex <= 2 * m->nneeded)
+    return;
+  m->drop = PETSC_TRUE;
+  p->known = PETSC_FALSE;
 }
 
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
@@ -212,11 +235,15 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
     struct SbContactFeatures *f = &(*pairs)->features[k];
 
     PetscCall(SbBoxTreeDestroy(&f->tree));
-    PetscCall(PetscFree2(f->item, f->box));
+    PetscCall(PetscFree(f->item));
+    PetscCall(PetscFree(f->box));
   }
   PetscCall(SbSpatialHashDestroy(&(*pairs)->hash));
   PetscCall(PetscFree((*pairs)->features));
-  PetscCall(PetscFree3((*pairs)->box, (*pairs)->shorter, (*pairs)->first));
+  PetscCall(SbContactSurfaceDestroyArray((*pairs)->mesh, &(*pairs)->shorter));
+  PetscCall(PetscFree((*pairs)->box));
+  PetscCall(PetscFree((*pairs)->first));
+  PetscCall(PetscFree((*pairs)->place));
   PetscCall(PetscFree((*pairs)->other));
   PetscCall(PetscFree((*pairs)->pair));
   PetscCall(PetscFree(*pairs));
@@ -226,7 +253,7 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
 /* Whether all vertices stay where the pairs were searched for. */
 static PetscBool still_within(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
-  for (PetscInt v = 0; v < p->mesh->nvertex; v++) {
+  for (PetscInt v = 0; v < p->nbox; v++) {
     const PetscReal *box = p->box + 6 * v;
     const PetscReal *a = x0 + 3 * v;
     const PetscReal *b = x1 + 3 * v;
@@ -290,7 +317,9 @@ static PetscErrorCode search_trees(SbContactPairs p)
   for (int k = 0; k < 6; k++) {
     struct SbContactFeatures *f = &p->features[k];
 
-    if (p->nsearch == 1)
+    if (p->mesh->halo && k >= OTHERS)
+      PetscCall(SbBoxTreeDestroy(&f->tree));
+    if (p->nsearch == 1 || (p->mesh->halo && k >= OTHERS))
       PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
     else
       PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
@@ -312,25 +341,47 @@ static PetscErrorCode search_trees(SbContactPairs p)
 }
 
 /* Whether pair p comes before q of the same kind and first vertex. */
-static inline PetscBool before(const SbContactPair *p, const SbContactPair *q)
+static inline PetscBool before(const PetscInt place[], const SbContactPair *p,
+                               const SbContactPair *q)
 {
   for (int k = 1; k < 4; k++)
     if (p->v[k] != q->v[k])
-      return (PetscBool)(p->v[k] < q->v[k]);
+      return (PetscBool)(place[p->v[k]] < place[q->v[k]]);
   return PETSC_FALSE;
 }
 
-/* Orders the pairs by kind, then by vertices: by counting for the first one, which leaves a few for
-   each, by insertion for the others. */
+/* The places of the vertices in the order of their numbers: kept ones are in it, those of other
+   ranks by halo_number[], those of the obstacle are last. */
+static void find_places(SbContactSurface m, PetscInt place[])
+{
+  const PetscInt nhalo = m->number ? m->nbody_vertex - m->nkept_vertex : 0;
+  PetscInt h = 0;
+
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    if (nhalo && v >= m->nkept_vertex)
+      break;
+    for (; h < nhalo && m->halo_number[h] < m->number[v]; h++)
+      place[m->halo_vertex[h]] = v + h;
+    place[v] = v + h;
+  }
+  for (; h < nhalo; h++)
+    place[m->halo_vertex[h]] = m->nkept_vertex + h;
+}
+
+/* Orders the pairs by kind, then by numbers of vertices: by counting for the first one, which
+   leaves a few for each, by insertion for the others. */
 static PetscErrorCode order_pairs(SbContactPairs p)
 {
   const PetscInt nvertex = p->mesh->nvertex;
   PetscInt n = 0;
+  PetscInt *place;
 
   PetscFunctionBeginUser;
+  find_places(p->mesh, p->place);
+  place = p->place;
   PetscCall(PetscArrayzero(p->first, 2 * nvertex));
   for (PetscInt i = 0; i < p->n; i++)
-    p->first[(p->pair[i].kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + p->pair[i].v[0]]++;
+    p->first[(p->pair[i].kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + place[p->pair[i].v[0]]]++;
   for (PetscInt k = 0; k < 2 * nvertex; k++) {
     n += p->first[k];
     p->first[k] = n - p->first[k];
@@ -339,14 +390,15 @@ static PetscErrorCode order_pairs(SbContactPairs p)
   for (PetscInt i = 0; i < p->n; i++) {
     const SbContactPair *pair = &p->pair[i];
 
-    p->other[p->first[(pair->kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + pair->v[0]]++] = *pair;
+    p->other[p->first[(pair->kind == SB_PAIR_EDGE_EDGE ? nvertex : 0) + place[pair->v[0]]]++] =
+      *pair;
   }
   for (PetscInt i = 1; i < p->n; i++) {
     const SbContactPair pair = p->other[i];
     PetscInt k = i;
 
     for (; k > 0 && p->other[k - 1].kind == pair.kind && p->other[k - 1].v[0] == pair.v[0] &&
-           before(&pair, &p->other[k - 1]);
+           before(place, &pair, &p->other[k - 1]);
          k--)
       p->other[k] = p->other[k - 1];
     p->other[k] = pair;
@@ -358,16 +410,35 @@ static PetscErrorCode order_pairs(SbContactPairs p)
 PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
   const SbContactSurface m = p->mesh;
+  PetscReal *const *follow[2] = {SbContactSurfaceFollow(m, x0), SbContactSurfaceFollow(m, x1)};
   PetscInt count[3] = {0, 0, 0};
+  PetscBool valid = (PetscBool)(p->known && still_within(p, x0, x1));
 
   PetscFunctionBeginUser;
   p->full = PETSC_FALSE;
-  if (p->known && still_within(p, x0, x1))
+  if (m->halo)
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &valid, 1, SB_MPI_BOOL, MPI_LAND, m->space->comm));
+  if (valid)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   p->known = PETSC_TRUE;
   p->nsearch++;
   p->n = p->ncandidate = 0;
+
+  /* what may meet this rank's features, with boxes around vertices */
+  if (m->halo) {
+    PetscCall(SbContactSurfaceReach(m, p->margin + 0.5 * p->reach, x0, x1));
+    PetscCall(list_features(p, PETSC_FALSE));
+    x0 = *follow[0];
+    x1 = *follow[1];
+  }
+  PetscCall(SbReserve(6 * m->nvertex, sizeof(*p->box), &p->box_room, &p->box));
+  if (2 * m->nvertex > p->first_room)
+    PetscCall(PetscFree(p->place));
+  PetscCall(SbReserve(2 * m->nvertex, sizeof(*p->first), &p->first_room, &p->first));
+  if (!p->place)
+    PetscCall(PetscMalloc1(p->first_room, &p->place));
+  p->nbox = m->nvertex;
   for (PetscInt v = 0; v < m->nvertex; v++) {
     PetscReal *box = p->box + 6 * v;
 
@@ -404,11 +475,12 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     PetscCall(order_pairs(p));
   if (p->hash)
     SbSpatialHashCount(p->hash, count);
-  PetscCall(PetscInfo(NULL,
-                      "search for pairs: %" PetscInt_FMT " boxes in %" PetscInt_FMT
-                      " entries of the hash; %" PetscInt_FMT " pairs of boxes meet, %" PetscInt_FMT
-                      " are kept\n",
-                      count[0], count[1], p->ncandidate, p->n));
+  PetscCall(PetscInfo(
+    NULL,
+    "search for pairs: %" PetscInt_FMT " boxes in %" PetscInt_FMT
+    " entries of the hash; %" PetscInt_FMT " pairs of boxes meet, %" PetscInt_FMT
+    " are kept; %" PetscInt_FMT " vertices held, %" PetscInt_FMT " of other ranks\n",
+    count[0], count[1], p->ncandidate, p->n, m->nbody_vertex, m->nbody_vertex - m->nkept_vertex));
 
   /* a half-space or a bowl: vertices whose boxes come within the reach */
   for (PetscInt v = 0; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v++) {
@@ -418,7 +490,8 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     PetscReal away;
     SbDistance g;
 
-    if (!m->mine[v] || m->driven[v] || (p->near && p->near[v] == SB_OVERLAP_INSIDE))
+    if (!m->mine[v] || m->driven[v] ||
+        (p->near && p->near[SbContactNumber(m, v)] == SB_OVERLAP_INSIDE))
       continue;
     for (int i = 0; i < 3; i++)
       way += PetscSqr(x1[3 * v + i] - x0[3 * v + i] - x1[3 * m->nbody_vertex + i] +
@@ -430,6 +503,8 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
     PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));
     p->pair[p->n++] = pair;
   }
+  if (m->halo)
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->full, 1, SB_MPI_BOOL, MPI_LOR, m->space->comm));
   if (p->full)
     p->known = PETSC_FALSE;
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
@@ -489,23 +564,30 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
                                      PetscReal *part)
 {
   const SbContactSurface m = p->mesh;
+  PetscReal *const *follow[2] = {SbContactSurfaceFollow(m, x0), SbContactSurfaceFollow(m, x1)};
+  const PetscInt nvertex =
+    m->nvertex - m->nbody_vertex + PetscMax(m->nbody_vertex, m->Nbody_vertex);
   PetscReal whole = 1.;
   PetscReal safe;
 
   PetscFunctionBeginUser;
 
   /* halve the motion until it has few enough pairs */
-  p->most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
+  p->most = PetscMin(CROWD * (PetscInt64)(nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
   PetscCall(SbContactPairsFind(p, x0, x1));
   while (p->full) {
     whole *= 0.5;
+    x0 = follow[0] ? *follow[0] : x0;
+    x1 = follow[1] ? *follow[1] : x1;
     for (PetscInt k = 0; k < 3 * m->nvertex; k++)
       p->shorter[k] = x0[k] + 0.5 * (x1[k] - x0[k]);
-    x1 = p->shorter;
+    follow[1] = &p->shorter;
     if (whole <= PETSC_SQRT_MACHINE_EPSILON)
       p->most = PETSC_MAX_INT;
-    PetscCall(SbContactPairsFind(p, x0, x1));
+    PetscCall(SbContactPairsFind(p, x0, p->shorter));
   }
+  x0 = follow[0] ? *follow[0] : x0;
+  x1 = follow[1] ? *follow[1] : x1;
   p->most = PETSC_MAX_INT;
 
   *part = 1.;

@@ -2,46 +2,66 @@
   pairs.h - surfaces in contact: vertices, edges and triangles of bodies and of an obstacle, contact
   pairs, continuous collision detection, penetrations, the barrier potential of a pair.
 
-  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every
-  element. A rank evaluates every pair that has one of its own nodes: forces on them are complete
-  without communication, and summed in an order that no partition changes.
+  A rank holds the features (vertices, edges, triangles) that have a node of it, and those of other
+  ranks that may meet them; a vertex of a body is a weighted mean of nodes, for every element. It
+  evaluates every pair that has one of its own nodes: forces on them are complete without
+  communication, and summed in an order that no partition changes.
 */
 #pragma once
 #include "obstacle.h"
 #include "sbsolver.h"
 
 typedef struct _p_SbContactSurface *SbContactSurface;
+#define SB_CONTACT_ARRAYS 16 /* most arrays of a surface */
 struct _p_SbContactSurface {
-  SbSpace space;                  /* borrowed */
-  PetscBool self;                 /* self-contact, too; set by the caller, false at first */
-  PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
+  SbSpace space;  /* borrowed */
+  PetscBool self; /* self-contact, too; set by the caller, false at first */
+  /* what this rank holds. Kept features come first, in the order of their numbers, then those of
+     other ranks, last the obstacle's; of vertices: a number stays the same within a step */
+  PetscInt nvertex, nbody_vertex;
   PetscInt ntriangle, nbody_triangle, nedge;
-  PetscInt *start,
-    *gnode;       /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those below,
-                              global numbers ascending */
-  PetscInt *node; /* the same as local nodes, -1: not known here */
+  PetscInt nkept_vertex, nkept_triangle, nkept_edge; /* without the obstacle's; all its edges */
+  PetscInt *start, *gnode;   /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those
+                              below, global numbers ascending */
+  PetscInt *node;            /* the same as local nodes, -1: not known here */
+  PetscInt *column, ncolumn; /* the same by numbers 0 to ncolumn - 1; NULL: gnode below Nnode */
   PetscReal *weight;
-  uint8_t *fixed; /* bit c: component c of the node is prescribed; SbContactSurfaceMarkDriven() */
-  PetscInt *part; /* [nvertex] body, nbody: the obstacle */
-  PetscInt *id;   /* [nbody_vertex] number in the mesh that no partition changes */
-  uint8_t *mine;  /* [nvertex] some node is owned here */
-  uint8_t *own;   /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
-  uint8_t *driven;    /* [nvertex] its motion is prescribed in all directions */
-  PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
-  PetscInt *edge;     /* [nedge][2] */
-  PetscReal *X;       /* [nvertex][3] at rest, m; obstacle: its rest frame */
+  uint8_t *fixed;   /* bit c: component c of the node is prescribed; SbContactSurfaceMarkDriven() */
+  PetscInt *part;   /* [nvertex] body, nbody: the obstacle */
+  PetscInt *number; /* [nvertex] among those of all ranks, no partition changes it; NULL: as here */
+  PetscSFNode *remote; /* [nbody_vertex] rank that owns it, number there */
+  uint8_t *mine;       /* [nvertex] some node is owned here */
+  uint8_t *own; /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
+  uint8_t *driven;           /* [nvertex] its motion is prescribed in all directions */
+  PetscInt *triangle;        /* [ntriangle][3] counter-clockwise seen from outside */
+  PetscInt *edge;            /* [nedge][2], the lower number first */
+  PetscInt *triangle_number; /* [ntriangle], as number[] */
+  PetscInt *edge_number;     /* [nedge] */
+  PetscReal *X;              /* [nvertex][3] at rest, m; obstacle: its rest frame */
   PetscReal *area,
-    *edge_area;        /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
-  PetscReal radius;    /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side; /* half-space or bowl, whose vertices are described there */
+    *edge_area;          /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscReal radius;      /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side;   /* half-space or bowl, whose vertices are described there */
+  PetscInt Nbody_vertex; /* of all ranks */
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
-  /* of SbContactSurfaceGetPositions() */
-  PetscInt nlocal, *local;    /* own vertices of bodies, in order[] */
-  PetscMPIInt *count, *first; /* [ranks] */
-  PetscInt *order;            /* [nbody_vertex] vertex of each received one */
-  PetscReal *buffer;          /* [2][nbody_vertex][3] */
+  PetscReal farthest;            /* largest coordinate at rest, m */
+  /* several ranks (contact_halo.c) */
+  PetscBool halo;   /* features of other ranks are held */
+  PetscBool drop;   /* the next search drops vertices that are no longer near */
+  PetscInt nneeded; /* of other ranks in the last search */
+  PetscSF sf;       /* from own vertices to those that others hold; NULL: one rank */
+  PetscInt *halo_number, *halo_vertex; /* [nbody_vertex - nkept_vertex] of other ranks, ascending */
+  PetscInt *group;                     /* [nkept_triangle] group of neighbours of one body */
+  PetscMPIInt *ngroup;                 /* [ranks] */
+  PetscInt room[4];                    /* of vertices, nodes of vertices, triangles, edges */
+  int narray;
+  PetscReal **array[SB_CONTACT_ARRAYS]; /* of SbContactSurfaceCreateArray() */
 };
+static inline PetscInt SbContactNumber(SbContactSurface mesh, PetscInt v)
+{
+  return mesh->number ? mesh->number[v] : v;
+}
 
 /* The surface of the facets of SbEffectFacets() and of an obstacle that is set up (NULL: none).
    MarkDriven, once all effects are set up: marks prescribed unknowns. Collective. */
@@ -49,10 +69,53 @@ PetscErrorCode SbContactSurfaceCreate(SbSpace space, PetscInt n, const SbFacet f
                                       SbObstacle obstacle, SbContactSurface *mesh);
 PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *mesh);
 PetscErrorCode SbContactSurfaceMarkDriven(SbContactSurface mesh);
+/* An array x[nvertex][3], zeros, that grows with the vertices that this rank holds, *x moves then;
+   released with the surface or by Destroy. Not collective. */
+PetscErrorCode SbContactSurfaceCreateArray(SbContactSurface mesh, PetscReal **x);
+PetscErrorCode SbContactSurfaceDestroyArray(SbContactSurface mesh, PetscReal **x);
 /* x[nvertex][3] of the bodies' vertices from local displacements u (ghosts up to date), m.
    Collective. */
 PetscErrorCode SbContactSurfaceGetPositions(SbContactSurface mesh, const PetscReal u[],
                                             PetscReal x[]);
+/* x[nvertex][3] of bodies' vertices from their owners. Sum: x[nvertex][n], sums over all ranks that
+   hold a vertex. Collective. */
+PetscErrorCode SbContactSurfaceUpdate(SbContactSurface mesh, PetscReal x[]);
+PetscErrorCode SbContactSurfaceSum(SbContactSurface mesh, PetscMPIInt n, PetscReal x[]);
+/* Outward normals of all vertices at x, of twice the area of the triangles around, m^2.
+   Collective. */
+PetscErrorCode SbContactSurfaceNormals(SbContactSurface mesh, const PetscReal x[],
+                                       PetscReal normal[]);
+/*
+  SbContactSurfaceReach - holds the features of other ranks that may meet those of this one on the
+  linear motion of the vertices from x0 to x1, grown by `grown` on each side, m, in place of those
+  held so far; vertices stay.
+
+  Collective. x0 and x1 are of SbContactSurfaceCreateArray(), and may move.
+*/
+PetscErrorCode SbContactSurfaceReach(SbContactSurface mesh, PetscReal grown, const PetscReal x0[],
+                                     const PetscReal x1[]);
+/* The whole surface on every rank with positions y[nvertex][3] of x[nvertex][3], without nodes of
+   vertices. The caller frees both. Collective. */
+PetscErrorCode SbContactSurfaceGather(SbContactSurface mesh, const PetscReal x[],
+                                      SbContactSurface *whole, PetscReal **y);
+/* Holds the vertices with these numbers, the same on all ranks; returns v[n], what they are here.
+   Collective. */
+PetscErrorCode SbContactSurfaceHold(SbContactSurface mesh, PetscInt n, const PetscInt number[],
+                                    PetscInt v[]);
+/* The address of an array of SbContactSurfaceCreateArray(), which follows it; NULL: another one. */
+static inline PetscReal *const *SbContactSurfaceFollow(SbContactSurface mesh, const PetscReal x[])
+{
+  for (int i = 0; i < mesh->narray; i++)
+    if (*mesh->array[i] == x)
+      return mesh->array[i];
+  return NULL;
+}
+/* Of contact_surface.c and contact_halo.c: room for features; nodes of vertex v; where groups, the
+   star forest and columns are set up. */
+PetscErrorCode SbContactSurfaceRoom(SbContactSurface mesh, PetscInt nvertex, PetscInt nentry,
+                                    PetscInt ntriangle, PetscInt nedge);
+PetscErrorCode SbContactSurfaceFindNodes(SbContactSurface mesh, PetscInt v);
+PetscErrorCode SbContactSurfaceShareOut(SbContactSurface mesh);
 /* Area of a triangle of the vertices v; n[3], its normal, twice as long. */
 static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscInt v[3],
                                               PetscReal n[3])
@@ -64,10 +127,6 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
   SbCross(a, b, n);
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
-
-/* Outward normals of all vertices at x, of twice the area of the triangles around, m^2. Not
-   collective. */
-void SbContactSurfaceNormals(SbContactSurface mesh, const PetscReal x[], PetscReal normal[]);
 
 /* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the
    obstacle. */
@@ -106,19 +165,18 @@ struct _p_SbContactPairs {
   SbContactSurface mesh; /* borrowed */
   PetscReal reach;       /* pairs nearer than this are found, m */
   PetscReal margin;      /* by which boxes are grown, m */
-  PetscReal
-    *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
+  PetscInt nbox;
+  PetscReal *box; /* [nbox][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   SbSpatialHash hash; /* NULL: trees */
   struct SbContactFeatures
-    *features;     /* [6] vertices, triangles and edges, each of this rank and of others */
-  PetscBool known; /* cleared by who changes `near` */
-  const uint8_t
-    *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
+    *features;         /* [6] vertices, triangles and edges, each of this rank and of others */
+  PetscBool known;     /* cleared by who changes `near` */
+  const uint8_t *near; /* [all] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
   SbContactPair *pair; /* [n] all that have nodes of this rank; by kind, then vertices; last those
                           with a side of the obstacle */
-  PetscInt other_size, *first; /* work of ordering them: [2 nvertex] */
+  PetscInt box_room, first_room, other_size, *first, *place; /* work of ordering them */
   SbContactPair *other;
   PetscInt ncandidate; /* pairs of boxes that met in the last search */
   PetscInt nsearch,
@@ -128,8 +186,11 @@ struct _p_SbContactPairs {
 PetscErrorCode SbContactPairsCreate(SbContactSurface mesh, PetscReal reach, SbContactSearch search,
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
-/* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not
-   collective. */
+/* At the start of a step, when nothing names vertices of other ranks: the next search lets go of
+   those that are not near, if they are many. Not collective. */
+void SbContactPairsForget(SbContactPairs pairs);
+/* All pairs that come within the reach on the linear motion from x0 to x1, and some more. x0 and x1
+   may move (SbContactSurfaceReach()). Collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
 /* The gap, m: the distance less the radius; closest points and direction in `distance`. Not
    collective. */
@@ -161,11 +222,12 @@ static inline PetscBool SbContactPairSweptApart(SbContactSurface mesh, const SbC
   return PETSC_FALSE;
 }
 /* Largest collision-free fraction, 0..1, of the motion from x0 to x1, for this rank's pairs; each
-   keeps a tenth of its gap. Not collective. */
+   keeps a tenth of its gap. As SbContactPairsFind(). Collective. */
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[],
                                      const PetscReal x1[], PetscReal *part);
 /* A penetrating vertex, or the midpoint of the penetrating part of an edge. */
 typedef struct {
+  PetscInt number; /* among those of all ranks */
   PetscInt n, v[5];
   PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
   PetscReal normal[3], depth, area; /* separation direction; m, m^2 */
@@ -177,17 +239,19 @@ enum {
   SB_OVERLAP_INTERSECTED,
   SB_OVERLAP_INSIDE
 };
-/* Start with {0}; release with PetscFree(point) and PetscFree(near). The same on every rank. */
+/* Start with {0}; release with PetscFree(point) and PetscFree(near). The same on every rank but for
+   the points, of which a rank has those with nodes of it. */
 typedef struct {
   PetscInt
     ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
   PetscInt part[2];            /* of the first of them: body, or nbody for the obstacle */
   PetscReal place[3], deepest; /* position of it; largest penetration, m */
-  PetscInt n, size;
-  SbPenetration *point; /* [n] with a separation direction */
-  uint8_t *near;        /* [nvertex] SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
+  PetscInt npoint, n, size;    /* of all ranks, of this one */
+  SbPenetration *point;        /* [n] with a separation direction */
+  uint8_t *near; /* by number, of all ranks: SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
-/* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
+/* Penetration at x, which may move (SbContactSurfaceReach()); `inside`: there is some, even if no
+   edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
@@ -216,8 +280,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
 void SbPairEnergy(SbContactSurface mesh, const SbContactPair *pair, const SbPairLaw *law,
-                  PetscReal gap, const SbDistance *distance, const PetscReal x[],
-                  PetscReal *energy, PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
+                  PetscReal gap, const SbDistance *distance, const PetscReal x[], PetscReal *energy,
+                  PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
 /* Whether an edge pair is nearly parallel, so that it counts less, or not at all. */
 PetscBool SbPairIsMollified(SbContactSurface mesh, const SbContactPair *pair, PetscReal gap,
                             const SbDistance *distance, const PetscReal x[]);

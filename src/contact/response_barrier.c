@@ -36,9 +36,9 @@
   1e-7 /* least sticking slip e of a time step over the size of the smallest body */
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
 #define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
-#define STIFFEST 11. /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
+#define STIFFEST 11.     /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
 #define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
-#define STATE 6 /* numbers in a record of a checkpoint */
+#define SUMS 4     /* in the first record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
@@ -60,15 +60,14 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   const PetscInt nbody = s->mesh->nbody;
   PetscReal cube = PETSC_MAX_REAL;
   SbFacet *facet;
-  PetscInt n, nmove, nobstacle;
+  PetscInt n, nobstacle;
 
   PetscFunctionBeginUser;
   PetscCall(SbPartnerSetUp(e, s->comm, &b->contact.partner));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
   PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.partner.obstacle, &b->surface));
   PetscCall(PetscFree(facet));
-  nmove = 3 * b->surface->nvertex;
-  nobstacle = nmove - 3 * b->surface->nbody_vertex;
+  nobstacle = 3 * (b->surface->nvertex - b->surface->nbody_vertex);
   s->coupled = PETSC_TRUE;
   if (!b->contact.partner.obstacle)
     PetscCall(SbBarrierFindBodies(e, s->mesh));
@@ -76,8 +75,10 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++)
     cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
-  PetscCall(PetscMalloc7(3 * nbody + 3, &b->widths.w, nmove, &b->motion.x, nmove, &b->motion.start,
-                         nmove, &b->motion.other, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.x));
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.start));
+  PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.other));
+  PetscCall(PetscMalloc4(3 * nbody + 3, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
                          &b->motion.from, nobstacle, &b->motion.to));
   b->widths.k = b->widths.w + nbody + 1;
   b->widths.mass = b->widths.k + nbody + 1;
@@ -98,7 +99,8 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
-  PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0], b->options.search, &b->pairs));
+  PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0],
+                                 b->options.search, &b->pairs));
   b->record.least = PETSC_MAX_REAL;
   b->record.shortest = b->separation.stiffer = b->widths.scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -166,9 +168,9 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
   PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
   PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
   b->separation.searched = PETSC_TRUE;
-  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
-  SbContactSurfaceNormals(m, b->motion.x, normal);
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
+  PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
@@ -208,14 +210,13 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  PetscCall(PetscMalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
-    SbContactSurfaceNormals(m, b->motion.x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
-    PetscCall(PetscArrayzero(push, 4 * m->nvertex));
+    PetscCall(PetscCalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
+    PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
       const PetscReal goal = APART * of_pair(b, b->widths.w, pair);
@@ -254,26 +255,26 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
-    if (!n)
-      break;
-    *moved = PETSC_TRUE;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, push, (PetscMPIInt)(4 * m->nvertex), MPIU_REAL,
-                               MPI_SUM, s->comm));
+    *moved = (PetscBool)(*moved || n);
+    PetscCall(SbContactSurfaceSum(m, 4, push));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
-        for (int i = 0; i < 3 && m->node[j] >= 0; i++)
+        for (int i = 0; i < 3 && m->node[j] >= 0 && m->node[j] < s->nnode_owned; i++)
           if (!(m->fixed[j] >> i & 1))
             u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
     }
+    PetscCall(PetscFree2(push, normal));
+    if (!n)
+      break;
+    PetscCall(SbSpaceUpdateGhosts(s, u));
   }
-  PetscCall(PetscFree2(push, normal));
   b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of pairs without multipliers at the current positions, J, and the work of its forces there on the
-   obstacle along the path of this step, J; this rank's. They rotate with the obstacle: moment times
-   angle. */
+/* Energy of pairs without multipliers at the current positions, J, and the work of its forces there
+   on the obstacle along the path of this step, J; this rank's. They rotate with the obstacle:
+   moment times angle. */
 static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 {
   PetscReal sum = 0.;
@@ -326,8 +327,7 @@ static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, P
   b->widths.growth = growth;
   if (factor > 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < 3 * b->surface->nbody_vertex; k++)
-    far = PetscMax(far, PetscAbsReal(b->surface->X[k]));
+  far = PetscMax(far, b->surface->farthest);
   least = WIDTH_LEAST * far / b->contact.base.width;
   if (least >= 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -350,7 +350,9 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   find_path(b, t, dt);
   b->contact.base.progress = 0.;
   b->multipliers.updates = 0;
-  b->friction.pairs.n = b->springs.n = b->springs.nbounce = 0;
+  b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;
+  SbContactPairsForget(b->pairs);
+  b->motion.known = (PetscBool)(b->motion.known && b->pairs->known);
   if (!b->motion.begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
   if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
@@ -417,8 +419,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   Barrier *b = (Barrier *)e->data;
   const SbContactSurface m = b->surface;
   PetscReal power;
-  PetscReal gained = 0.;
-  PetscReal asked = 0.;
+  PetscReal progress[2] = {0., 0.}; /* of springs: what they opened, what they should */
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierUpdate(b, stage->u));
@@ -462,18 +463,21 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->at.v[0]])
-      b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
+    if (!counts_spring(b, spring))
+      continue;
+    b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->springs.n - b->springs.nbounce)
       continue;
-    gained += PetscMin(way, spring->goal - spring->start);
-    asked += spring->goal - spring->start;
+    progress[0] += PetscMin(way, spring->goal - spring->start);
+    progress[1] += spring->goal - spring->start;
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, progress, 2, MPIU_REAL, MPI_SUM, s->comm));
   b->sums.work += b->contact.base.work;
   b->separation.parted = PETSC_FALSE;
-  if (asked > 0.)
-    b->separation.stiffer = gained < HALF * asked ? 2. * b->separation.stiffer
-                                                  : PetscMax(1., 0.5 * b->separation.stiffer);
+  if (progress[1] > 0.)
+    b->separation.stiffer = progress[0] < HALF * progress[1]
+                              ? 2. * b->separation.stiffer
+                              : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
     PetscCall(SbBarrierLag(b));
@@ -495,25 +499,26 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 }
 
 /* Forces follow from the positions and the multipliers: these are saved, and accumulated sums. The
-   first record of a rank has its sums, the others a multiplier each. */
+   first record of a rank has its sums; with multipliers each further one has one of them. */
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
   const Multipliers *m = &b->multipliers;
-  const PetscReal state[STATE] = {b->sums.work, b->friction.loss,
-                                  s->rank ? 0. : b->separation.stiffer,
-                                  s->rank ? 0. : b->widths.scale, -1.};
+  const PetscReal sum[SUMS] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
+                               s->rank ? 0. : b->widths.scale};
 
   PetscFunctionBeginUser;
   *n = s->rank ? 1 : 1 + m->n;
-  PetscCall(PetscMalloc1(STATE * *n, records));
-  PetscCall(PetscArraycpy(*records, state, STATE));
+  PetscCall(PetscCalloc1(e->nstate * *n, records));
+  PetscCall(PetscArraycpy(*records, sum, SUMS));
+  if (has_multipliers(b))
+    (*records)[PAIR_KEY] = -1.;
   for (PetscInt k = 1; k < *n; k++) {
-    const PairForce *at = &m->pair[k - 1];
-    const PetscReal record[STATE] = {at->pair.v[0], at->pair.v[1], at->pair.v[2], at->pair.v[3],
-                                     2. * at->pair.kind + at->pair.side, at->force};
+    PetscReal *record = *records + e->nstate * k;
 
-    PetscCall(PetscArraycpy(*records + STATE * k, record, STATE));
+    for (int i = 0; i < PAIR_KEY; i++)
+      record[i] = m->pair[k - 1].key[i];
+    record[PAIR_KEY] = m->pair[k - 1].force;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -523,7 +528,7 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
 {
   Barrier *b = (Barrier *)e->data;
   Multipliers *m = &b->multipliers;
-  PetscReal sum[4] = {0.};
+  PetscReal sum[SUMS] = {0.};
 
   PetscFunctionBeginUser;
   (void)t;
@@ -531,19 +536,16 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   m->n = 0;
   PetscCall(SbReserve(n, sizeof(*m->pair), &m->size, &m->pair));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *record = records + STATE * k;
-    PairForce *at = &m->pair[m->n];
+    const PetscReal *record = records + e->nstate * k;
 
-    for (int i = 0; i < 4 && record[4] < 0.; i++)
-      sum[i] += record[i];
-    if (record[4] < 0.)
+    if (!has_multipliers(b) || record[PAIR_KEY] < 0.) {
+      for (int i = 0; i < SUMS; i++)
+        sum[i] += record[i];
       continue;
-    *at = (PairForce){.pair.kind = (SbPairKind)((int)record[4] / 2),
-                      .pair.side = (PetscBool)((int)record[4] % 2),
-                      .force = record[5]};
-    for (int i = 0; i < 4; i++)
-      at->pair.v[i] = (PetscInt)record[i];
-    m->n++;
+    }
+    for (int i = 0; i < PAIR_KEY; i++)
+      m->pair[m->n].key[i] = (PetscInt)record[i];
+    m->pair[m->n++].force = record[PAIR_KEY];
   }
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
@@ -575,10 +577,9 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSurfaceDestroy(&b->surface));
   PetscCall(SbContactPairsDestroy(&b->pairs));
-  PetscCall(PetscFree7(b->widths.w, b->motion.x, b->motion.start, b->motion.other, b->motion.u,
-                       b->motion.from, b->motion.to));
+  PetscCall(SbContactSurfaceDestroy(&b->surface)); /* with positions */
+  PetscCall(PetscFree4(b->widths.w, b->motion.u, b->motion.from, b->motion.to));
   PetscCall(PetscFree(b->columns.slot));
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
@@ -670,7 +671,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->nstate = STATE;
+  e->nstate = has_multipliers(b) ? PAIR_KEY + 1 : SUMS;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

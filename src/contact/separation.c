@@ -18,21 +18,26 @@
 #define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
 
 /* Whether two bodies coincide: then no separation direction exists. */
-static PetscBool same_place(const Barrier *b, const PetscInt body[2])
+static PetscErrorCode same_place(const Barrier *b, const PetscInt body[2], PetscBool *same)
 {
   const SbContactSurface m = b->surface;
   PetscReal box[2][6];
   PetscReal most = 0.;
 
+  PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
     SbBoxClear(box[k]);
     for (PetscInt v = 0; v < m->nbody_vertex; v++)
       if (m->part[v] == body[k])
         SbBoxAdd(box[k], b->motion.x + 3 * v);
+    for (int i = 3; i < 6; i++)
+      box[k][i] = -box[k][i];
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, box, 12, MPIU_REAL, MPI_MIN, m->space->comm));
   for (int i = 0; i < 6; i++)
     most = PetscMax(most, PetscAbsReal(box[0][i] - box[1][i]));
-  return (PetscBool)(most < SAME * m->size);
+  *same = (PetscBool)(most < SAME * m->size);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
@@ -41,6 +46,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   const SbContactSurface m = b->surface;
   SbContactOverlap *o = &b->separation.overlap;
   PetscBool inside = PETSC_FALSE;
+  PetscBool same = PETSC_FALSE;
   PetscInt body[2] = {0, 0};
 
   PetscFunctionBeginUser;
@@ -48,33 +54,47 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   if (first && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
   PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
-  PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
+  if (inside)
+    PetscCall(same_place(b, body, &same));
+  PetscCheck(!inside || (o->npoint && !same), s->comm, PETSC_ERR_USER_INPUT,
              "The effect %s: body %s is inside body %s when the run begins, or in the same place; "
              "move one of them by "
              "-body_%s_translate",
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name,
              s->mesh->body[body[0]].name);
   b->separation.overlapping =
-    (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * m->size));
+    (PetscBool)(o->ncrossing > 0 && (!first || !o->npoint || o->deepest > ROUNDING * m->size));
 
   /* a body wholly inside the obstacle has no separation direction */
   if (first && b->contact.partner.obstacle && !b->separation.overlapping) {
+    PetscReal place[4] = {-1., PETSC_MIN_REAL, PETSC_MIN_REAL, PETSC_MIN_REAL}; /* body, x */
+    PetscInt lowest[2] = {PETSC_MAX_INT, PETSC_MAX_INT}; /* number of all ranks, of this one */
     SbPose pose;
 
     SbPartnerPose(&b->contact.partner, 0., &pose);
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-      const char *name = s->mesh->body[m->part[v]].name;
-      const PetscReal *x = b->motion.x + 3 * v;
       PetscReal X[3], n[3];
 
-      SbPoseInvert(&pose, x, X);
-      PetscCheck(m->driven[v] ||
-                   SbObstacleDistance(b->contact.partner.obstacle, X, n) > -SAME * m->size,
-                 s->comm, PETSC_ERR_USER_INPUT,
-                 "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; "
-                 "move it by "
-                 "-body_%s_translate",
-                 e->name, name, (double)x[0], (double)x[1], (double)x[2], name);
+      SbPoseInvert(&pose, b->motion.x + 3 * v, X);
+      if (lowest[1] < PETSC_MAX_INT || !m->own[v] || m->driven[v] ||
+          SbObstacleDistance(b->contact.partner.obstacle, X, n) > -SAME * m->size)
+        continue;
+      lowest[0] = lowest[1] = SbContactNumber(m, v);
+      place[0] = (PetscReal)m->part[v];
+      PetscCall(PetscArraycpy(place + 1, b->motion.x + 3 * v, 3));
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, lowest, 1, MPIU_INT, MPI_MIN, s->comm));
+    for (int i = 0; lowest[1] != lowest[0] && i < 4; i++)
+      place[i] = PETSC_MIN_REAL;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, place, 4, MPIU_REAL, MPI_MAX, s->comm));
+    if (lowest[0] < PETSC_MAX_INT) {
+      const char *name = s->mesh->body[(PetscInt)place[0]].name;
+
+      SETERRQ(s->comm, PETSC_ERR_USER_INPUT,
+              "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; "
+              "move it by "
+              "-body_%s_translate",
+              e->name, name, (double)place[1], (double)place[2], (double)place[3], name);
     }
   }
   if (b->pairs->near || b->separation.overlapping)
@@ -93,10 +113,11 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     if (SbContactPairGap(m, pair, b->motion.x, &d) > SAME * m->size)
       continue;
     for (int k = 0; k < 4; k++)
-      o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
+      o->near[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
   }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near,
+                             (PetscMPIInt)(m->nvertex - m->nbody_vertex + m->Nbody_vertex),
+                             MPI_UINT8_T, MPI_MAX, s->comm));
   b->pairs->known = PETSC_FALSE;
 
   /* warns once, naming what overlaps */
@@ -106,7 +127,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     for (int k = 0; k < 2; k++)
       name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
     PetscCheck(
-      o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
+      o->npoint > 0, s->comm, PETSC_ERR_USER_INPUT,
       "The effect %s: %s and %s overlap at (%g, %g, %g) m, and no separation direction was found: "
       "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
@@ -118,7 +139,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
       "until then "
       "they may pass through each other there",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-      o->n, (double)o->deepest, e->name));
+      o->npoint, (double)o->deepest, e->name));
   }
   b->separation.announced = PETSC_TRUE;
 

@@ -2,7 +2,8 @@
   contact_constraints.c - linear systems of bodies in contact with constraints between their nodes,
   for the responses `projected` and `multiplier`.
 
-  A step Y back from an iterate with the gaps g beyond those that are kept, C being their derivative:
+  A step Y back from an iterate with the gaps g beyond those that are kept, C being their
+  derivative:
 
     M Y + C^T l = F,   C Y - D l = g
 
@@ -41,9 +42,9 @@ typedef struct {
   Vec flexible;      /* D of rows of unit length, m/N */
 
   /* projected */
-  PC gram;      /* (C C^T + e I)^-1 */
-  Vec row[3];   /* work */
-  Vec x[2];     /* work, of bodies */
+  PC gram;    /* (C C^T + e I)^-1 */
+  Vec row[3]; /* work */
+  Vec x[2];   /* work, of bodies */
 } Constrained;
 
 PetscErrorCode SbConstraintRowsReserve(SbConstraintRows *rows, PetscInt n, PetscInt nentry)
@@ -281,8 +282,7 @@ static PetscErrorCode solve_projected(Constrained *c, Vec F, Vec g, Vec Y,
   for (int k = 0; k < 2; k++)
     PetscCall(VecDuplicate(F, &c->x[k]));
 
-  PetscCall(
-    MatCreateShell(comm, n + rows, n + rows, PETSC_DETERMINE, PETSC_DETERMINE, c, &A));
+  PetscCall(MatCreateShell(comm, n + rows, n + rows, PETSC_DETERMINE, PETSC_DETERMINE, c, &A));
   PetscCall(MatShellSetOperation(A, MATOP_MULT, SB_OPERATION(multiply)));
   PetscCall(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(KSPCreate(comm, &ksp));
@@ -361,8 +361,8 @@ static PetscErrorCode create_diagonal(Vec d, PetscReal factor, Mat *D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* soft: flexibility of the springs in M and D together, m/N. The rows and their forces are scaled by
-   the mean stiffness k, so that all residuals are forces: [M k C^T; k C -k^2 D] (Y, l / k). */
+/* soft: flexibility of the springs in M and D together, m/N. The rows and their forces are scaled
+   by the mean stiffness k, so that all residuals are forces: [M k C^T; k C -k^2 D] (Y, l / k). */
 static PetscErrorCode solve_saddle(Constrained *c, Vec F, Vec g, Vec soft, Vec Y,
                                    KSPConvergedReason *reason, PetscInt *iterations)
 {

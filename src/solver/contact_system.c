@@ -387,7 +387,7 @@ static PetscErrorCode factor(SbContactSystem c, PetscBool *ok)
                                  c->stale_pattern[FACTOR], ok));
     c->stale_pattern[FACTOR] = PETSC_FALSE;
   }
-  c->stale_values[FACTOR] = (PetscBool)!*ok;
+  c->stale_values[FACTOR] = (PetscBool) !*ok;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

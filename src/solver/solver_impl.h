@@ -57,8 +57,8 @@ PetscErrorCode SbSolverPresetOfUser(const char *choice, const SbSolverPreset **p
   SbSolveConstrained - Y of M Y + C^T l = F', C Y - l / stiffness = goal, F' being F without the
   forces of rows at their goals.
 
-  Collective. Input: M, symmetric; inner, a preconditioner of it; saddle, by the saddle-point system,
-  else in the null space; weight, on the stiffness of rows. Output: Y, reason, iterations.
+  Collective. Input: M, symmetric; inner, a preconditioner of it; saddle, by the saddle-point
+  system, else in the null space; weight, on the stiffness of rows. Output: Y, reason, iterations.
 */
 PetscErrorCode SbSolveConstrained(Mat M, PC inner, PetscBool saddle, const SbConstraintRows *rows,
                                   PetscReal weight, Vec F, Vec Y, KSPConvergedReason *reason,

@@ -171,9 +171,9 @@ static PetscErrorCode solve(void *ctx, Mat P, Vec rhs, Vec Y, KSPConvergedReason
   if (!q->system)
     PetscCall(SbContactSystemCreate(run->model->space, run->solve.contact_choice, &q->system));
   if (run->model->contacts.nexact)
-    PetscCall(SbContactSystemSolveConstrained(
-      q->system, P, &q->blocks, run->model->contacts.saddle, &q->rows, run->solve.barrier_weight,
-      rhs, Y, reason, iterations));
+    PetscCall(SbContactSystemSolveConstrained(q->system, P, &q->blocks, run->model->contacts.saddle,
+                                              &q->rows, run->solve.barrier_weight, rhs, Y, reason,
+                                              iterations));
   else
     PetscCall(
       SbContactSystemSolve(q->system, P, &q->blocks, PETSC_TRUE, rhs, Y, reason, iterations));

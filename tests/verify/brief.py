@@ -445,9 +445,6 @@ NOT_YET = {
     "penalty and Lagrange multipliers":
         "Not there yet: multipliers, penalty and augmented Lagrangian between bodies and within "
         "one; they meet by a barrier",
-    "hashed neighbour search, consistent penetration depth and normal":
-        "Not there yet: ownership of cells by ranks; every rank holds all surfaces, and hashes its "
-        "own features and what is near them",
     "rigid bodies in the same scene":
         "Not there yet: rigid bodies that move by forces; obstacles are rigid and follow a "
         "prescribed path",

@@ -117,7 +117,7 @@ static PetscErrorCode check_ring(const char *element)
   PetscCall(SbSpaceGetSetFacets(s, set, &nfacet, &facet));
   PetscCall(SbContactSurfaceCreate(s, nfacet, facet, NULL, &m));
   m->self = PETSC_TRUE;
-  PetscCall(PetscMalloc1(3 * m->nvertex, &x));
+  PetscCall(SbContactSurfaceCreateArray(m, &x));
   for (PetscInt i = 0; i < m->nvertex; i++) {
     const PetscReal *X = m->X + 3 * i;
     const PetscReal turn = (2 * PETSC_PI + 0.7) / 2;
@@ -136,12 +136,11 @@ static PetscErrorCode check_ring(const char *element)
               (PetscReal)o.n;
   }
   VERIFY_MORE(o.ncrossing, 20, "edges through triangles");
-  VERIFY_MORE(o.n, 8, "points that know the way out");
+  VERIFY_MORE(o.npoint, 8, "points that know the way out");
   VERIFY_MORE(radial, 0.5, "mean part of the ways along the radius");
   VERIFY_LESS(o.deepest, 0.11, "depth, m");
   PetscCall(PetscFree(o.point));
   PetscCall(PetscFree(o.near));
-  PetscCall(PetscFree(x));
   PetscCall(PetscFree(facet));
   PetscCall(SbContactSurfaceDestroy(&m));
   PetscCall(test_scene_close(&t));
