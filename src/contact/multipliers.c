@@ -16,9 +16,9 @@
 #define EXACT 1e-7       /* the same of exact constraints in static runs */
 #define EXACT_STEPS 1e-5 /* and in time steps */
 #define UPDATES 100      /* most updates of multipliers in a step */
-#define FALLS 0.7        /* the worst gap falls to this part in ... */
+#define FALLS 0.9        /* the worst gap falls to this part in ... */
 #define STUCK 3          /* ... updates; else it settles no further */
-#define LOOSE 1e-2       /* then the tolerance without a warning */
+#define LOOSE 0.1        /* then the tolerance without a warning */
 
 static void find_key(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY])
 {
