@@ -463,7 +463,7 @@ PetscErrorCode SbContactSystemSolveConstrained(SbContactSystem c, Mat K, const S
 
   /* a preconditioner of the matrix: its factor, or that of CG */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
-                         (!c->type[0] && !c->choice && 3 * c->space->Nnode <= SB_DIRECT_SMALL));
+                         (!c->type[0] && !c->choice && 3 * c->space->Nnode <= SMALL));
   if (factored) {
     PetscCall(factor(c, &ok));
     PetscCall(PCCreate(c->space->comm, &inner));
