@@ -421,7 +421,7 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
   PetscInt *start = NULL;
   PetscInt *adjacent = NULL;
   const PetscInt *point;
-  PetscBool in_place;
+  PetscBool in_place, weights;
   PetscSF forest = NULL;
   PetscSection section;
   IS points;
@@ -431,6 +431,9 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
   PetscCall(PetscPartitionerSetType(
     partitioner, w->Ncell <= METIS_MOST ? SB_PARTITIONER_METIS : SB_PARTITIONER_BISECTION));
   PetscCall(PetscPartitionerSetFromOptions(partitioner));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-petscpartitioner_use_vertex_weights", &weights));
+  PetscCheck(!weights, comm, PETSC_ERR_USER_INPUT,
+             "-petscpartitioner_use_vertex_weights: tets have no weights; leave it out");
 
   // one rank; fewer cells than ranks, which some types do not allow
   if (size == 1 || w->Ncell <= size) {
