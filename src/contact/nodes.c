@@ -57,10 +57,15 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
     const SbFacet *f = &facet[i];
     const PetscInt *per = SbSpaceCellElement(space, f->cell)->nodes_per;
     const SbMaterial m = space->material[space->mesh->cell_material[f->cell]];
+    PetscReal parts[2] = {1, 1}; /* of the area that a vertex has, and the middle of an edge */
 
+    if (per[0])
+      parts[0] = per[1] ? 12 : 3;
+    if (per[1])
+      parts[1] = 4;
     for (PetscInt a = 0; a < (per[1] ? SB_CELL_NODES : 4); a++) {
       const PetscInt node = SbSpaceCellNode(space, f->cell, a);
-      const PetscReal share = f->area / (!per[0] ? 1 : a >= 4 ? 4 : per[1] ? 12 : 3);
+      const PetscReal share = f->area / parts[a >= 4];
       const int *edge = a < 4 ? NULL : SbTetEdge[a - 4];
 
       /* at the vertex behind the facet; the node of CR and DG with its number is on the facet */
