@@ -204,41 +204,6 @@ static PetscErrorCode set_range(DMLabel label, PetscInt value, PetscInt first, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which points have the points of a stratum in their cones: a bucket sort of these cones. */
-typedef struct {
-  PetscInt n;            /* number of points of the stratum */
-  PetscInt cone_size;    /* of the points above */
-  PetscInt first, above; /* first points of both */
-  PetscInt *start;       /* [n + 1] */
-  PetscInt *item;        /* [start[n]] entries of the cones, ascending */
-} Supports;
-
-/* cone[nabove][cone_size] in numbers from zero on. Their sizes go to the plex. */
-static PetscErrorCode find_supports(DM dm, PetscInt nabove, const PetscInt cone[], Supports *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbBucketByKey(s->cone_size * nabove, cone, s->n, &s->start, &s->item));
-  for (PetscInt i = 0; i < s->n; i++)
-    PetscCall(DMPlexSetSupportSize(dm, s->first + i, s->start[i + 1] - s->start[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* After DMSetUp(): the supports of a stratum follow each other in the plex. */
-static PetscErrorCode fill_supports(DM dm, Supports *s)
-{
-  const PetscInt *there;
-
-  PetscFunctionBeginUser;
-  if (s->start[s->n]) {
-    PetscCall(DMPlexGetSupport(dm, s->first, &there));
-    for (PetscInt i = 0; i < s->start[s->n]; i++)
-      ((PetscInt *)there)[i] = s->above + s->item[i] / s->cone_size;
-  }
-  PetscCall(PetscFree(s->start));
-  PetscCall(PetscFree(s->item));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Points, cones, supports, strata. s: NULL without faces and edges. */
 static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
 {
@@ -248,8 +213,6 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
   static const PetscInt cone_size[4] = {4, 0, 3, 2};
   static const DMPolytopeType type[4] = {DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_POINT,
                                          DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_SEGMENT};
-  Supports supports[3];
-  const int nsupport = s ? 3 : 1;
   PetscInt *cone, *orientation;
   DMLabel types;
   DM dm = mesh->dm;
@@ -259,17 +222,6 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
   for (int k = 0; k < 4; k++)
     for (PetscInt p = first[k]; k != 1 && p < first[k + 1]; p++)
       PetscCall(DMPlexSetConeSize(dm, p, cone_size[k]));
-  if (s) {
-    supports[0] = (Supports){s->nface, 4, first[2], first[0], NULL, NULL};
-    supports[1] = (Supports){s->nedge, 3, first[3], first[2], NULL, NULL};
-    supports[2] = (Supports){mesh->nvert, 2, first[1], first[3], NULL, NULL};
-    PetscCall(find_supports(dm, mesh->ncell, s->face, &supports[0]));
-    PetscCall(find_supports(dm, s->nface, s->face_edge, &supports[1]));
-    PetscCall(find_supports(dm, s->nedge, s->edge_vert, &supports[2]));
-  } else {
-    supports[0] = (Supports){mesh->nvert, 4, first[1], first[0], NULL, NULL};
-    PetscCall(find_supports(dm, mesh->ncell, mesh->cell, &supports[0]));
-  }
   PetscCall(DMSetUp(dm));
   PetscCall(DMPlexGetCones(dm, &cone));
   PetscCall(DMPlexGetConeOrientations(dm, &orientation));
@@ -277,8 +229,7 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
     PetscCall(fill_cones(mesh, s, cone, orientation));
   for (PetscInt i = 0; !s && i < 4 * mesh->ncell; i++)
     cone[i] = mesh->ncell + mesh->cell[i - i % 4 + plex_vertex[i % 4]];
-  for (int k = 0; k < nsupport; k++)
-    PetscCall(fill_supports(dm, &supports[k]));
+  PetscCall(DMPlexSymmetrize(dm));
 
   // the types are known: PETSc need not look at every cone
   PetscCall(DMCreateLabel(dm, "celltype"));
