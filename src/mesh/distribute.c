@@ -27,47 +27,47 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
 static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
                                  SbLocalMesh *to)
 {
+  const MPI_Comm comm = PetscObjectComm((PetscObject)route->sf);
   const PetscInt *which = route->which;
-  const PetscMPIInt *dest = route->dest;
-  PetscInt *at, *order, *position, *count;
-  PetscMPIInt *mark;
+  PetscInt *at, *to_rank, *start, *order, *last;
+  PetscMPIInt size;
   SbRouteList list = {0};
   SbRoute vertices;
 
   PetscFunctionBeginUser;
   *to = (SbLocalMesh){0};
 
-  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell
-  // are there
-  PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
-  PetscCall(PetscCalloc4(route->nsend, &order, from->nvert, &position, route->size, &count,
-                         from->nvert, &mark));
+  // vertices to send to each rank, in the order of the cells; at[][4]: which of the list the
+  // vertices of a cell are, then their places there
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(
+    PetscMalloc3(4 * (size_t)route->nsend, &at, route->nsend, &to_rank, from->nvert, &last));
   for (PetscInt i = 0; i < route->nsend; i++)
-    order[route->position[i]] = i;
+    to_rank[i] = route->place[i].rank;
+  PetscCall(SbBucketByKey(route->nsend, to_rank, size, &start, &order));
   for (PetscInt v = 0; v < from->nvert; v++)
-    mark[v] = -1;
+    last[v] = -1;
   for (PetscInt k = 0; k < route->nsend; k++) {
     const PetscInt i = order[k];
     const PetscInt *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
     for (int a = 0; a < 4; a++) {
-      if (mark[v[a]] != dest[i]) {
-        PetscCall(SbRouteAdd(&list, v[a], dest[i]));
-        mark[v[a]] = dest[i];
-        position[v[a]] = count[dest[i]]++;
+      if (last[v[a]] < 0 || list.rank[last[v[a]]] != to_rank[i]) {
+        last[v[a]] = list.n;
+        PetscCall(SbRouteAdd(&list, v[a], (PetscMPIInt)to_rank[i]));
       }
-      at[4 * (size_t)i + a] = position[v[a]];
+      at[4 * (size_t)i + a] = last[v[a]];
     }
   }
-  PetscCall(PetscFree4(order, position, count, mark));
-  PetscCall(SbRouteCreate(route->comm, list.n, list.item, list.rank, &vertices));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(order));
+  PetscCall(SbRouteCreate(comm, list.n, list.item, list.rank, &vertices));
+  for (PetscInt i = 0; i < 4 * route->nsend; i++)
+    at[i] = vertices.place[at[i]].index;
   PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
-  PetscCall(PetscFree(at));
+  PetscCall(PetscFree3(at, to_rank, last));
   to->ncell = route->nrecv;
   to->nvert = vertices.nrecv;
-  for (PetscMPIInt r = 0; r < route->size; r++)
-    for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
-      to->cell[i] += vertices.rfirst[r];
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list.item, from->vertex, &to->vertex));
   if (owned)

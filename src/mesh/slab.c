@@ -107,8 +107,8 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* A face that may be between tets of two ranks, and the tet across it. */
 typedef struct {
   PetscInt vert[3], at; /* ascending; slot at the sender, position in the received array */
-  PetscInt cell;  /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
-  int64_t number; /* file number of the tet */
+  PetscInt rank, cell;  /* as in SbPart.remote: index here plus the cells of earlier bodies */
+  int64_t number;       /* file number of the tet */
 } Face;
 typedef struct {
   PetscInt rank, cell;
@@ -135,8 +135,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
       m++;
     if (m == 2)
       for (int k = 0; k < 2; k++)
-        across[f[k].at] =
-          (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
+        across[f[k].at] = (Across){f[1 - k].rank, f[1 - k].cell, f[1 - k].number};
     else if (m > 2 && !nshared++)
       first = i;
   }
@@ -203,8 +202,11 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       continue;
     PetscCall(PetscSortInt(3, v));
     PetscCall(SbReserve(n + 1, sizeof(*face), &room, &face));
-    face[n++] =
-      (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, i, before + i / 4, tets->number[i / 4]};
+    face[n++] = (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]},
+                       i,
+                       s->rank,
+                       before + i / 4,
+                       tets->number[i / 4]};
   }
 
   // home ranks match the faces and reply with the cell across
