@@ -165,6 +165,7 @@ struct _p_SbMesh {
      nodes there; with overlap, point star forest, rest coordinates and labels (src/mesh/plex.c) */
   DM dm;
   PetscInt *face_point, *edge_point; /* [ncell][4], [ncell][6]; NULL without faces and edges */
+  PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL likewise */
   PetscSF cell_sf,
     vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
   PetscInt nbody;

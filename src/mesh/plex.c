@@ -97,6 +97,8 @@ static PetscErrorCode find_sides(SbMesh mesh, Sides *s)
       f++;
     s->face[i] = s->face[NFACE * other + f];
   }
+  mesh->neighbour = faces.neighbour;
+  faces.neighbour = NULL;
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(SbTetEdges(mesh->nvert, mesh->ncell, mesh->cell, &s->nedge, &s->edge));
 
@@ -404,8 +406,9 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
   // the boundary, then the sets: bit k of the masks
   for (PetscInt k = 0; k <= mesh->nset; k++) {
     const uint64_t bit = k ? SB_SET_BIT(k - 1) : SB_ON_BOUNDARY;
-    char name[SB_NAME_MAX + 16] = "boundary";
-    PetscBool taken = PETSC_FALSE;
+    const char *own = k ? mesh->set[k - 1].name : "boundary";
+    char name[SB_NAME_MAX + 16];
+    PetscBool taken;
 
     for (PetscInt p = 0; p < npoint; p++)
       key[p] = -1;
@@ -422,15 +425,11 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
         key[mesh->ncell + mesh->nvert + s->face[i]] = 1;
     }
 
-    // a set may have the name of another label
-    if (k)
-      PetscCall(PetscStrncpy(name, mesh->set[k - 1].name, sizeof(name)));
+    // a set may have the name of another label: set_NAME, set1_NAME, ...
+    PetscCall(PetscStrncpy(name, own, sizeof(name)));
     PetscCall(DMHasLabel(mesh->dm, name, &taken));
     for (int again = 0; taken; again++) {
-      if (again)
-        (void)snprintf(name, sizeof(name), "set%d_%s", again, mesh->set[k - 1].name);
-      else
-        (void)snprintf(name, sizeof(name), "set_%s", mesh->set[k - 1].name);
+      (void)snprintf(name, sizeof(name), "set%.*d_%s", again > 0, again, own);
       PetscCall(DMHasLabel(mesh->dm, name, &taken));
     }
     PetscCall(DMCreateLabel(mesh->dm, name));
