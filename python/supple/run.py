@@ -1,4 +1,5 @@
 """The folder of a run, read: meshes, frames, fields, history, settings."""
+import importlib
 import json
 import os
 import stat
@@ -28,6 +29,14 @@ def read_text(path, most=TEXT_BYTES):
     if len(text) > most:
         raise OSError(f"{path} is larger than {most} bytes")
     return text
+
+
+def needed(module, what):
+    """A package that only this needs. RunError without it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as e:
+        raise RunError(f"{what}() needs the package {module}, which is not installed ({e}): pip install {'meshio pyvista' if what == 'to_pyvista' else module}") from None
 
 
 def own(group, name):
@@ -305,8 +314,7 @@ class Run:
 
     def to_meshio(self, k=-1):
         """A meshio.Mesh of a frame: points where they are, fields per point and per cell."""
-        import meshio
-
+        meshio = needed("meshio", "to_meshio")
         mesh, names = self.mesh(k), self.fields(k)
         fields = {name: self.field(name, k) for name in names}
         on_cells = {name: [values] for name, values in fields.items() if len(values) == len(mesh.cells)}
@@ -316,8 +324,8 @@ class Run:
 
     def to_pyvista(self, k=-1):
         """A pyvista.UnstructuredGrid of a frame, likewise."""
-        import pyvista
-
+        pyvista = needed("pyvista", "to_pyvista")
+        needed("meshio", "to_pyvista")
         return pyvista.from_meshio(self.to_meshio(k))
 
 
