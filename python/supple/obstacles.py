@@ -150,15 +150,22 @@ class Obstacle:
         return self.x @ pose[:3, :3].T + pose[:3, 3]
 
 
+def is_body(run, name, word):
+    """Whether a body is of this name, or one of the copies of the body of this name."""
+    copy = name[len(word):] if name.startswith(word) else None
+    return copy == "" or bool(copy and run.scenario.get(f"body_{word}_copies") and copy.strip("_").isdigit())
+
+
 def obstacles(run):
     """Those of a run that can be drawn, as a list. Files of meshes are looked for from the working directory."""
-    names, found = run.scenario.get("bodies", "").split(","), []
+    names, found = run.bodies, []
     up = run.up()
     way = sorted({int(k) for k in numpy.linspace(0, len(run) - 1, min(len(run), 40))})
     for effect in run.scenario.get("effects", "").split(","):
         if not run.scenario.get(f"effect_{effect}_obstacle"):
             continue
-        mine = [names.index(word) for word in run.scenario.get(f"effect_{effect}_on", "").split(",") if word in names] or range(len(names))
+        words = run.scenario.get(f"effect_{effect}_on", "").split(",")
+        mine = [k for k, name in enumerate(names) if any(is_body(run, name, word) for word in words)] or range(len(names))
         reached = numpy.concatenate([run.positions(k)[numpy.unique(run.mesh(k).cells[numpy.isin(run.mesh(k).body, list(mine))])] for k in way])
         obstacle = Obstacle(run, effect, reached, numpy.array([0.0, 0.0, 1.0]) if up is None else up)
         if obstacle.x is not None:

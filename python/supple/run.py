@@ -336,6 +336,13 @@ def colour_range(samples):
     if len(values) == 0:
         return 0.0, 1.0
     low, high = numpy.percentile(values, [0.7, 99.3])
+    if high - low <= 1e-12 * numpy.abs(values).max():
+        # nearly all are alike, as forces of contact that are zero but at a few points: the others decide
+        common = numpy.median(values)
+        others = values[numpy.abs(values - common) > 1e-12 * numpy.abs(values).max()]
+        if len(others):
+            low, high = numpy.percentile(numpy.append(others, common), [0.7, 99.3])
+            low, high = min(low, common), max(high, common)
     if low >= 0 and low < 0.3 * high:
         low = 0.0
     elif low < 0 < high:
