@@ -4,6 +4,7 @@
 """
 import math
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,20 @@ def check_cases():
             refused(lambda: Formula(text, where="-test"), "-test", f"column {expected[1:]} of", f"'{text}'", *words)
             errors += 1
     check(values > 40 and errors > 30, f"{values} values, {errors} errors")
+
+
+def check_random():
+    """20,000 random texts of the grammar's words and of others: a number, or an error of one line that names a column."""
+    words = [*"+-*/^(),.; t x y z pi 1 2. .5e1 0x1 1e400 sin( min( clamp( step( ramp sqrt( __ eval [ ' é \0 ² table: \t".split(" "), " "]
+    choose = random.Random(1)
+    values = 0
+    for _ in range(20000):
+        text = "".join(choose.choice(words) for _ in range(choose.randrange(12)))
+        try:
+            values += isinstance(float(Formula(text)(PLACE)), float)
+        except FormulaError as e:
+            check("column " in str(e), f"{text!r}: {e}")
+    check(values > 100, f"only {values} are formulas")
 
 
 def check_tables():
@@ -112,6 +127,7 @@ def check_sources():
 
 if __name__ == "__main__":
     check_cases()
+    check_random()
     check_tables()
     check_plot()
     check_sources()
