@@ -109,6 +109,17 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file);
    (presets of solvers): what is added later is not the user's. Without this call everything counts.
    Not collective. */
 PetscErrorCode SbOptionsRemember(void);
+/* PetscInitialize() without the files .petscrc, which PETSc would read in the home and in the
+   working folder; `-skip_petscrc no` on the command line reads them. *argv is replaced.
+   Collective. */
+PetscErrorCode SbOptionsInitialize(int *argc, char ***argv, const char *file);
+/* Why an option file is not read, "" if it is: the first option in it, or in a file that it names,
+   with which PETSc would load a library, run a program or open a connection (-dll_append); a file
+   in it that cannot be read. Before PetscInitialize(). Not collective. */
+void SbOptionsRefused(const char *file, size_t size, char why[]);
+/* The options of the environment (PETSC_OPTIONS, PETSC_OPTIONS_YAML of this process) that count, as
+   "-name value ..."; after SbOptionsRemember(). Not collective. */
+PetscErrorCode SbOptionsEnvironment(size_t size, char text[]);
 /* At the end of a run: warns about each option of the user's that nobody read; n: how many.
    Collective. */
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
@@ -212,6 +223,18 @@ void SbFormat(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE
 void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
 /* Comma-separated numbers, into p[most]; returns their count, -1 for other text or more numbers. */
 int SbParseNumbers(const char *text, int most, PetscReal p[]);
+
+/* files */
+
+#define SB_TEXT_BYTES ((size_t)1 << 28) /* largest size of a table, a file of copies, a history */
+
+/* Opens a regular file for reading, of at most `most` bytes (0: any size): never waits, as for a
+   pipe without a writer. Returns NULL, or the reason why not, and then *file is NULL. Close with
+   fclose(). */
+const char *SbFileOpen(const char *path, size_t most, FILE **file);
+/* A new empty file for writing, in place of what has this name: a link is removed, not followed.
+   NULL and errno if that fails. Close with fclose(). */
+FILE *SbFileCreate(const char *path);
 
 /* arrays */
 

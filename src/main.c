@@ -74,7 +74,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   /* initialise libraries and error handling */
   PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(SbCommandLine(&argc, argv, &command));
-  ierr = PetscInitialize(&argc, &argv, command.scenario, NULL);
+  ierr = SbOptionsInitialize(&argc, &argv, command.scenario);
   if (ierr)
     SbErrorFindYamlLine();
   PetscCall(ierr);

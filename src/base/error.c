@@ -208,7 +208,7 @@ void SbErrorFindYamlLine(void)
   size_t size;
 
   if (strstr(state.message, "YAML") && dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))
-    f = fopen(state.file, "r");
+    (void)SbFileOpen(state.file, 0, &f);
   if (!f)
     return;
   size = fread(text, 1, sizeof(text) - 1, f);

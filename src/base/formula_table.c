@@ -5,20 +5,18 @@
   empty lines are ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0
   reads the file, which scales to thousands of ranks; an error is broadcast and raised on all ranks.
 */
-#include <errno.h>
 #include "formula.h"
 
 /* Reads the complete file. Rank 0 only. */
-static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n,
-                                PetscReal (**rows)[2])
+static PetscErrorCode read_rows(FILE *f, const char *why, const char *file, const char *where,
+                                PetscInt *n, PetscReal (**rows)[2])
 {
   static const char blanks[] = " \t\n\v\f\r";
   char line[512];
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file,
-             strerror(errno));
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file, why);
   for (int number = 1; fgets(line, sizeof(line), f); number++) {
     PetscReal row[2];
     char *next = line;
@@ -63,9 +61,10 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
-    FILE *f = fopen(file, "r");
+    FILE *f;
+    const char *why = SbFileOpen(file, SB_TEXT_BYTES, &f);
 
-    SB_CATCH(&caught, read_rows(f, file, where, &formula->nrow, &formula->row));
+    SB_CATCH(&caught, read_rows(f, why, file, where, &formula->nrow, &formula->row));
     if (f)
       (void)fclose(f);
   }

@@ -10,10 +10,12 @@
   Each value is a table of two rows, so that a repeated step has the same values. A run that is
   faster than -live_pace simulated seconds per second waits; a slower one does not catch up.
 */
+#include <unistd.h>
 #include "formula.h"
 #include "option.h"
 
-#define VALUE_MAX 48 /* largest number of live values */
+#define LIVE_BYTES 65536 /* largest size of the file */
+#define VALUE_MAX 48     /* largest number of live values */
 
 typedef struct {
   char name[2 * SB_NAME_MAX];   /* first word of its line in the file: tool, tool_angle */
@@ -130,10 +132,15 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
    Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
-  FILE *f = fopen(live.file, "r");
+  FILE *f;
+  const char *why = SbFileOpen(live.file, LIVE_BYTES, &f);
   char line[512];
 
   PetscFunctionBeginUser;
+  if (!f && !live.warned && !access(live.file, F_OK)) {
+    live.warned = PETSC_TRUE;
+    PetscCall(SbWarning(PETSC_COMM_SELF, "%s is not read: %s", live.file, why));
+  }
   while (f && fgets(line, sizeof(line), f)) {
     const size_t n = strcspn(line, " \t,\r\n");
     PetscBool useful = (PetscBool)(!n || line[0] == '#');

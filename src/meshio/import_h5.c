@@ -599,6 +599,7 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
 {
   File f = {.im = im, .file = -1, .mesh = "/mesh", .part = k, .nparts = n};
   PetscErrorCode ierr;
+  char why[PETSC_MAX_PATH_LEN + 256];
   hid_t access;
   htri_t is_hdf5;
   FILE *file;
@@ -606,6 +607,8 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
   PetscFunctionBeginUser;
 
   // error: missing file, not an HDF5 file, or truncated
+  PetscCheck(SbH5IsOwn(path, sizeof(why), why), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s",
+             why);
   access = H5Pcreate(H5P_FILE_ACCESS);
   PetscCall(SbScanOpenFile(f.im->where, path, &file, &f.bytes));
   (void)fclose(file);
@@ -643,12 +646,14 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   const char *dot = strrchr(body->mesh, '.');
   hid_t file, set, space;
   hssize_t n;
+  char why[PETSC_MAX_PATH_LEN + 256];
 
   *ncell = 0;
   if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
     return;
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
+  file = SbH5IsOwn(body->mesh, sizeof(why), why) ? H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT)
+                                                 : -1; /* the reader says why not */
   if (file < 0)
     return;
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;

@@ -62,7 +62,8 @@ typedef struct {
 
 /* The type in memory of numbers of this type in a file: that of PetscInt for H5T_STD_I64LE. */
 hid_t SbH5TypeInMemory(hid_t type);
-/* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
+/* Files are opened collectively for MPI-IO; SbH5Create() replaces what has the
+   name; SbH5Open() refuses files with links to others (SbH5IsOwn). */
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
                         PetscBool *ok); /* no error: see ok */

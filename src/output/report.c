@@ -135,6 +135,10 @@ PetscErrorCode SbReportHeader(SbRun run)
   print_bodies(run->model, out);
   if (out->scenario[0])
     entry("scenario", "%s", out->scenario);
+  PetscCall(SbOptionsEnvironment(sizeof(text), text));
+  if (text[0])
+    entry("environment", "PETSC_OPTIONS gives %s", text);
+  text[0] = 0;
 
   // effects, with the notes of their set-up
   for (PetscInt e = 0; e < run->model->neffect; e++) {

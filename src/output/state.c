@@ -115,6 +115,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
   char name[SB_MESH_NAME], *comma, *names, *rest;
+  char why[PETSC_MAX_PATH_LEN + 256];
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
   PetscInt which = -1;
@@ -134,6 +135,8 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   }
   if (!stat(o->path, &info) && S_ISDIR(info.st_mode))
     PetscCall(PetscStrlcat(o->path, "/fields.h5", sizeof(o->path)));
+  PetscCheck(SbH5IsOwn(o->path, sizeof(why), why), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s", option, text, why);
   o->file = stat(o->path, &info) ? -1 : H5Fopen(o->path, H5F_ACC_RDONLY, H5P_DEFAULT);
   PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them",

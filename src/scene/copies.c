@@ -4,7 +4,6 @@
   With scale s, rotation R and translation t of the body's own options and those of a copy (s', R',
   t'), a mesh point x is at R' R s' s x + t + t'. Rotations are composed as quaternions: q' q.
 */
-#include <errno.h>
 #include "scene_impl.h"
 
 #define NUMBERS 11 /* numbers on a line: x y z, axis, degrees, scale, velocity */
@@ -50,12 +49,13 @@ static PetscErrorCode read_file(const char *option, const char *file, PetscInt *
                                 SbPlacement **place)
 {
   char line[1024];
-  FILE *f = fopen(file, "r");
+  FILE *f;
+  const char *why = SbFileOpen(file, SB_TEXT_BYTES, &f);
   PetscInt room = 0;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s %s: %s", option, file, strerror(errno));
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s %s: %s", option, file, why);
   for (int number = 1; !ierr && fgets(line, sizeof(line), f); number++) {
     PetscBool found = PETSC_FALSE;
 

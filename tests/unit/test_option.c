@@ -444,6 +444,7 @@ static PetscErrorCode test_underscores(void)
 static PetscErrorCode test_nearest(void)
 {
   const char *const names[] = {"gravity", "traction", "pressure", "p1", "cr"};
+  const char *const solvers[] = {"direct", "cg_hypre", "cg_icc", "cg"};
   char text[64];
 
   PetscFunctionBeginUser;
@@ -456,6 +457,12 @@ static PetscErrorCode test_nearest(void)
   SbSuggestNames("rc", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "cr"), "'%s'", text);
   SbSuggestNames("contact", 5, names, sizeof(text), text);
+  SB_CHECK(!text[0], "'%s'", text);
+
+  /* a word of a name, where none is alike */
+  SbSuggestNames("hypre", 4, solvers, sizeof(text), text);
+  SB_CHECK(!strcmp(text, "cg_hypre"), "'%s'", text);
+  SbSuggestNames("hyp", 4, solvers, sizeof(text), text);
   SB_CHECK(!text[0], "'%s'", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
