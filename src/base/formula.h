@@ -19,7 +19,12 @@ struct _p_SbFormula {
   PetscBool uses[2];   /* time, position */
   PetscInt nrow;
   PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
+  char *where, *text;  /* owned; name of the option; the formula, NULL: it is live */
+  PetscReal largest;   /* its values' largest size: SB_LENGTH_MAX for lengths */
 };
+
+/* An empty formula of an option whose name is `where`. */
+PetscErrorCode SbFormulaNew(const char *where, SbFormula *formula);
 
 /* where: option name, for messages. */
 PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,

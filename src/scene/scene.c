@@ -217,7 +217,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
     /* constant velocities are stored in the body */
     if (SbFormulaUses(model->start[i].velocity[k], 'x'))
       continue;
-    body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
+    PetscCall(SbFormulaEval(model->start[i].velocity[k], 0., NULL, &body->velocity[k]));
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }
   PetscCall(SbOptionGiven(&scope, "displacement", &model->start[i].moved));
