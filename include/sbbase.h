@@ -257,6 +257,14 @@ int SbThreadsSetOne(void);
 /* m; a tenth of a light year. Coordinates and displacements beyond it are errors where they enter,
    as products of six of them must not overflow. */
 #define SB_LENGTH_MAX 1e15
+/* Whether each of n numbers is finite and at most SB_LENGTH_MAX in size. */
+static inline PetscBool SbLengthsFit(PetscInt n, const PetscReal x[])
+{
+  for (PetscInt i = 0; i < n; i++)
+    if (!(PetscAbsReal(x[i]) <= SB_LENGTH_MAX))
+      return PETSC_FALSE;
+  return PETSC_TRUE;
+}
 
 /* formulas */
 
