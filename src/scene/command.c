@@ -32,10 +32,56 @@ const SbOption SbCommandRows[] = {
   {0},
 };
 
+/* A file that is being read, and the one that names it. */
+typedef struct _OuterFile {
+  const struct _OuterFile *outer;
+  dev_t device;
+  ino_t inode;
+} OuterFile;
+
 /* Whether a word is this option, with one dash or two. */
 static PetscBool is_option(const char *word, const char *key)
 {
   return (PetscBool)!strcasecmp(word + 1 + (word[1] == '-'), key);
+}
+
+/* Follows the option files that a file names, before PETSc does so without end. `outer`: the files
+   around it. Returns 0, ELOOP if one names itself, or why one cannot be read. Rank 0. */
+static int follow_files(const char *file, const OuterFile *outer)
+{
+  FILE *f = fopen(file, "r");
+  char *line = NULL;
+  char *rest = NULL;
+  size_t size = 0;
+  int error = f ? 0 : errno;
+  struct stat info;
+  OuterFile here = {.outer = outer};
+
+  if (f && !fstat(fileno(f), &info)) {
+    here.device = info.st_dev;
+    here.inode = info.st_ino;
+  }
+  for (const OuterFile *o = outer; o && f; o = o->outer)
+    if (o->inode == here.inode && o->device == here.device)
+      error = ELOOP;
+  while (!error && getline(&line, &size, f) >= 0) {
+    line[strcspn(line, "#")] = 0;
+    for (char *word = strtok_r(line, " \t\r\n:\"", &rest); word && !error;
+         word = strtok_r(NULL, " \t\r\n:\"", &rest)) {
+      const char *next;
+
+      word += strspn(word, "-");
+      if (strcasecmp(word, "options_file") && strcasecmp(word, "options_file_yaml"))
+        continue;
+      next = strtok_r(NULL, " \t\r\n\"", &rest);
+      if (next)
+        error = follow_files(next, &here);
+    }
+  }
+  free(line);
+  if (f)
+    (void)fclose(f);
+  return error;
 }
 
 /* Whether rank 0 can read an option file, which is then recorded; else sets command->problem.
@@ -51,6 +97,8 @@ static PetscBool readable(const char *file, SbCommand *command)
     error = errno;
   if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode))
     error = EISDIR;
+  if (!rank && !error)
+    error = follow_files(file, NULL);
   (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
   if (!error) {
     if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
@@ -59,7 +107,9 @@ static PetscBool readable(const char *file, SbCommand *command)
   }
   if (!command->problem[0])
     (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s",
-                   file, strerror(error));
+                   file,
+                   error == ELOOP ? "it, or a file that it names, names itself by -options_file"
+                                  : strerror(error));
   return PETSC_FALSE;
 }
 
