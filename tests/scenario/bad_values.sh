@@ -61,4 +61,71 @@ error 1 "-body_block_velocity|log(x)|infinite|x,y,z = 0" block.opts -body_block_
 error 1 "-body_block_displacement|1e38*z|1e15 m" block.opts -body_block_displacement "0;0;1e38*z"
 error 1 "-body_block_translate|1e38|1e15 m" block.opts -body_block_translate 0,0,1e38
 
+# an explicit run beyond its stable step ends before its numbers overflow
+error 2 "step|stable" block.opts -time euler_symplectic -ts_dt 0.01 -ts_max_time 1 -body_block_velocity "x^2;0;0" -output_dir wild
+check "a number that is not finite in wild/history.csv" test "$(grep -ciE 'nan|inf[^o]' <(tail -n +3 wild/history.csv))" = 0
+
+# coordinates whose squares overflow
+for size in 1e16 1e154 1e170; do
+  sed "s/^0 0 1$/0 0 $size/" tet.off >huge.off
+  printf 'solid a\n%s\nendsolid a\n' "$(for k in 1 2 3 4; do printf 'facet normal 0 0 0\nouter loop\nvertex 0 0 %s\nvertex 1 0 %s\nvertex 0 1 0\nendloop\nendfacet\n' "$size" "$k"; done)" >huge.stl
+  printf '4 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 %s\n' "$size" >huge.node
+  printf '1 4 0\n1 1 2 3 4\n' >huge.ele
+  for file in huge.off huge.stl huge.node; do error 1 "$file|1e+15 m" block.opts -body_block_mesh $file; done
+  error 1 "huge.off|1e+15 m" block.opts "${plate[@]}" -effect_plate_response penalty -effect_plate_obstacle mesh:huge.off
+done
+
+# option files: one that names itself, two that name each other, more options than PETSc holds
+printf -- '-options_file self.opts\n' >self.opts
+printf -- '-options_file second.opts\n' >first.opts
+printf 'options_file: first.opts\n' >second.yml
+printf -- '-options_file first.opts\n' >second.opts
+error 1 "self.opts|-options_file" self.opts
+error 2 "first.opts|-options_file" first.opts
+error 1 "first.opts|-options_file" block.opts -options_file first.opts
+error 1 "second.yml|-options_file" second.yml
+for k in $(seq 560); do echo "-body_b${k}_young 1"; done >many.opts
+"${mpi[@]}" 1 "$supple" many.opts -version >out.txt 2>err.txt || check "many.opts: $(cat err.txt)" grep -qF -- "-body_default_" err.txt
+
+# lines of tables and copies: whole, without zero bytes and lone carriage returns
+{ printf '0 0 0 #'; printf 'x%.0s' $(seq 2000); printf ' 5 5 5\n1 0 0\n'; } >long.txt
+"${mpi[@]}" 1 "$supple" block.opts -body_block_copies long.txt -output_history_bodies yes -output_dir long >out.txt 2>&1
+code=$?
+check "long.txt: $(cat out.txt)" test $code = 0
+check "two copies in long.txt" grep -q ',block2_kinetic,' long/history.csv
+check "no third copy in long.txt" test "$(grep -c ',block3_kinetic,' long/history.csv)" = 0
+printf '0 0 0\r1 1 1\r2 2 2' >cr.txt
+printf '0 0 0\n1 0 0\0 5\n' >zero.txt
+error 1 "-body_block_copies|cr.txt|line 1|carriage" block.opts -body_block_copies cr.txt
+error 3 "-body_block_copies|zero.txt|line 2|zero" block.opts -body_block_copies zero.txt
+error 1 "-bodies|block1" block.opts -bodies block,block1 -body_block_copies "grid:2,1,1,1,1,1" -body_block1_mesh box:1,1,1:1 -body_block1_material linear -body_block1_young 1 -body_block1_poisson 0
+{ printf '0 0 #'; printf 'x%.0s' $(seq 2000); printf '\n0.01 0\n'; } >long_table.txt
+"${mpi[@]}" 1 "$supple" block.opts "${move[@]}" -effect_move_displacement "0;0;table:long_table.txt" >out.txt 2>&1
+code=$?
+check "long_table.txt: $(cat out.txt)" test $code = 0
+printf '0 0\r1 1\r' >cr_table.txt
+error 1 "-effect_move_displacement|cr_table.txt|line 1|carriage" block.opts "${move[@]}" -effect_move_displacement "0;0;table:cr_table.txt"
+
+# what is said: warns NAMES ARGUMENT...: one line of a run that succeeds names all of NAMES
+warns() {
+  local line name code
+  local -a names
+  IFS='|' read -ra names <<<"$1"
+  shift
+  "${mpi[@]}" 2 "$supple" "$@" >out.txt 2>err.txt
+  code=$?
+  check "$*: exit code $code, $(cat err.txt)" test $code = 0
+  line=$(grep -F -- "${names[0]}" err.txt)
+  check "$*: '$line' is not one warning" test "$(grep -c '^supple: warning: ' <<<"$line")" = 1
+  for name in "${names[@]}"; do check "$*: '$line' does not name $name" grep -qF -- "$name" <<<"$line"; done
+}
+warns "-effect_damp_alpha|-effect_damp_beta" block.opts -effects damp -effect_damp_type damping
+warns "-body_block_poisson|0.4999|p2" block.opts -body_block_poisson 0.4999
+warns "-body_block_poisson|-0.95" block.opts -body_block_poisson -0.95
+warns "-body_block_poisson|-0.999" block.opts -body_block_poisson -0.999 -body_block_material linear
+warns "-probe_tip_at|0.9 m" block.opts -probes tip -probe_tip_at 1,0,0
+warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2
+error 1 "-probes|'a#b'" block.opts -probes "'a#b'" -probe_a#b_at 0,0,0
+error 1 "-probes|tip" block.opts -probes tip,tip -probe_tip_at 0,0,0
+
 finish
