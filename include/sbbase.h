@@ -277,6 +277,18 @@ void SbMemoryReturnLarge(void);
 */
 int SbThreadsSetOne(void);
 
+/* m; a tenth of a light year. Coordinates and displacements beyond it are errors where they enter,
+   as products of six of them must not overflow. */
+#define SB_LENGTH_MAX 1e15
+/* Whether each of n numbers is finite and at most SB_LENGTH_MAX in size. */
+static inline PetscBool SbLengthsFit(PetscInt n, const PetscReal x[])
+{
+  for (PetscInt i = 0; i < n; i++)
+    if (!(PetscAbsReal(x[i]) <= SB_LENGTH_MAX))
+      return PETSC_FALSE;
+  return PETSC_TRUE;
+}
+
 /* formulas */
 
 /*
@@ -289,8 +301,14 @@ int SbThreadsSetOne(void);
   evaluation allocates nothing.
 */
 typedef struct _p_SbFormula *SbFormula;
-/* x may be NULL when the formula does not use it. */
-PetscReal SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);
+/*
+  Its value. Not collective. x may be NULL when the formula does not use it.
+
+  Error: PETSC_ERR_USER_INPUT with option, time and place if the value is not a number, infinite, or
+  a length beyond SB_LENGTH_MAX.
+*/
+PetscErrorCode SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3],
+                             PetscReal *value);
 PetscBool SbFormulaUses(SbFormula formula, char variable); /* 't': time; 'x': position */
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*

@@ -144,6 +144,14 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
                    mess && !strncmp(mess, "Unknown first token", 19)
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
+
+    /* PETSc's words say nothing of a file, or of what to do */
+    if (strstr(state.message, "max number of options"))
+      SbFormat(
+        sizeof(state.message), state.message,
+        "the scenario has more options than PETSc %s can hold, 512: give what many bodies "
+        "share as -body_default_..., make alike ones -body_NAME_copies, or use a newer PETSc",
+        SB_PETSC_VERSION);
     if (choice) {
       for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n'))
         *c = ' ';

@@ -76,8 +76,17 @@ static PetscBool insert_file(PetscOptions database, const char *path, int depth)
       (void)fclose(f);
     return PETSC_FALSE;
   }
-  if (yaml && getdelim(&line, &room, 0, f) > 0)
+  if (yaml && getdelim(&line, &room, 0, f) > 0) {
+    const char *inner = NULL;
+    PetscBool given = PETSC_FALSE;
+
     (void)PetscOptionsInsertStringYAML(database, line);
+    (void)PetscOptionsFindPair(database, NULL, "-options_file", &inner, &given);
+    if (given && inner) {
+      SbFormat(sizeof(name), name, "%s", inner);
+      good = insert_file(database, name, depth + 1);
+    }
+  }
   for (; good && !yaml && getline(&line, &room, f) >= 0;) {
     char *rest;
     char *word, *value, *more;

@@ -103,7 +103,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     least = PetscMin(least, b->active.pair[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
   if (b->contact.partner.obstacle)
-    SbPartnerPose(&b->contact.partner, stage->t, &pose);
+    PetscCall(SbPartnerPose(&b->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < nterm(b); i++) {
     PetscReal force[3] = {0.};
     PetscReal *columns;

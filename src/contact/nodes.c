@@ -132,7 +132,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
 
   PetscFunctionBeginUser;
   (void)speed;
-  SbPartnerBeginStep(t, dt, &c->contact.partner);
+  PetscCall(SbPartnerBeginStep(t, dt, &c->contact.partner));
   c->contact.friction.updates = 0;
   c->first = PETSC_TRUE;
   c->impact = 1;
@@ -384,7 +384,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);

@@ -61,7 +61,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
   if (first && b->contact.partner.obstacle && !b->separation.overlapping) {
     SbPose pose;
 
-    SbPartnerPose(&b->contact.partner, 0., &pose);
+    PetscCall(SbPartnerPose(&b->contact.partner, 0., &pose));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       const char *name = s->mesh->body[m->part[v]].name;
       const PetscReal *x = b->motion.x + 3 * v;

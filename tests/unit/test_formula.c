@@ -8,6 +8,15 @@
 
 static const PetscReal X[3] = {0.5, -2, 3};
 
+/* Its value; NaN where it has none. */
+static PetscReal value_at(SbFormula f, PetscReal t, const PetscReal x[3])
+{
+  PetscReal value = NAN;
+
+  (void)SbFormulaEval(f, t, x, &value);
+  return value;
+}
+
 /* Creation must fail with a message that contains these names; partial results are freed. */
 static PetscErrorCode refused(const char *text, const char *names)
 {
@@ -26,7 +35,10 @@ static PetscErrorCode value(const char *text, PetscReal expected)
 
   PetscFunctionBeginUser;
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f));
-  v = SbFormulaEval(f, 4, X);
+  if (PetscIsInfOrNanReal(expected))
+    SB_CHECK_ERROR(SbFormulaEval(f, 4, X, &v), PETSC_ERR_USER_INPUT, "-test");
+  else
+    PetscCall(SbFormulaEval(f, 4, X, &v));
   SB_CHECK(v == expected || PetscAbsReal(v - expected) <= 1e-14 * PetscAbsReal(expected) ||
              (v != v && expected != expected),
            "%s is %.17g, expected %.17g", text, v, expected);
@@ -92,9 +104,44 @@ static PetscErrorCode test_uses(void)
 
   /* without a dependence on position, x may be NULL */
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, "3*t", "-test", &f));
-  SB_CHECK(SbFormulaEval(f, 2, NULL) == 6, "3*t");
+  SB_CHECK(value_at(f, 2, NULL) == 6, "3*t");
   PetscCall(SbFormulaDestroy(&f));
   PetscCall(SbFormulaDestroy(&f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values that are not finite are errors with option, formula, time and place; of lengths also those
+   that are too large. */
+static PetscErrorCode test_not_finite(void)
+{
+  static const struct {
+    const char *text;
+    PetscReal largest;
+    const char *names; /* of the error at t = 4; NULL: it is valid */
+  } cases[] = {
+    {"sqrt(3-t)", PETSC_MAX_REAL, "-test|sqrt(3-t)|not a number|t = 4 s"},
+    {"1/(t-4)", PETSC_MAX_REAL, "-test|1/(t-4)|infinite|t = 4 s"},
+    {"-exp(1e3*t)", PETSC_MAX_REAL, "-test|infinite|t = 4 s"},
+    {"log(y)", PETSC_MAX_REAL, "-test|not a number|0.5,-2,3"},
+    {"log(y-t)", PETSC_MAX_REAL, "-test|not a number|t = 4 s|0.5,-2,3"},
+    {"1e400", PETSC_MAX_REAL, "-test|infinite"},
+    {"1e38", PETSC_MAX_REAL, NULL},
+    {"0-1e38*t", SB_LENGTH_MAX, "-test|beyond 1e15 m|t = 4 s"},
+    {"1e15", SB_LENGTH_MAX, NULL},
+  };
+  PetscReal v;
+  SbFormula f;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, cases[i].text, "-test", &f));
+    f->largest = cases[i].largest;
+    if (cases[i].names)
+      SB_CHECK_ERROR(SbFormulaEval(f, 4, X, &v), PETSC_ERR_USER_INPUT, cases[i].names);
+    else
+      PetscCall(SbFormulaEval(f, 4, X, &v));
+    PetscCall(SbFormulaDestroy(&f));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,12 +175,12 @@ static PetscErrorCode test_tables(void)
 
   PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
   SB_CHECK(SbFormulaUses(f, 't') && !SbFormulaUses(f, 'x'), "a table is a function of time");
-  SB_CHECK(SbFormulaEval(f, -1, NULL) == 1 && SbFormulaEval(f, 9, NULL) == -5, "constant outside");
-  SB_CHECK(SbFormulaEval(f, 1, NULL) == 3 && SbFormulaEval(f, 2, NULL) == 5, "at the rows");
-  SB_CHECK(SbFormulaEval(f, 0.25, NULL) == 1.5 && SbFormulaEval(f, 3, NULL) == 0, "in between");
+  SB_CHECK(value_at(f, -1, NULL) == 1 && value_at(f, 9, NULL) == -5, "constant outside");
+  SB_CHECK(value_at(f, 1, NULL) == 3 && value_at(f, 2, NULL) == 5, "at the rows");
+  SB_CHECK(value_at(f, 0.25, NULL) == 1.5 && value_at(f, 3, NULL) == 0, "in between");
   PetscCall(SbFormulaDestroy(&f));
   PetscCall(table(file, "3 8\n", NULL, &f));
-  SB_CHECK(SbFormulaEval(f, 0, NULL) == 8, "a single row");
+  SB_CHECK(value_at(f, 0, NULL) == 8, "a single row");
   PetscCall(SbFormulaDestroy(&f));
 
   PetscCall(table(file, "0 1\n1 x\n", "line 2", &f));
@@ -162,6 +209,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_cases());
   PetscCall(test_uses());
+  PetscCall(test_not_finite());
   PetscCall(test_tables());
   SB_TEST_END();
 }
