@@ -113,6 +113,11 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 /* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
 void SbFileReplace(const char *path, const void *text, size_t size, char message[SB_MESSAGE_MAX]);
+/* Renames NAME.END, from before a restart at this step, to NAME_before_STEP.END, with a number if
+   that is taken. Rank 0 only; other: the new path; message: the error, if any. */
+#define SB_OTHER_MAX (PETSC_MAX_PATH_LEN + 48)
+void SbFileKeep(const char *path, PetscInt step, char other[SB_OTHER_MAX],
+                char message[SB_MESSAGE_MAX]);
 
 /* state */
 
