@@ -332,8 +332,13 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const SbStage *stage,
                            PetscReal values[]);
+/* Hash of bytes, from a start value. */
+uint64_t SbHashBytes(uint64_t start, size_t n, const char bytes[]);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
+
+/* In the identity of a run: what its files contain, behind its options. */
+#define SB_CONTENT "content of "
 
 /* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum.
    Collective. */
