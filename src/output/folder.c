@@ -52,6 +52,21 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
   (void)unlink(tmp);
 }
 
+void SbFileKeep(const char *path, PetscInt step, char other[SB_OTHER_MAX],
+                char message[SB_MESSAGE_MAX])
+{
+  const char *dot = strrchr(path, '.');
+
+  for (int k = 1; k == 1 || !access(other, F_OK); k++) {
+    SbFormat(SB_OTHER_MAX, other, "%.*s_before_%06" PetscInt_FMT, (int)(dot - path), path, step);
+    if (k > 1)
+      SbAppend(SB_OTHER_MAX, other, "_%d", k);
+    SbAppend(SB_OTHER_MAX, other, "%s", dot);
+  }
+  if (rename(path, other))
+    SbFormat(SB_MESSAGE_MAX, message, "cannot rename %s to %s: %s", path, other, strerror(errno));
+}
+
 void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN])
 {
   SbFormat(PETSC_MAX_PATH_LEN, path, "%s/%s", out->dir, name);

@@ -298,13 +298,12 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
 
     /* a history with other columns stays, under another name */
     if (!kept && !access(h->path, F_OK)) {
-      char other[PETSC_MAX_PATH_LEN + 32];
+      char other[SB_OTHER_MAX];
 
-      (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv",
-                     (int)(strlen(h->path) - 4), h->path, run->clock.step0);
-      if (!rename(h->path, other))
-        PetscCall(
-          PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
+      SbFileKeep(h->path, run->clock.step0, other, message);
+      if (!message[0])
+        PetscCall(SbWarning(PETSC_COMM_SELF, "%s is damaged or has other columns: kept as %s",
+                            h->path, other));
     }
   }
   if (message[0])
