@@ -69,7 +69,8 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
                  "%s: node %lld is beyond %g m, the largest length, when scaled by %g; check the "
                  "file, %s and %s",
                  im->where, (long long)im->vert_number[v], (double)SB_LENGTH_MAX,
-                 (double)body->scale, SbImportOption(im, "scale", scale), SbImportOption(im, "translate", translate));
+                 (double)body->scale, SbImportOption(im, "scale", scale),
+                 SbImportOption(im, "translate", translate));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
