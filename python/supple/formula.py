@@ -22,6 +22,13 @@ NUMBER = re.compile(r"0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP]
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
+def keeping_nan(function):
+    """The function with nan wherever an argument is nan: numpy's fmin, power and comparisons would lose it."""
+    def value(*arguments):
+        return numpy.where(sum(numpy.isnan(a) for a in arguments) > 0, numpy.nan, function(*arguments))
+    return value
+
+
 def clamp(a, low, high):
     return numpy.where(a < low, low, numpy.where(a > high, high, a))
 
@@ -30,10 +37,10 @@ def clamp(a, low, high):
 FUNCTIONS = {
     "sin": (1, numpy.sin), "cos": (1, numpy.cos), "tan": (1, numpy.tan), "asin": (1, numpy.arcsin), "acos": (1, numpy.arccos), "atan": (1, numpy.arctan),
     "atan2": (2, numpy.arctan2), "exp": (1, numpy.exp), "log": (1, numpy.log), "sqrt": (1, numpy.sqrt), "abs": (1, numpy.abs),
-    "min": (2, numpy.fmin), "max": (2, numpy.fmax), "floor": (1, numpy.floor), "tanh": (1, numpy.tanh),
-    "step": (1, lambda a: numpy.where(a < 0, 0.0, 1.0)), "ramp": (1, lambda a: clamp(a, 0.0, 1.0)), "clamp": (3, clamp),
+    "min": (2, numpy.minimum), "max": (2, numpy.maximum), "floor": (1, numpy.floor), "tanh": (1, numpy.tanh),
+    "step": (1, keeping_nan(lambda a: numpy.where(a < 0, 0.0, 1.0))), "ramp": (1, lambda a: clamp(a, 0.0, 1.0)), "clamp": (3, keeping_nan(clamp)),
 }
-OPERATORS = {"+": numpy.add, "-": numpy.subtract, "*": numpy.multiply, "/": numpy.divide, "^": numpy.power}
+OPERATORS = {"+": numpy.add, "-": numpy.subtract, "*": numpy.multiply, "/": numpy.divide, "^": keeping_nan(numpy.power)}
 
 
 class FormulaError(RunError):

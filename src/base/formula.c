@@ -216,6 +216,16 @@ static PetscErrorCode expression(Parser *p, const char *operators)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether one of n arguments is not a number. C's min, max and pow, and comparisons, would lose it:
+   a formula would have a value where it has none. */
+static PetscBool any_nan(const PetscReal a[], int n)
+{
+  for (int i = 0; i < n; i++)
+    if (PetscIsNanReal(a[i]))
+      return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
 /* The value, whatever it is. */
 static PetscReal evaluate(SbFormula f, PetscReal t, const PetscReal x[3])
 {
@@ -249,13 +259,15 @@ static PetscReal evaluate(SbFormula f, PetscReal t, const PetscReal x[3])
       a[0] /= a[1];
       break;
     case '^':
-      a[0] = pow(a[0], a[1]);
+      a[0] = any_nan(a, 2) ? (PetscReal)NAN : pow(a[0], a[1]);
       break;
     case 'm':
       a[0] = -a[0];
       break;
     case 'f':
-      if (functions[s->index].f1)
+      if (any_nan(a, functions[s->index].narg))
+        a[0] = (PetscReal)NAN;
+      else if (functions[s->index].f1)
         a[0] = functions[s->index].f1(a[0]);
       else if (functions[s->index].f2)
         a[0] = functions[s->index].f2(a[0], a[1]);
