@@ -342,7 +342,9 @@ PetscErrorCode SbRunIntegrate(SbRun run)
   PetscCall(TSGetStepNumber(run->solve.ts, &step));
   PetscCall(TSGetTime(run->solve.ts, &t));
   PetscCall(TSGetTimeStep(run->solve.ts, &dt));
-  if (reason == TS_CONVERGED_ITS && t < run->clock.t_end * (1. - 1e-12))
+  run->clock.cut_short =
+    (PetscBool)(reason == TS_CONVERGED_ITS && t < run->clock.t_end * (1. - 1e-12));
+  if (run->clock.cut_short)
     PetscCall(SbWarning(run->model->comm,
                         "-ts_max_steps ends the run after step %" PetscInt_FMT
                         " at t = %g s, before -ts_max_time %g s",

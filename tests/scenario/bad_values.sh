@@ -124,7 +124,10 @@ warns "-body_block_poisson|0.4999|p2" block.opts -body_block_poisson 0.4999
 warns "-body_block_poisson|-0.95" block.opts -body_block_poisson -0.95
 warns "-body_block_poisson|-0.999" block.opts -body_block_poisson -0.999 -body_block_material linear
 warns "-probe_tip_at|0.9 m" block.opts -probes tip -probe_tip_at 1,0,0
-warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2
+warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2 -output_dir cut
+check "cut/run.json: $(tail -n 3 cut/run.json)" grep -q '"status": "cut short"' cut/run.json
+"${mpi[@]}" 1 "$supple" block.opts -ts_max_steps 4 -output_dir whole >out.txt 2>&1
+check "whole/run.json: $(tail -n 3 whole/run.json)" grep -q '"status": "completed"' whole/run.json
 error 1 "-probes|'a#b'" block.opts -probes "'a#b'" -probe_a#b_at 0,0,0
 error 1 "-probes|tip" block.opts -probes tip,tip -probe_tip_at 0,0,0
 
