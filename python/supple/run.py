@@ -98,7 +98,7 @@ class Mesh:
         self.vertices = own(group, "vertices")[()] if "vertices" in group else self.cells
         self.cells10 = own(group, "cells10")[()] if "cells10" in group else None
         self.parent = own(group, "parent")[()] if "parent" in group else None
-        self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices")]
+        self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices", "bodies")]
 
     @cached_property
     def surface(self):
@@ -201,6 +201,8 @@ class Run:
     def bodies(self):
         """Names, in the order of their numbers."""
         names = self.first_mesh.attrs.get("bodies", b"body")
+        if "bodies" in self.first_mesh:  # too long for an attribute
+            names = own(self.first_mesh, "bodies")[()]
         return (names.decode() if isinstance(names, bytes) else str(names)).split(",")
 
     def positions(self, k):

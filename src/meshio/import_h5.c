@@ -385,18 +385,35 @@ static int number_of(hid_t file, const char *object, const char *name)
 PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 {
   const hid_t attribute = open_attribute(file, mesh, "bodies");
-  const hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
-  const PetscBool text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
-                                     H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
+  const hid_t group = attribute < 0 ? H5Gopen2(file, mesh, H5P_DEFAULT) : -1;
+  const hid_t dataset = group >= 0 && H5Lexists(group, "bodies", H5P_DEFAULT) > 0
+                          ? H5Dopen2(group, "bodies", H5P_DEFAULT)
+                          : -1;
+  const hid_t space = dataset >= 0 ? H5Dget_space(dataset) : -1;
+  const hid_t object = attribute >= 0 ? attribute : dataset;
+  hid_t type = -1;
+  PetscBool text;
 
   PetscFunctionBeginUser;
+  if (object >= 0)
+    type = attribute >= 0 ? H5Aget_type(object) : H5Dget_type(object);
+  text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
+                     H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
   PetscCall(PetscCalloc1(text ? H5Tget_size(type) + 1 : 1, names));
-  if (text)
+  if (text && attribute >= 0)
     (void)H5Aread(attribute, type, *names);
+  else if (text && H5Sget_simple_extent_npoints(space) == 1)
+    (void)H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *names);
   if (type >= 0)
     (void)H5Tclose(type);
   if (attribute >= 0)
     (void)H5Aclose(attribute);
+  if (space >= 0)
+    (void)H5Sclose(space);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
+  if (group >= 0)
+    (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -16,6 +16,8 @@
 #include "output_impl.h"
 #include "sbgeometry.h"
 
+#define ATTRIBUTE_BYTES 60000 /* HDF5 holds an attribute of up to 64 KB in an object header */
+
 struct _p_SbFrames {
   SbH5 h5;
   hid_t top;             /* /step */
@@ -223,11 +225,15 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
 
-  /* the bodies that the numbers of /mesh/body stand for: "liver,stone" */
+  /* the bodies that the numbers of /mesh/body stand for: "liver,stone"; an attribute, or a dataset
+     where they are too long for one */
   PetscCall(PetscCalloc1(size, &names));
   for (PetscInt b = 0; b < run->model->nbody; b++)
     SbAppend(size, names, "%s%s", b ? "," : "", run->model->body[b].name);
-  PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  if (strlen(names) < ATTRIBUTE_BYTES)
+    PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  else
+    PetscCall(SbH5WriteText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
 
   /* points at rest, and cells */
