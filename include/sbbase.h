@@ -109,6 +109,17 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file);
    (presets of solvers): what is added later is not the user's. Without this call everything counts.
    Not collective. */
 PetscErrorCode SbOptionsRemember(void);
+/* PetscInitialize() without the files .petscrc, which PETSc would read in the home and in the
+   working folder; `-skip_petscrc no` on the command line reads them. *argv is replaced.
+   Collective. */
+PetscErrorCode SbOptionsInitialize(int *argc, char ***argv, const char *file);
+/* Why an option file is not read, "" if it is: the first option in it, or in a file that it names,
+   with which PETSc would load a library, run a program or open a connection (-dll_append); a file
+   in it that cannot be read. Before PetscInitialize(). Not collective. */
+void SbOptionsRefused(const char *file, size_t size, char why[]);
+/* The options of the environment (PETSC_OPTIONS, PETSC_OPTIONS_YAML of this process) that count, as
+   "-name value ..."; after SbOptionsRemember(). Not collective. */
+PetscErrorCode SbOptionsEnvironment(size_t size, char text[]);
 /* At the end of a run: warns about each option of the user's that nobody read; n: how many.
    Collective. */
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
@@ -213,6 +224,18 @@ void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE
 /* Comma-separated numbers, into p[most]; returns their count, -1 for other text or more numbers. */
 int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
+/* files */
+
+#define SB_TEXT_BYTES ((size_t)1 << 28) /* largest size of a table, a file of copies, a history */
+
+/* Opens a regular file for reading, of at most `most` bytes (0: any size): never waits, as for a
+   pipe without a writer. Returns NULL, or the reason why not, and then *file is NULL. Close with
+   fclose(). */
+const char *SbFileOpen(const char *path, size_t most, FILE **file);
+/* A new empty file for writing, in place of what has this name: a link is removed, not followed.
+   NULL and errno if that fails. Close with fclose(). */
+FILE *SbFileCreate(const char *path);
+
 /* arrays */
 
 /* Enlarges *array, of *size elements of `unit` bytes, to at least `need`, and twice: appending is
@@ -254,6 +277,18 @@ void SbMemoryReturnLarge(void);
 */
 int SbThreadsSetOne(void);
 
+/* m; a tenth of a light year. Coordinates and displacements beyond it are errors where they enter,
+   as products of six of them must not overflow. */
+#define SB_LENGTH_MAX 1e15
+/* Whether each of n numbers is finite and at most SB_LENGTH_MAX in size. */
+static inline PetscBool SbLengthsFit(PetscInt n, const PetscReal x[])
+{
+  for (PetscInt i = 0; i < n; i++)
+    if (!(PetscAbsReal(x[i]) <= SB_LENGTH_MAX))
+      return PETSC_FALSE;
+  return PETSC_TRUE;
+}
+
 /* formulas */
 
 /*
@@ -266,8 +301,14 @@ int SbThreadsSetOne(void);
   evaluation allocates nothing.
 */
 typedef struct _p_SbFormula *SbFormula;
-/* x may be NULL when the formula does not use it. */
-PetscReal SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);
+/*
+  Its value. Not collective. x may be NULL when the formula does not use it.
+
+  Error: PETSC_ERR_USER_INPUT with option, time and place if the value is not a number, infinite, or
+  a length beyond SB_LENGTH_MAX.
+*/
+PetscErrorCode SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3],
+                             PetscReal *value);
 PetscBool SbFormulaUses(SbFormula formula, char variable); /* 't': time; 'x': position */
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*

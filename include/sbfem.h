@@ -74,8 +74,6 @@ struct _p_SbSpace {
   PetscBool faces;             /* some body has its nodes at faces */
   PetscBool vertices;          /* all have them at vertices only: nodes are the mesh's vertices */
   PetscInt
-    *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
-  PetscInt
     *dirichlet_node; /* [ncell][4] massless node that a DG face is tied to, -1: none; or NULL */
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */

@@ -165,6 +165,7 @@ struct _p_SbMesh {
      nodes there; with overlap, point star forest, rest coordinates and labels (src/mesh/plex.c) */
   DM dm;
   PetscInt *face_point, *edge_point; /* [ncell][4], [ncell][6]; NULL without faces and edges */
+  PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL likewise */
   PetscSF cell_sf,
     vert_sf; /* from owned cells and vertices to their ghost copies, numbered as here */
   PetscInt nbody;
@@ -228,17 +229,14 @@ extern const SbOption SbMeshRows[];
 /* route.c: records to other ranks */
 
 typedef struct {
-  MPI_Comm comm;
+  PetscSF sf; /* from records that come in to those that leave */
   PetscInt nsend, nrecv;
   PetscInt *which;    /* [nsend] which of the caller's items they are, or NULL */
-  PetscMPIInt *dest;  /* [nsend] rank to which each goes */
-  PetscInt *position; /* [nsend] of a record among those that leave, by rank */
-  PetscMPIInt size, *scount, *sfirst, *rcount,
-    *rfirst; /* [size] to and from each rank, the first of them */
+  PetscSFNode *place; /* [nsend] where each goes: rank, and its number among those that come in */
 } SbRoute;
 
 /* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. The route
-   takes over which and dest. Collective. */
+   takes over which and frees dest. Collective. */
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest,
                              SbRoute *route);
 PetscErrorCode SbRouteDestroy(SbRoute *route);

@@ -274,6 +274,18 @@ void SbImportEdgeNodes(const SbImport *import, const SbImportEdges *edges, Petsc
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes,
                  const char *format, ...) PETSC_ATTRIBUTE_FORMAT(6, 7);
 
+/* own_h5.c */
+
+/*
+  SbH5IsOwn - whether all that an HDF5 file holds is in the file itself: no external or soft link,
+  no dataset stored in other files (external storage, virtual). Others could make a reader show, or
+  change, any file of the user.
+
+  Not collective. why: the reason, "FILE: /mesh/x is a link ...", as a part of a message. True for a
+  file that is missing or no HDF5, which its reader says; false for a pipe or device.
+*/
+PetscBool SbH5IsOwn(const char *path, size_t size, char why[]);
+
 /* import_h5.c: what is in the fields.h5 of a run */
 
 /* Its frames. Start with {.wanted = step}, negative: the last one. */

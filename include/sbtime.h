@@ -121,6 +121,7 @@ typedef struct {
     PetscReal longest_step;   /* recent maximum of a step, s */
     PetscReal longest_output; /* recent maximum of the output after it, s */
   } stop;
+  PetscBool cut_short;    /* -ts_max_steps ended the run before t_end */
   PetscBool paused;       /* SbRunSolve() returned by monitors.post_step; the run continues */
   PetscBool stopped;      /* the run was asked to end, and can be restarted; why: stop_reason */
   char stop_reason[1024]; /* why the run ended early, or a step failed; empty: neither */

@@ -7,6 +7,7 @@
   with an error line and a non-zero code. Open MPI refuses to start as root unless
   OMPI_ALLOW_RUN_AS_ROOT=1 and OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
 */
+#include <hdf5.h>
 #include <signal.h>
 #include "sb.h"
 
@@ -73,7 +74,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   /* initialise libraries and error handling */
   PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(SbCommandLine(&argc, argv, &command));
-  ierr = PetscInitialize(&argc, &argv, command.scenario, NULL);
+  ierr = SbOptionsInitialize(&argc, &argv, command.scenario);
   if (ierr)
     SbErrorFindYamlLine();
   PetscCall(ierr);
@@ -90,6 +91,8 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(SbRegisterAll());
   PetscCall(SbOptionBool(&SbRunScope, "error_trace", &trace));
   SbErrorSetTrace(trace);
+  if (!trace)
+    (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* errors have a message without HDF5's stack */
   for (PetscInt i = 0; i < command.nfile; i++)
     PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 

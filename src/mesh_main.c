@@ -16,7 +16,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   PetscFunctionBeginUser;
   PetscCall(SbErrorHandlerInstall("supple-mesh"));
   PetscCall(SbToolCommandLine(&argc, argv, &line));
-  PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  PetscCall(SbOptionsInitialize(&argc, &argv, NULL));
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN);

@@ -4,23 +4,16 @@ from pathlib import Path
 
 import numpy
 
-from .run import FACES
+from .formula import split_formulas, value_at
+from .run import FACES, read_text
 
-
-def formula(text, t):
-    """Value of one of the scenario's formulas of time, or of the table that it names."""
-    if text.startswith("table:"):
-        rows = [line.split("#")[0].replace(",", " ").replace(";", " ").split() for line in Path(text[6:]).read_text().splitlines()]
-        return float(numpy.interp(t, *numpy.array([row for row in rows if row], dtype=float).T))
-    names = {name: getattr(math, name) for name in "sin cos tan asin acos atan atan2 exp log sqrt floor tanh pi".split()}
-    names |= {"abs": abs, "min": min, "max": max, "t": t, "step": lambda a: float(a >= 0), "clamp": lambda a, low, high: min(max(a, low), high)}
-    names["ramp"] = lambda a: min(max(a, 0.0), 1.0)
-    return float(eval(text.replace("^", "**"), {"__builtins__": {}}, names))
+SURFACES = ("stl", "obj", "ply", "off")  # what trimesh may read here; its other formats name further files or hold more than a surface
+MESH_BYTES = 1 << 32  # largest size of a mesh
 
 
 def read_gmsh(path):
     """Vertices of a text file of version 4.1, and the boundary of its tets, or its triangles when it has none."""
-    lines = iter(path.read_text().splitlines())
+    lines = iter(read_text(path, MESH_BYTES).splitlines())
     points, cells = {}, {2: [], 4: []}
     for line in lines:
         if line == "$Nodes":
@@ -116,21 +109,24 @@ class Obstacle:
         return x + a[:3], triangles
 
     def read(self, path):
-        if not path.exists():
+        if not path.is_file():
             return
         if path.suffix == ".msh":
             x, self.triangles = read_gmsh(path)
-        else:
+        elif path.suffix.lower().lstrip(".") in SURFACES and path.stat().st_size <= MESH_BYTES:
             import trimesh
 
-            surface = trimesh.load_mesh(path, process=False)
+            with open(path, "rb") as file:  # without its name: materials and pictures that it names are not looked for
+                surface = trimesh.load_mesh(file, file_type=path.suffix.lower().lstrip("."), process=False)
             x, self.triangles = numpy.array(surface.vertices), numpy.array(surface.faces)
+        else:
+            return
         self.x = float(self.option("obstacle_scale", "1")) * x + [float(a) for a in self.option("obstacle_at", "0,0,0").split(",")]
 
     def shift(self, t):
         """[3] m at time t, s."""
         text = self.option("displacement", "0;0;0")
-        return [self.live(f"{self.name}_live_{k}", t) for k in "xyz"] if text == "live" else [formula(one, t) for one in text.split(";")]
+        return [self.live(f"{self.name}_live_{k}", t) for k in "xyz"] if text == "live" else [value_at(one, t, f"-effect_{self.name}_displacement") for one in split_formulas(text)]
 
     def live(self, column, t):
         table = self.run.history
@@ -140,7 +136,7 @@ class Obstacle:
         """[4][4]: turned about its axis, then shifted (m); x at time t (s) is pose @ (x, 1)."""
         centre, axis = ([float(x) for x in self.option(*given).split(",")] for given in (("axis_point", "0,0,0"), ("axis", "0,0,1")))
         text = self.option("angle", "0")
-        angle = math.radians(self.live(f"{self.name}_angle_live", t) if text == "live" else formula(text, t))
+        angle = math.radians(self.live(f"{self.name}_angle_live", t) if text == "live" else value_at(text, t, f"-effect_{self.name}_angle"))
         a = numpy.asarray(axis) / (numpy.linalg.norm(axis) or 1)
         cross = numpy.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
         pose = numpy.eye(4)
@@ -154,15 +150,22 @@ class Obstacle:
         return self.x @ pose[:3, :3].T + pose[:3, 3]
 
 
+def is_body(run, name, word):
+    """Whether a body is of this name, or one of the copies of the body of this name."""
+    copy = name[len(word):] if name.startswith(word) else None
+    return copy == "" or bool(copy and run.scenario.get(f"body_{word}_copies") and copy.strip("_").isdigit())
+
+
 def obstacles(run):
     """Those of a run that can be drawn, as a list. Files of meshes are looked for from the working directory."""
-    names, found = run.scenario.get("bodies", "").split(","), []
+    names, found = run.bodies, []
     up = run.up()
     way = sorted({int(k) for k in numpy.linspace(0, len(run) - 1, min(len(run), 40))})
     for effect in run.scenario.get("effects", "").split(","):
         if not run.scenario.get(f"effect_{effect}_obstacle"):
             continue
-        mine = [names.index(word) for word in run.scenario.get(f"effect_{effect}_on", "").split(",") if word in names] or range(len(names))
+        words = run.scenario.get(f"effect_{effect}_on", "").split(",")
+        mine = [k for k, name in enumerate(names) if any(is_body(run, name, word) for word in words)] or range(len(names))
         reached = numpy.concatenate([run.positions(k)[numpy.unique(run.mesh(k).cells[numpy.isin(run.mesh(k).body, list(mine))])] for k in way])
         obstacle = Obstacle(run, effect, reached, numpy.array([0.0, 0.0, 1.0]) if up is None else up)
         if obstacle.x is not None:

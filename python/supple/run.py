@@ -1,5 +1,8 @@
 """The folder of a run, read: meshes, frames, fields, history, settings."""
+import importlib
 import json
+import os
+import stat
 import time
 from functools import cached_property
 from pathlib import Path
@@ -7,12 +10,45 @@ from pathlib import Path
 import h5py
 import numpy
 
+TEXT_BYTES = 1 << 28  # largest size of a text file, as SB_TEXT_BYTES
 TENSOR = ("xx", "xy", "xz", "yy", "yz", "zz")  # order of six components in fields.h5
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))  # of a tet, counter-clockwise seen from outside
 
 
 class RunError(Exception):
     """A folder or file is not what it should be, a name is unknown, or a run failed; the message says which."""
+
+
+def read_text(path, most=TEXT_BYTES):
+    """A text file of a limited size; OSError where it is another kind of file (a pipe, a device) or larger."""
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(handle, encoding="utf-8", errors="replace") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(f"{path} is not a regular file")
+        text = file.read(most + 1)
+    if len(text) > most:
+        raise OSError(f"{path} is larger than {most} bytes")
+    return text
+
+
+def needed(module, what):
+    """A package that only this needs. RunError without it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as e:
+        raise RunError(f"{what}() needs the package {module}, which is not installed ({e}): pip install {'meshio pyvista' if what == 'to_pyvista' else module}") from None
+
+
+def own(group, name):
+    """The object at a path in an HDF5 group. RunError where it is not in the file itself: a link to another name or file, a dataset whose numbers are in other files."""
+    for part in name.strip("/").split("/"):
+        link = group.get(part, getlink=True)
+        if link is not None and not isinstance(link, h5py.HardLink):
+            raise RunError(f"{group.file.filename}: {group.name.rstrip('/')}/{part} is a link to another place; a results file of supple has none, so this one is not read")
+        group = group[part]
+    if isinstance(group, h5py.Dataset) and (group.external or group.is_virtual):
+        raise RunError(f"{group.file.filename}: the numbers of {group.name} are in other files; a results file of supple holds all of its own, so this one is not read")
+    return group
 
 
 class Surface:
@@ -58,11 +94,11 @@ class Mesh:
 
     def __init__(self, group):
         self.path = group.name
-        self.x, self.cells, self.body = group["x"][()], group["cells"][()], group["body"][()]
-        self.vertices = group["vertices"][()] if "vertices" in group else self.cells
-        self.cells10 = group["cells10"][()] if "cells10" in group else None
-        self.parent = group["parent"][()] if "parent" in group else None
-        self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices")]
+        self.x, self.cells, self.body = (own(group, name)[()] for name in ("x", "cells", "body"))
+        self.vertices = own(group, "vertices")[()] if "vertices" in group else self.cells
+        self.cells10 = own(group, "cells10")[()] if "cells10" in group else None
+        self.parent = own(group, "parent")[()] if "parent" in group else None
+        self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices", "bodies")]
 
     @cached_property
     def surface(self):
@@ -98,7 +134,7 @@ class Run:
             self.__dict__.pop(name, None)
         self.close()
         path = self.folder / "fields.h5"
-        if not path.exists():
+        if not path.is_file():
             if not (self.folder / "run.json").exists():
                 raise RunError(f"{path} does not exist; is {self.folder} the folder of a run with -output_fields?")
             return  # a run without fields
@@ -106,21 +142,22 @@ class Run:
             try:
                 self.read_index(path)
                 return
-            except (OSError, KeyError, RuntimeError) as e:
+            except (OSError, KeyError, RuntimeError, RunError) as e:
                 self.close()  # HDF5 would go on reading what it had
                 if attempts == 1:
-                    raise RunError(f"{path} is not a results file of supple: {e}") from None
+                    raise RunError(str(e) if isinstance(e, RunError) else f"{path} is not a results file of supple: {e}") from None
                 # a frame may have come while this was read, behind the end that the file had when it was opened
                 time.sleep(0.02)
 
     def read_index(self, path):
         """Frames of fields.h5, and that the newest of them is whole."""
         self.file = h5py.File(path, "r", locking=False)
-        hundreds = self.file["/step"]  # not by items(), where a group that has not come to the disk yet is None
-        self.paths = sorted((f"/step/{hundred}/{step}" for hundred in hundreds for step in hundreds[hundred]), key=lambda one: int(one.rpartition("/")[2]))
-        self.first_mesh = self.file["/mesh"]
+        hundreds = own(self.file, "step")  # not by items(), where a group that has not come to the disk yet is None
+        self.paths = sorted((f"/step/{hundred}/{step}" for hundred in hundreds for step in own(hundreds, hundred)), key=lambda one: int(one.rpartition("/")[2]))
+        self.first_mesh = own(self.file, "mesh")
         for one in self.paths[-1:]:
-            _ = [self.file[one][name] for name in self.file[one]]
+            frame = own(self.file, one)
+            _ = [own(frame, name) for name in frame]
         # another run in the same folder, or one that went on from a checkpoint: nothing of before counts
         inode, known = path.stat().st_ino, [one for one in self.paths if one in self.about]
         if inode != self.inode or len(known) < len(self.about) or known and self.about[known[-1]] != self.read_about(known[-1]):
@@ -134,7 +171,7 @@ class Run:
 
     def read_about(self, path):
         """(time, number of the mesh) of a frame."""
-        group = self.file[path]
+        group = own(self.file, path)
         return float(group.attrs["time"]), int(group.attrs.get("mesh", 0))
 
     # ---------------------------------------------------------------- frames
@@ -151,37 +188,40 @@ class Run:
     def frame(self, k):
         if not -len(self) <= k < len(self):
             raise RunError(f"there is no frame {k}; the run has {len(self)}")
-        return self.file[self.paths[k]]
+        return own(self.file, self.paths[k])
 
     def mesh(self, k=0):
         """The Mesh of a frame."""
         number = self.about[self.frame(k).name][1] if self.paths else 0
         if number not in self.meshes:
-            self.meshes[number] = Mesh(self.file[f"/mesh_{number:06d}" if number else "/mesh"])
+            self.meshes[number] = Mesh(own(self.file, f"mesh_{number:06d}" if number else "mesh"))
         return self.meshes[number]
 
     @property
     def bodies(self):
         """Names, in the order of their numbers."""
         names = self.first_mesh.attrs.get("bodies", b"body")
+        if "bodies" in self.first_mesh:  # too long for an attribute
+            names = own(self.first_mesh, "bodies")[()]
         return (names.decode() if isinstance(names, bytes) else str(names)).split(",")
 
     def positions(self, k):
         """Of the points [npoint][3] m in a frame; at rest where it has neither displacement nor position."""
         group, mesh = self.frame(k), self.mesh(k)
         if "displacement" in group:
-            return mesh.x + group["displacement"][()]
-        return group["position"][()].astype(float) if "position" in group else mesh.x
+            return mesh.x + own(group, "displacement")[()]
+        return own(group, "position")[()].astype(float) if "position" in group else mesh.x
 
     def fields(self, k=-1):
         """Names of a frame's fields, and of what belongs to its mesh."""
-        return [name for name, data in self.frame(k).items() if isinstance(data, h5py.Dataset)] + self.mesh(k).arrays
+        frame = self.frame(k)
+        return [name for name in frame if isinstance(own(frame, name), h5py.Dataset)] + self.mesh(k).arrays
 
     def data(self, name, k=-1):
         """The dataset of a field, with its attribute `unit`."""
         if name not in self.fields(k):
             raise RunError(f"the run has no field '{name}'; it has {', '.join(self.fields(k))}")
-        return self.frame(k)[name] if name in self.frame(k) else self.file[self.mesh(k).path][name]
+        return own(self.frame(k) if name in self.frame(k) else own(self.file, self.mesh(k).path), name)
 
     def field(self, name, k=-1):
         """A field as it is stored: [n] or [n][3] or [n][6] (xx xy xz yy yz zz), per point or per cell."""
@@ -211,7 +251,7 @@ class Run:
 
     def read_history(self):
         path = self.folder / "history.csv"
-        if not path.exists():
+        if not path.is_file():
             raise RunError(f"{path} does not exist: the run was made with -output_history no, or has not begun")
         with open(path, "rb") as f:
             head = f.readline() + f.readline()
@@ -242,13 +282,13 @@ class Run:
     def info(self):
         """run.json."""
         path = self.folder / "run.json"
-        return json.loads(path.read_text()) if path.exists() else {}
+        return json.loads(read_text(path)) if path.is_file() else {}
 
     @cached_property
     def scenario(self):
         """Options of scenario.opts, name without dash -> text."""
         path, found = self.folder / "scenario.opts", {}
-        for line in path.read_text().splitlines() if path.exists() else []:
+        for line in read_text(path).splitlines() if path.is_file() else []:
             words = line.split("#")[0].split(None, 1)
             if words and words[0].startswith("-"):
                 found[words[0][1:]] = words[1].strip().strip('"') if len(words) > 1 else ""
@@ -276,8 +316,7 @@ class Run:
 
     def to_meshio(self, k=-1):
         """A meshio.Mesh of a frame: points where they are, fields per point and per cell."""
-        import meshio
-
+        meshio = needed("meshio", "to_meshio")
         mesh, names = self.mesh(k), self.fields(k)
         fields = {name: self.field(name, k) for name in names}
         on_cells = {name: [values] for name, values in fields.items() if len(values) == len(mesh.cells)}
@@ -287,8 +326,8 @@ class Run:
 
     def to_pyvista(self, k=-1):
         """A pyvista.UnstructuredGrid of a frame, likewise."""
-        import pyvista
-
+        pyvista = needed("pyvista", "to_pyvista")
+        needed("meshio", "to_pyvista")
         return pyvista.from_meshio(self.to_meshio(k))
 
 
@@ -299,6 +338,13 @@ def colour_range(samples):
     if len(values) == 0:
         return 0.0, 1.0
     low, high = numpy.percentile(values, [0.7, 99.3])
+    if high - low <= 1e-12 * numpy.abs(values).max():
+        # nearly all are alike, as forces of contact that are zero but at a few points: the others decide
+        common = numpy.median(values)
+        others = values[numpy.abs(values - common) > 1e-12 * numpy.abs(values).max()]
+        if len(others):
+            low, high = numpy.percentile(numpy.append(others, common), [0.7, 99.3])
+            low, high = min(low, common), max(high, common)
     if low >= 0 and low < 0.3 * high:
         low = 0.0
     elif low < 0 < high:

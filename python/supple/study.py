@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -56,7 +57,9 @@ def options_of(scenario, options):
 
 def start(scenario, folder, ranks=1, **options):
     """Runs a scenario into `folder` and returns its Run. Keywords are options without the dash; one that only bodies have, young=2e4, is given
-    to all of them. Raises RunError with the program's message when the run fails."""
+    to all of them. Results of an earlier run in `folder` are replaced, unless output_overwrite=False keeps them in its subfolder before_DATE.
+    Raises RunError with the program's message when the run fails."""
+    options = {"output_overwrite": True} | options
     done = subprocess.run([*command(ranks), str(scenario), "-output_dir", str(folder), "-quiet", *options_of(scenario, options)],
                           capture_output=True, text=True)
     if done.returncode:
@@ -101,19 +104,22 @@ def bar(done, total):
         print(f"\r[{'#' * (30 * done // total):30}] {done} of {total} runs", end="\n" if done == total else "", file=sys.stderr, flush=True)
 
 
-def sweep(scenario, folder="out/sweep", ranks=1, columns=None, progress=True, **options):
-    """Runs a scenario for every combination of the options that are lists, one run after the other, each into folder/0000, ...
+def sweep(scenario, folder="out/sweep", ranks=1, columns=None, progress=True, workers=1, **options):
+    """Runs a scenario for every combination of the options that are lists, `workers` runs at a time, each into folder/0000, ...
+
+    With ranks and workers, ranks * workers processes compute at once. On a terminal a bar counts the runs that have ended.
 
     Returns a Table: the options that vary, `status` (completed, or the reason of a failure), the columns of the last row of the
     history (those named, else all), and `folder`. A run that fails does not end the sweep.
     """
     lists = {name: values for name, values in options.items() if isinstance(values, list)}
     fixed = {name: value for name, value in options.items() if name not in lists}
-    rows, cases = [], list(itertools.product(*lists.values()))
-    for k, case in enumerate(cases):
-        if progress:
-            bar(k, len(cases))
-        row = dict(zip(lists, case))
+    cases = list(itertools.product(*lists.values()))
+    if workers < 1 or int(workers) != workers:
+        raise RunError(f"workers={workers}: how many runs at a time, 1 or more")
+
+    def run_case(k):
+        row = dict(zip(lists, cases[k]))
         place = Path(folder) / f"{k:04d}"
         try:
             run = start(scenario, place, ranks, **fixed, **row)
@@ -122,10 +128,21 @@ def sweep(scenario, folder="out/sweep", ranks=1, columns=None, progress=True, **
             run.close()
         except RunError as e:
             row["status"] = str(e)
-        rows.append(row | {"folder": str(place)})
+        return row | {"folder": str(place)}
+
+    # threads only wait: each starts a run and reads the end of its history
     if progress:
-        bar(len(cases), len(cases))
-    return Table(rows)
+        bar(0, len(cases))
+    with ThreadPoolExecutor(workers) as pool:
+        runs = [pool.submit(run_case, k) for k in range(len(cases))]
+        try:
+            for done, _ in enumerate(as_completed(runs)):
+                if progress:
+                    bar(done + 1, len(cases))
+        finally:
+            for run in runs:
+                run.cancel()  # those that have not begun, after Ctrl-C
+    return Table([run.result() for run in runs])
 
 
 def richardson(sizes, values):
@@ -150,16 +167,30 @@ def richardson(sizes, values):
 
 
 class Convergence:
-    """Of a quantity with the size of the mesh or the step: sizes and values [n], order, limit (extrapolated), errors [n] against it."""
+    """Of a quantity with the size of the mesh or the step: sizes and values [n], order, limit (extrapolated), errors [n] against it; these are nan where no convergence is seen."""
 
     def __init__(self, quantity, sizes, values):
         self.quantity, self.sizes, self.values = quantity, numpy.array(sizes, dtype=float), numpy.array(values, dtype=float)
         self.order, self.limit = richardson(sizes, values)
+        first, second = self.values[numpy.argsort(self.sizes)[:2]]
+        self.same = bool(first == second)
+        if not self.converges:
+            self.limit = math.nan
         self.errors = numpy.abs(self.values - self.limit)
 
+    @property
+    def converges(self):
+        """Whether the differences between the three smallest sizes become smaller as those of a power of the size do, or the last one is zero."""
+        return not math.isnan(self.order) or self.same
+
+    def told(self):
+        if self.same:
+            return f"the two smallest sizes give the same value, {self.limit:.8g}"
+        return f"order {self.order:.3g}, limit {self.limit:.8g}" if self.converges else "no convergence seen: the differences of the values do not become smaller with the size"
+
     def __str__(self):
-        rows = [{"size": h, self.quantity: f, "error": e} for h, f, e in zip(self.sizes, self.values, self.errors)]
-        return f"{Table(rows)}\norder {self.order:.3g}, limit {self.limit:.8g}"
+        rows = [{"size": h, self.quantity: f} | ({"error": e} if self.converges else {}) for h, f, e in zip(self.sizes, self.values, self.errors)]
+        return f"{Table(rows)}\n{self.told()}"
 
 
 def convergence(scenario, quantity, sizes, folder="out/convergence", ranks=1, progress=True, **options):

@@ -52,6 +52,32 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                                        "PetscOptionsSetValue PetscParseLayerYAML"));
 }
 
+/* Whether a viewer or monitor that the user gave, as "-dm_view draw", is why PETSc failed. */
+static PetscBool is_wrong_viewer(const char *function, const char *file, const char *message,
+                                 size_t size, char given[])
+{
+  const PetscBool viewer =
+    (PetscBool)((file && (strstr(file, "src/sys/classes/viewer/") ||
+                          strstr(file, "src/sys/classes/draw/"))) ||
+                (file && function && strstr(file, "src/dm/") && strstr(function, "View")));
+
+  given[0] = 0;
+  for (PetscInt i = 0; file && i < SbTheOptions.nuser; i++) {
+    const char *name = SbTheOptions.user[i].name;
+    const char *value = SbTheOptions.user[i].value;
+    const char *path = value ? strchr(value, ':') : NULL;
+    const PetscBool shows = (PetscBool)(strstr(name, "_view") || strstr(name, "_monitor"));
+    char text[PETSC_MAX_PATH_LEN];
+
+    // the file that the message is about, or the only ones that may be meant
+    SbFormat(sizeof(text), text, "%.*s", path ? (int)strcspn(path + 1, ":") : 0,
+             path ? path + 1 : "");
+    if (shows && value && value[0] && (viewer || (text[0] && message && strstr(message, text))))
+      SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value);
+  }
+  return (PetscBool)(given[0] != 0);
+}
+
 /* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc
    failed. */
 static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file,
@@ -107,7 +133,9 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   if (p == PETSC_ERROR_INITIAL) {
     const PetscBool yaml = (PetscBool)(function && strstr(function, "YAML"));
     char given[256];
-    const PetscBool choice = is_wrong_choice(n, function, file, sizeof(given), given);
+    const PetscBool choice =
+      (PetscBool)(is_wrong_viewer(function, file, mess, sizeof(given), given) ||
+                  is_wrong_choice(n, function, file, sizeof(given), given));
 
     state.code = 1;
     state.pending = (PetscBool)(choice || is_user_error(n, function));
@@ -116,6 +144,14 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
                    mess && !strncmp(mess, "Unknown first token", 19)
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
+
+    /* PETSc's words say nothing of a file, or of what to do */
+    if (strstr(state.message, "max number of options"))
+      SbFormat(
+        sizeof(state.message), state.message,
+        "the scenario has more options than PETSc %s can hold, 512: give what many bodies "
+        "share as -body_default_..., make alike ones -body_NAME_copies, or use a newer PETSc",
+        SB_PETSC_VERSION);
     if (choice) {
       for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n'))
         *c = ' ';
@@ -180,7 +216,7 @@ void SbErrorFindYamlLine(void)
   size_t size;
 
   if (strstr(state.message, "YAML") && dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))
-    f = fopen(state.file, "r");
+    (void)SbFileOpen(state.file, 0, &f);
   if (!f)
     return;
   size = fread(text, 1, sizeof(text) - 1, f);

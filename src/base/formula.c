@@ -216,7 +216,18 @@ static PetscErrorCode expression(Parser *p, const char *operators)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
+/* Whether one of n arguments is not a number. C's min, max and pow, and comparisons, would lose it:
+   a formula would have a value where it has none. */
+static PetscBool any_nan(const PetscReal a[], int n)
+{
+  for (int i = 0; i < n; i++)
+    if (PetscIsNanReal(a[i]))
+      return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+/* The value, whatever it is. */
+static PetscReal evaluate(SbFormula f, PetscReal t, const PetscReal x[3])
 {
   PetscReal stack[SB_FORMULA_STACK + 2]; /* the first value is at stack[1] */
   PetscReal *a = stack;                  /* the last value */
@@ -248,13 +259,15 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
       a[0] /= a[1];
       break;
     case '^':
-      a[0] = pow(a[0], a[1]);
+      a[0] = any_nan(a, 2) ? (PetscReal)NAN : pow(a[0], a[1]);
       break;
     case 'm':
       a[0] = -a[0];
       break;
     case 'f':
-      if (functions[s->index].f1)
+      if (any_nan(a, functions[s->index].narg))
+        a[0] = (PetscReal)NAN;
+      else if (functions[s->index].f1)
         a[0] = functions[s->index].f1(a[0]);
       else if (functions[s->index].f2)
         a[0] = functions[s->index].f2(a[0], a[1]);
@@ -264,6 +277,30 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
     }
   }
   return a[0];
+}
+
+PetscErrorCode SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3], PetscReal *value)
+{
+  char at[128] = "";
+  PetscReal v;
+
+  PetscFunctionBeginUser;
+  v = evaluate(f, t, x);
+  *value = v;
+  if (PetscAbsReal(v) <= f->largest)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* where and when: snprintf() as PetscSNPrintf() would write "0." */
+  if (f->uses[0])
+    SbFormat(sizeof(at), at, " at t = %.10g s", (double)t);
+  if (f->uses[1] && x)
+    SbAppend(sizeof(at), at, ", x,y,z = %g,%g,%g m", (double)x[0], (double)x[1], (double)x[2]);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: %s is %s%s", f->where,
+          f->text ? f->text : "its value",
+          PetscIsNanReal(v)        ? "not a number"
+          : PetscIsInfOrNanReal(v) ? "infinite"
+                                   : "beyond 1e15 m",
+          at);
 }
 
 PetscBool SbFormulaUses(SbFormula f, char variable)
@@ -277,9 +314,20 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
   if (!*formula)
     PetscFunctionReturn(PETSC_SUCCESS);
   SbLiveForget(*formula);
+  PetscCall(PetscFree((*formula)->text));
+  PetscCall(PetscFree((*formula)->where));
   PetscCall(PetscFree((*formula)->step));
   PetscCall(PetscFree((*formula)->row));
   PetscCall(PetscFree(*formula));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormulaNew(const char *where, SbFormula *formula)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(formula));
+  PetscCall(PetscStrallocpy(where, &(*formula)->where));
+  (*formula)->largest = PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -290,8 +338,9 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
   Parser p = {.text = text, .next = text, .where = where};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&f));
-  *formula = f;
+  PetscCall(SbFormulaNew(where, formula));
+  f = *formula;
+  PetscCall(PetscStrallocpy(text, &f->text));
   skip_blanks(&p);
   if (!strncmp(p.next, "table:", 6)) {
     f->uses[0] = PETSC_TRUE;

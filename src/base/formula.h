@@ -19,7 +19,12 @@ struct _p_SbFormula {
   PetscBool uses[2];   /* time, position */
   PetscInt nrow;
   PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
+  char *where, *text;  /* owned; name of the option; the formula, NULL: it is live */
+  PetscReal largest;   /* its values' largest size: SB_LENGTH_MAX for lengths */
 };
+
+/* An empty formula of an option whose name is `where`. */
+PetscErrorCode SbFormulaNew(const char *where, SbFormula *formula);
 
 /* where: option name, for messages. */
 PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
@@ -33,5 +38,17 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);
+/* What is wrong with the n characters of a line: a zero byte, or ends of lines as of old Macs,
+   which would join lines; NULL: nothing. */
+static inline const char *SbLineProblem(const char *line, size_t n)
+{
+  const char *cr = (const char *)memchr(line, '\r', n);
+
+  if (memchr(line, 0, n))
+    return "holds a zero byte; it is no text file";
+  if (cr && cr + 1 < line + n && cr[1] != '\n')
+    return "holds a carriage return alone; end lines with a newline";
+  return NULL;
+}
 /* Linear interpolation, constant outside. */
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *formula, PetscReal t);

@@ -5,25 +5,32 @@
   empty lines are ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0
   reads the file, which scales to thousands of ranks; an error is broadcast and raised on all ranks.
 */
-#include <errno.h>
 #include "formula.h"
 
-/* Reads the complete file. Rank 0 only. */
-static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n,
-                                PetscReal (**rows)[2])
+/* Reads the complete file. Rank 0 only. *buffer: for a line; the caller frees it. f: NULL, and
+   `why`: it is not open. */
+static PetscErrorCode read_rows(FILE *f, const char *why, const char *file, const char *where,
+                                char **buffer, SbFormula formula)
 {
   static const char blanks[] = " \t\n\v\f\r";
-  char line[512];
+  size_t size = 0;
+  ssize_t length;
+  PetscInt *const n = &formula->nrow;
+  PetscReal(**const rows)[2] = &formula->row;
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file,
-             strerror(errno));
-  for (int number = 1; fgets(line, sizeof(line), f); number++) {
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file, why);
+  for (int number = 1; (length = getline(buffer, &size, f)) >= 0; number++) {
     PetscReal row[2];
+    char *const line = *buffer;
     char *next = line;
+    const char *problem = SbLineProblem(line, (size_t)length);
     char *end;
     PetscBool valid = PETSC_TRUE;
+
+    PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s, line %d %s", where, file, number,
+               problem);
 
     // two numbers, or a blank line
     line[strcspn(line, "#")] = 0;
@@ -63,9 +70,12 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
-    FILE *f = fopen(file, "r");
+    FILE *f;
+    char *line = NULL;
+    const char *why = SbFileOpen(file, SB_TEXT_BYTES, &f);
 
-    SB_CATCH(&caught, read_rows(f, file, where, &formula->nrow, &formula->row));
+    SB_CATCH(&caught, read_rows(f, why, file, where, &line, formula));
+    free(line);
     if (f)
       (void)fclose(f);
   }

@@ -10,10 +10,12 @@
   Each value is a table of two rows, so that a repeated step has the same values. A run that is
   faster than -live_pace simulated seconds per second waits; a slower one does not catch up.
 */
+#include <unistd.h>
 #include "formula.h"
 #include "option.h"
 
-#define VALUE_MAX 48 /* largest number of live values */
+#define LIVE_BYTES 65536 /* largest size of the file */
+#define VALUE_MAX 48     /* largest number of live values */
 
 typedef struct {
   char name[2 * SB_NAME_MAX];   /* first word of its line in the file: tool, tool_angle */
@@ -73,7 +75,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     for (PetscInt i = 0; i < live.n; i++)
       if (!strcmp(live.value[i].column, v->column))
         old = live.value[i].formula->row[0][1];
-    PetscCall(PetscNew(&formula[k]));
+    PetscCall(SbFormulaNew(where, &formula[k]));
     formula[k]->uses[0] = PETSC_TRUE;
     formula[k]->nrow = 2;
     PetscCall(PetscMalloc1(2, &formula[k]->row));
@@ -130,13 +132,21 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
    Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
-  FILE *f = fopen(live.file, "r");
-  char line[512];
+  FILE *f;
+  const char *why = SbFileOpen(live.file, LIVE_BYTES, &f);
+  char *line = NULL;
+  size_t size = 0;
+  ssize_t length;
 
   PetscFunctionBeginUser;
-  while (f && fgets(line, sizeof(line), f)) {
+  if (!f && !live.warned && !access(live.file, F_OK)) {
+    live.warned = PETSC_TRUE;
+    PetscCall(SbWarning(PETSC_COMM_SELF, "%s is not read: %s", live.file, why));
+  }
+  while (f && (length = getline(&line, &size, f)) >= 0) {
     const size_t n = strcspn(line, " \t,\r\n");
-    PetscBool useful = (PetscBool)(!n || line[0] == '#');
+    const PetscBool text = (PetscBool)!SbLineProblem(line, (size_t)length);
+    PetscBool useful = (PetscBool)(text && (!n || line[0] == '#'));
 
     for (PetscInt i = 0; i < live.n; i += live.value[i].n) {
       char *next = line + n;
@@ -144,12 +154,12 @@ static PetscErrorCode read_targets(PetscReal target[])
       PetscReal x[SB_OPTION_COUNT_MAX];
       int k = 0;
 
-      if (strlen(live.value[i].name) != n || strncmp(line, live.value[i].name, n))
+      if (!text || strlen(live.value[i].name) != n || strncmp(line, live.value[i].name, n))
         continue;
       for (; k < live.value[i].n; k++) {
         next += strspn(next, " \t,");
         x[k] = strtod(next, &end);
-        if (end == next || !isfinite(x[k]))
+        if (end == next || !(PetscAbsReal(x[k]) <= live.value[i].formula->largest))
           break;
         next = end;
       }
@@ -157,15 +167,16 @@ static PetscErrorCode read_targets(PetscReal target[])
         memcpy(&target[i], x, (size_t)k * sizeof(*x));
       useful = (PetscBool)(useful || k == live.value[i].n);
     }
-    if (useful || live.warned || !strchr(line, '\n'))
+    if (useful || live.warned || line[length - 1] != '\n')
       continue;
     line[strcspn(line, "\r\n")] = 0;
     live.warned = PETSC_TRUE;
     PetscCall(SbWarning(
       PETSC_COMM_SELF,
-      "%s: the line '%s' is not one of a value that is live, as `%s` with %d number%s", live.file,
-      line, live.value[0].name, live.value[0].n, live.value[0].n > 1 ? "s" : ""));
+      "%s: the line '%.200s' is not one of a value that is live, as `%s` with %d number%s",
+      live.file, line, live.value[0].name, live.value[0].n, live.value[0].n > 1 ? "s" : ""));
   }
+  free(line);
   if (f)
     (void)fclose(f);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -115,17 +115,66 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Place of an instance in the hash table of those that inherit; letters of both cases are one. */
+static size_t heir_hash(const char *klass, const char *instance)
+{
+  size_t hash = 5381;
+
+  for (const char *c = klass; *c; c++)
+    hash = 33 * hash + (size_t)(*c | 32);
+  for (const char *c = instance; *c; c++)
+    hash = 33 * hash + (size_t)(*c | 32);
+  return hash & (size_t)(SbTheOptions.nslot - 1);
+}
+
+/* The scope of an instance that inherits, or NULL. */
+static const SbScope *heir_of(const char *klass, const char *instance)
+{
+  if (!SbTheOptions.nslot)
+    return NULL;
+  for (size_t at = heir_hash(klass, instance); SbTheOptions.slot[at] >= 0;
+       at = (at + 1) & (size_t)(SbTheOptions.nslot - 1)) {
+    const SbScope *heir = &SbTheOptions.inherit[SbTheOptions.slot[at]];
+
+    if (!strcmp(heir->klass, klass) && !strcasecmp(heir->instance, instance))
+      return heir;
+  }
+  return NULL;
+}
+
+/* Puts number i into the table, which is doubled when it is half full. */
+static PetscErrorCode add_heir(PetscInt i)
+{
+  PetscInt first = i;
+
+  PetscFunctionBeginUser;
+  if (2 * SbTheOptions.ninherit > SbTheOptions.nslot) {
+    SbTheOptions.nslot = PetscMax(64, 2 * SbTheOptions.nslot);
+    PetscCall(PetscFree(SbTheOptions.slot));
+    PetscCall(PetscMalloc1(SbTheOptions.nslot, &SbTheOptions.slot));
+    for (PetscInt k = 0; k < SbTheOptions.nslot; k++)
+      SbTheOptions.slot[k] = -1;
+    first = 0;
+  }
+  for (; first <= i; first++) {
+    const SbScope *heir = &SbTheOptions.inherit[first];
+    size_t at = heir_hash(heir->klass, heir->instance);
+
+    while (SbTheOptions.slot[at] >= 0)
+      at = (at + 1) & (size_t)(SbTheOptions.nslot - 1);
+    SbTheOptions.slot[at] = first;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.ninherit; i++) {
-    const SbScope *known = &SbTheOptions.inherit[i];
-
-    if (!strcmp(known->klass, klass) && !strcmp(known->instance, instance))
-      PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (heir_of(klass, instance))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(grow(SbTheOptions.ninherit, sizeof(*SbTheOptions.inherit), &SbTheOptions.inherit));
   SbScopeSet(&SbTheOptions.inherit[SbTheOptions.ninherit++], klass, from, instance);
+  PetscCall(add_heir(SbTheOptions.ninherit - 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,6 +183,7 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
 {
   char name[SB_OPTION_NAME_MAX];
   const char *unused;
+  const SbScope *copy;
   PetscBool there;
   SbScope all;
 
@@ -143,15 +193,11 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   *where = *scope;
   SbOptionName(where, key, sizeof(name), name);
   PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
-  for (PetscInt i = 0; i < SbTheOptions.ninherit && !*given; i++) {
-    const SbScope *copy = &SbTheOptions.inherit[i];
-
-    if (strcmp(copy->klass, scope->klass) || strcasecmp(copy->instance, scope->instance))
-      continue;
+  copy = *given ? NULL : heir_of(scope->klass, scope->instance);
+  if (copy) {
     PetscCall(PetscStrncpy(where->instance, copy->type, sizeof(where->instance)));
     SbOptionName(where, key, sizeof(name), name);
     PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
-    break;
   }
 
   /* else the value for all bodies, which always counts as read */
@@ -292,6 +338,7 @@ PetscErrorCode SbOptionsReset(void)
   PetscCall(PetscFree(SbTheOptions.row));
   PetscCall(PetscFree(SbTheOptions.listed));
   PetscCall(PetscFree(SbTheOptions.inherit));
+  PetscCall(PetscFree(SbTheOptions.slot));
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   SbTheOptions = (SbOptionTable){0};
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -41,6 +41,7 @@ typedef struct {
   PetscInt ninherit;
   SbScope *
     inherit; /* [ninherit] `instance` of `klass` inherits missing values from the instance `type` */
+  PetscInt nslot, *slot; /* [nslot] hash table of numbers in `inherit`, -1: free; a power of two */
   PetscInt nlisted;
   char **listed; /* [nlisted] names in the lists of the scenario files, with duplicates; owned */
 } SbOptionTable;

@@ -82,6 +82,11 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
                "Unreadable range '%s' in a row of the option table", r->row->range);
     in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
   }
+
+  /* lengths also end where computing with them would overflow; infinite ones say "no limit" */
+  if (!strcmp(r->row->unit, "m") && PetscAbsReal(x) > SB_LENGTH_MAX && !PetscIsInfReal(x))
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is beyond 1e15 m, the largest length: %s",
+            r->name, r->text, r->row->help);
   PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name,
              r->text, blank, unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit,
              r->row->help);
@@ -328,6 +333,8 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
                "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s",
                r->name, r->text, i + 1, (int)sizeof(piece) - 1, r->row->help);
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, piece, r->name, &formulas[i]));
+    if (!strcmp(r->row->unit, "m"))
+      formulas[i]->largest = SB_LENGTH_MAX;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -34,6 +34,19 @@ static PetscInt edit_distance(const char *a, const char *b)
   return row[na % 3][nb];
 }
 
+/* Whether a word of three letters or more is one of those that underscores join in a name. */
+static PetscBool is_part(const char *word, const char *name)
+{
+  const size_t n = strlen(word);
+
+  for (const char *part = name; n > 2 && part; part = strchr(part, '_')) {
+    part += part[0] == '_';
+    if (!strncasecmp(part, word, n) && (!part[n] || part[n] == '_'))
+      return (PetscBool)(strlen(name) > n);
+  }
+  return PETSC_FALSE;
+}
+
 void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                     char text[])
 {
@@ -45,8 +58,13 @@ void SbSuggestNames(const char *word, PetscInt n, const char *const names[], siz
   for (PetscInt i = 0; i < n; i++)
     if (names[i])
       best = PetscMin(best, edit_distance(word, names[i]));
-  if (best > farthest)
+  if (best > farthest) {
+    /* a word of a longer name: hypre of cg_hypre */
+    for (PetscInt i = 0; i < n && nbest < 3; i++)
+      if (names[i] && is_part(word, names[i]))
+        SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
     return;
+  }
   for (PetscInt i = 0; i < n && nbest < 3; i++) {
     PetscBool again = PETSC_FALSE;
 

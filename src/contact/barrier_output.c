@@ -108,7 +108,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
                                     b->springs.spring[i].at.depth - b->springs.spring[i].start);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 2, MPIU_REAL, MPI_MIN, s->comm));
   if (b->contact.partner.obstacle)
-    SbPartnerPose(&b->contact.partner, stage->t, &pose);
+    PetscCall(SbPartnerPose(&b->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < nterm(b); i++) {
     PetscReal force[3] = {0.};
     PetscReal *columns;

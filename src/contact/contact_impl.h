@@ -93,7 +93,7 @@ typedef struct {
 
   Read     - the options of an obstacle and its path; without one nothing is done.
   SetUp    - reads the file of a mesh; appends a line about it to the effect's note.
-  Pose     - where it is at time t.
+  Pose     - where it is at time t. Error: PETSC_ERR_USER_INPUT where its path is not a number.
   BeginStep - its poses at both ends of a step from t to t + dt.
   AddForce - adds the force f on a body at x, N, and its torque about the axis, N m, to values[6];
              pose: at that time.
@@ -101,8 +101,8 @@ typedef struct {
 PetscErrorCode SbPartnerRead(SbEffect e, const SbScope *scope, SbPartner *partner);
 PetscErrorCode SbPartnerSetUp(SbEffect e, MPI_Comm comm, SbPartner *partner);
 PetscErrorCode SbPartnerDestroy(SbPartner *partner);
-void SbPartnerPose(const SbPartner *partner, PetscReal t, SbPose *pose);
-void SbPartnerBeginStep(PetscReal t, PetscReal dt, SbPartner *partner);
+PetscErrorCode SbPartnerPose(const SbPartner *partner, PetscReal t, SbPose *pose);
+PetscErrorCode SbPartnerBeginStep(PetscReal t, PetscReal dt, SbPartner *partner);
 void SbPartnerAddForce(const SbPartner *partner, const SbPose *pose, const PetscReal x[3],
                        const PetscReal f[3], PetscReal values[]);
 

@@ -145,7 +145,10 @@ PetscErrorCode SbFrictionConstrain(const Nodes *c, SbSpace space, ContactNode *t
       g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
     }
     row.spring = PETSC_TRUE;
-    row.stiffness = !careful(g) && !g->slides ? touch->spring.k : careful(g) || q ? g->turning : 0;
+    if (!careful(g) && !g->slides)
+      row.stiffness = touch->spring.k;
+    else if (careful(g) || q)
+      row.stiffness = g->turning;
     PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -26,7 +26,7 @@ PetscErrorCode SbContactGap_Nodes(SbContact contact, SbSpace space, const SbStag
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < c->n; i++) {
     const PetscInt node = c->node[i].node;
     PetscReal x[3], n[3], g;
@@ -49,7 +49,7 @@ PetscErrorCode SbContactPoints_Nodes(SbContact contact, SbSpace space, const SbS
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < c->n; i++) {
     const ContactNode *touch = &c->node[i];
     SbContactPoint p = {.body = {space->node_body[touch->node], -1},
@@ -77,7 +77,7 @@ PetscErrorCode SbEffectHistory_Nodes(SbEffect e, SbSpace space, const SbStage *s
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   (void)residual;
   for (int k = 0; k < 8; k++)
     values[k] = 0;
@@ -143,7 +143,7 @@ PetscErrorCode SbEffectLoad_Nodes(SbEffect e, SbSpace space, PetscReal t, const 
   PetscInt *number, *at;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, t, &c->contact.partner.pose[1]);
+  PetscCall(SbPartnerPose(&c->contact.partner, t, &c->contact.partner.pose[1]));
   PetscCall(PetscMalloc2(c->n, &number, c->n, &at));
   for (PetscInt i = 0; i < c->n; i++) {
     ContactNode *touch = &c->node[i];

@@ -57,10 +57,15 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
     const SbFacet *f = &facet[i];
     const PetscInt *per = SbSpaceCellElement(space, f->cell)->nodes_per;
     const SbMaterial m = space->material[space->mesh->cell_material[f->cell]];
+    PetscReal parts[2] = {1, 1}; /* of the area that a vertex has, and the middle of an edge */
 
+    if (per[0])
+      parts[0] = per[1] ? 12 : 3;
+    if (per[1])
+      parts[1] = 4;
     for (PetscInt a = 0; a < (per[1] ? SB_CELL_NODES : 4); a++) {
       const PetscInt node = SbSpaceCellNode(space, f->cell, a);
-      const PetscReal share = f->area / (!per[0] ? 1 : a >= 4 ? 4 : per[1] ? 12 : 3);
+      const PetscReal share = f->area / parts[a >= 4];
       const int *edge = a < 4 ? NULL : SbTetEdge[a - 4];
 
       /* at the vertex behind the facet; the node of CR and DG with its number is on the facet */
@@ -127,7 +132,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
 
   PetscFunctionBeginUser;
   (void)speed;
-  SbPartnerBeginStep(t, dt, &c->contact.partner);
+  PetscCall(SbPartnerBeginStep(t, dt, &c->contact.partner));
   c->contact.friction.updates = 0;
   c->first = PETSC_TRUE;
   c->impact = 1;
@@ -379,7 +384,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);

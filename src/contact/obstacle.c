@@ -93,9 +93,10 @@ static PetscErrorCode make_surface(SbObstacle o)
     const PetscInt v = k / 3;
     const PetscInt i = k % 3;
 
-    s->x[k] = o->shape == BOX     ? p[3 * ((v >> i) & 1) + i]
-              : o->shape == PLANE ? (p[3] + (PetscReal)v) * p[i]
-                                  : p[k];
+    if (o->shape == BOX)
+      s->x[k] = p[3 * ((v >> i) & 1) + i];
+    else
+      s->x[k] = o->shape == PLANE ? (p[3] + (PetscReal)v) * p[i] : p[k];
   }
   if (o->shape == BOX)
     PetscCall(PetscArraycpy(s->tri, box, 36));
@@ -200,7 +201,7 @@ static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal 
   PetscBool inside = PETSC_TRUE;
 
   for (int i = 0; i < 3; i++) {
-    v[i] = x[i] < p[i] ? x[i] - p[i] : x[i] > p[3 + i] ? x[i] - p[3 + i] : 0;
+    v[i] = PetscMin(x[i] - p[i], 0) + PetscMax(x[i] - p[3 + i], 0);
     if (v[i] != 0)
       inside = PETSC_FALSE;
   }
@@ -213,8 +214,8 @@ static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal 
     if (d >= depth)
       continue;
     depth = d;
-    for (int k = 0; k < 3; k++)
-      n[k] = k == i ? (side < 3 ? -1 : 1) : 0;
+    n[0] = n[1] = n[2] = 0;
+    n[i] = side < 3 ? -1 : 1;
   }
   return -depth;
 }

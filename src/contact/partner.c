@@ -37,22 +37,26 @@ PetscErrorCode SbPartnerDestroy(SbPartner *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbPartnerPose(const SbPartner *p, PetscReal t, SbPose *pose)
+PetscErrorCode SbPartnerPose(const SbPartner *p, PetscReal t, SbPose *pose)
 {
-  PetscReal d[3];
+  PetscReal d[3], degrees;
 
+  PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++)
-    d[i] = SbFormulaEval(p->path.displacement[i], t, NULL);
-  SbPoseSet(p->path.axis, SbFormulaEval(p->path.angle, t, NULL) * PETSC_PI / 180, p->path.point, d,
-            pose);
+    PetscCall(SbFormulaEval(p->path.displacement[i], t, NULL, &d[i]));
+  PetscCall(SbFormulaEval(p->path.angle, t, NULL, &degrees));
+  SbPoseSet(p->path.axis, degrees * PETSC_PI / 180, p->path.point, d, pose);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbPartnerBeginStep(PetscReal t, PetscReal dt, SbPartner *p)
+PetscErrorCode SbPartnerBeginStep(PetscReal t, PetscReal dt, SbPartner *p)
 {
+  PetscFunctionBeginUser;
   if (!p->obstacle)
-    return;
-  SbPartnerPose(p, t, &p->pose[0]);
-  SbPartnerPose(p, t + dt, &p->pose[1]);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbPartnerPose(p, t, &p->pose[0]));
+  PetscCall(SbPartnerPose(p, t + dt, &p->pose[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbPartnerAddForce(const SbPartner *p, const SbPose *pose, const PetscReal x[3],

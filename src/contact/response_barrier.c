@@ -107,19 +107,21 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 }
 
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
-static void find_path(Barrier *b, PetscReal t, PetscReal dt)
+static PetscErrorCode find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
   const SbContactSurface m = b->surface;
 
+  PetscFunctionBeginUser;
   if (!b->contact.partner.obstacle)
-    return;
-  SbPartnerBeginStep(t, dt, &b->contact.partner);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbPartnerBeginStep(t, dt, &b->contact.partner));
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     SbPoseApply(&b->contact.partner.pose[0], m->X + 3 * v,
                 b->motion.from + 3 * (v - m->nbody_vertex));
     SbPoseApply(&b->contact.partner.pose[1], m->X + 3 * v,
                 b->motion.to + 3 * (v - m->nbody_vertex));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The separation direction of a pair at distance zero: the normal of the triangle, or of both
@@ -163,7 +165,7 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
   if (b->motion.begun || t != 0.)
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   *first = PETSC_TRUE;
-  find_path(b, t, dt);
+  PetscCall(find_path(b, t, dt));
   PetscCall(SbContactSurfaceMarkDriven(m));
   PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
   PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
@@ -347,7 +349,7 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscBool moved;
 
   PetscFunctionBeginUser;
-  find_path(b, t, dt);
+  PetscCall(find_path(b, t, dt));
   b->contact.base.progress = 0.;
   b->multipliers.updates = 0;
   b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;

@@ -72,8 +72,8 @@ PetscErrorCode SbContactTargetVelocity_Exact(SbContact contact, SbSpace space, c
   SbPose before, now;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &now);
-  SbPartnerPose(&c->contact.partner, stage->t - INSTANT * stage->dt, &before);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &now));
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t - INSTANT * stage->dt, &before));
   for (PetscInt i = 0; i < c->n; i++) {
     const ContactNode *touch = &c->node[i];
     PetscReal x[3], X[3], from[3], to[3], v[3];

@@ -42,7 +42,7 @@ PetscErrorCode SbEffectForce_Springs(SbEffect e, SbSpace space, const SbStage *s
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < c->n; i++) {
     const ContactNode *touch = &c->node[i];
     PetscReal x[3], n[3], normal;
@@ -62,7 +62,7 @@ PetscErrorCode SbEffectTangent_Springs(SbEffect e, SbSpace space, const SbStage 
   SbPose pose;
 
   PetscFunctionBeginUser;
-  SbPartnerPose(&c->contact.partner, stage->t, &pose);
+  PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   for (PetscInt i = 0; i < c->n; i++) {
     const ContactNode *touch = &c->node[i];
     PetscReal x[3], n[3], block[9];

@@ -71,7 +71,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     PetscInt lowest[2] = {PETSC_MAX_INT, PETSC_MAX_INT}; /* number of all ranks, of this one */
     SbPose pose;
 
-    SbPartnerPose(&b->contact.partner, 0., &pose);
+    PetscCall(SbPartnerPose(&b->contact.partner, 0., &pose));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       PetscReal X[3], n[3];
 

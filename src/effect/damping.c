@@ -27,6 +27,11 @@ static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "alpha", &d->alpha));
   PetscCall(SbOptionReal(scope, "beta", &d->beta));
+  if (d->alpha == 0. && d->beta == 0.)
+    PetscCall(SbWarning(PETSC_COMM_WORLD,
+                        "the effect %s damps nothing: give -effect_%s_alpha (1/s) or "
+                        "-effect_%s_beta (s)",
+                        e->name, e->name, e->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -199,12 +199,13 @@ static PetscReal measure_of(PetscInt ncorner, const PetscReal e[3][3])
 }
 
 /* value = the load at time t. */
-static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
+static PetscErrorCode integrate(DeadLoad *load, SbSpace space, PetscReal t)
 {
   const SbMesh mesh = space->mesh;
   const PetscInt nc = load->on->ncorner;
   const SbPointRule *rule = load->on->rule;
 
+  PetscFunctionBeginUser;
   load->t = t;
   for (PetscInt i = 0; i < 3 * space->nnode; i++)
     load->value[i] = 0;
@@ -247,13 +248,15 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
       measure = part * measure_of(nc, (const PetscReal(*)[3])e);
 
       // the load there, spread over the nodes
-      for (int i = 0; i < 3; i++)
-        q[i] =
-          measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
+      for (int i = 0; i < 3; i++) {
+        PetscCall(SbFormulaEval(load->density[i], t, p, &q[i]));
+        q[i] = measure * rule->weight[k] * (q[i] + load->uniform[i]);
+      }
       for (PetscInt a = 0; a < 3 * n; a++)
         load->value[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3] += phi[a / 3] * q[a % 3];
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
@@ -284,7 +287,7 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 
   // a steady load is integrated once
   PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
-  integrate(load, space, 0);
+  PetscCall(integrate(load, space, 0));
   for (int i = 0; i < 3; i++)
     steady = (PetscBool)(steady && !SbFormulaUses(load->density[i], 't'));
   if (steady)
@@ -295,11 +298,12 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   DeadLoad *load = (DeadLoad *)e->data;
-  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
+  PetscReal s;
 
   PetscFunctionBeginUser;
+  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &s));
   if (load->corner && stage->t != load->t)
-    integrate(load, space, stage->t);
+    PetscCall(integrate(load, space, stage->t));
   for (PetscInt i = 0; i < load->n; i++) {
     const PetscInt node = 3 * load->node[i];
 

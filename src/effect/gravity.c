@@ -23,15 +23,15 @@ static PetscErrorCode options_gravity(SbEffect e, const SbScope *scope)
 static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const PetscReal *vector = (const PetscReal *)e->data;
-  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *mass =
     space->consistent_mass || !e->dynamic ? space->node_share : space->node_mass;
-  const PetscReal g[3] = {s * vector[0], s * vector[1], s * vector[2]};
+  PetscReal s;
 
   PetscFunctionBeginUser;
+  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &s));
   for (PetscInt i = 0; i < space->nnode_owned; i++)
     for (int c = 0; c < 3; c++)
-      f[3 * i + c] += mass[i] * g[c];
+      f[3 * i + c] += mass[i] * (s * vector[c]);
   PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

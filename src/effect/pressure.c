@@ -178,15 +178,30 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The pressure at time t, Pa. */
+static PetscErrorCode pressure_at(SbEffect e, PetscReal t, PetscReal *p)
+{
+  PetscReal factor;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFormulaEval(((const Pressure *)e->data)->value, t, NULL, p));
+  PetscCall(SbFormulaEval(e->time, t, NULL, &factor));
+  *p *= factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
   const SbMesh mesh = space->mesh;
   PetscInt *count;
   PetscInt n = 0;
+  PetscReal value = 1.;
   PetscBool some;
 
   PetscFunctionBeginUser;
+  if (e->steady)
+    PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
   PetscCall(PetscCalloc1(mesh->nbody, &count));
@@ -204,7 +219,7 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
       p->facet[n++] = p->facet[k];
   p->nfacet = n;
   PetscCall(PetscFree(count));
-  if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0))
+  if (p->follower && value != 0)
     PetscCall(find_rim(p, space));
 
   /* the remainder of bodies with nodes at faces, and free rims */
@@ -279,11 +294,11 @@ static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3]
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p =
-    SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
+  PetscReal p;
 
   PetscFunctionBeginUser;
+  PetscCall(pressure_at(e, stage->t, &p));
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
     if (load->whole[b])
       PetscCall(SbSpaceAddVolume(space, b, u, -p, f, NULL));
@@ -307,10 +322,11 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p = stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) *
-                      SbFormulaEval(e->time, stage->t, NULL);
+  PetscReal p;
 
   PetscFunctionBeginUser;
+  PetscCall(pressure_at(e, stage->t, &p));
+  p *= stage->shift_k;
   if (p == 0)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
@@ -391,10 +407,11 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
                                            const PetscReal x[], PetscReal y[])
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p = stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) *
-                      SbFormulaEval(e->time, stage->t, NULL);
+  PetscReal p;
 
   PetscFunctionBeginUser;
+  PetscCall(pressure_at(e, stage->t, &p));
+  p *= stage->shift_k;
   for (PetscInt k = 0; k < load->nfacet; k++) {
     PetscReal side[2][3] = {{0}};
     PetscReal w[2][3] = {{0}};

@@ -119,11 +119,14 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
 {
   const Support *d = (const Support *)e->data;
-  const PetscReal theta =
-    d->path.angle ? SbFormulaEval(d->path.angle, t, NULL) * PETSC_PI / 180 : 0;
-  const PetscReal half = PetscSinReal(theta / 2);
+  PetscReal theta = 0;
+  PetscReal half;
 
   PetscFunctionBeginUser;
+  if (d->path.angle)
+    PetscCall(SbFormulaEval(d->path.angle, t, NULL, &theta));
+  theta *= PETSC_PI / 180;
+  half = PetscSinReal(theta / 2);
   for (PetscInt i = 0, row = 0; i < d->n; i++) {
     const PetscReal *X = &space->node_x[3 * d->node[i]];
     PetscReal r[3], kr[3], kkr[3];
@@ -136,9 +139,10 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
     for (int c = 0; c < 3; c++) {
       PetscReal u = 0;
 
-      if (d->path.angle)
-        u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] +
-            SbFormulaEval(d->path.displacement[c], t, X);
+      if (d->path.angle) {
+        PetscCall(SbFormulaEval(d->path.displacement[c], t, X, &u));
+        u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] + u;
+      }
       if (d->bits[i] & (1 << c))
         space->fixed_value[3 * row + c] = u;
     }
@@ -153,13 +157,16 @@ static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal 
                                            PetscReal *work)
 {
   const Support *d = (const Support *)e->data;
-  const PetscReal theta[2] = {SbFormulaEval(d->path.angle, t0, NULL) * PETSC_PI / 180,
-                              SbFormulaEval(d->path.angle, t1, NULL) * PETSC_PI / 180};
+  PetscReal theta[2];
   const PetscReal *r[2] = {r0, r1};
   const PetscReal still[3] = {0};
   SbPose pose[2];
 
   PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) {
+    PetscCall(SbFormulaEval(d->path.angle, k ? t1 : t0, NULL, &theta[k]));
+    theta[k] *= PETSC_PI / 180;
+  }
   if (theta[0] == theta[1])
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++)

@@ -164,11 +164,11 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
       PetscInt f = 0;
       PetscBool owned = PETSC_FALSE;
 
-      if (mesh->cell_body[i / 4] != body || (!supported && s->neighbour[i] < i / 4))
+      if (mesh->cell_body[i / 4] != body || (!supported && mesh->neighbour[i] < i / 4))
         continue;
-      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4)
+      while (!supported && f < 3 && mesh->neighbour[4 * mesh->neighbour[i] + f] != i / 4)
         f++;
-      *face = (Face){{i / 4, supported ? SUPPORT : s->neighbour[i]}, {i % 4, f}};
+      *face = (Face){{i / 4, supported ? SUPPORT : mesh->neighbour[i]}, {i % 4, f}};
       face_nodes(s, face, node);
       for (int k = 0; k < 8; k++)
         owned = (PetscBool)(owned || node[k] < s->nnode_owned);

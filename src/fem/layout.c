@@ -30,7 +30,7 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
 {
   PetscInt f = 0;
 
-  while (f < 3 && s->neighbour[4 * other + f] != cell)
+  while (f < 3 && s->mesh->neighbour[4 * other + f] != cell)
     f++;
   return f;
 }
@@ -202,26 +202,6 @@ static PetscErrorCode number_nodes(SbSpace s, uint64_t prescribed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cell across each face, -1: none here, from the supports of the faces. */
-static PetscErrorCode find_neighbours(SbSpace s)
-{
-  const SbMesh mesh = s->mesh;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell + 1, &s->neighbour));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    const PetscInt *cell;
-    PetscInt n;
-
-    PetscCall(DMPlexGetSupportSize(mesh->dm, mesh->face_point[i], &n));
-    PetscCall(DMPlexGetSupport(mesh->dm, mesh->face_point[i], &cell));
-    s->neighbour[i] = -1;
-    if (n == 2)
-      s->neighbour[i] = cell[cell[0] == i / 4 ? 1 : 0];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and
    tets, contains an edge if it contains both vertices; other groups contain the edges of their
    triangles and tets, so that no edge through a thin body is in the group of its surface. Owners
@@ -371,8 +351,6 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++)
       if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
         prescribed |= SB_SET_BIT(k / mesh->nbody);
-    if (s->faces)
-      PetscCall(find_neighbours(s));
 
     // one entry more: a table without entries, on a rank without cells, is not a missing one
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell + 1, &s->cell_node));
@@ -398,7 +376,6 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
     PetscCall(PetscFree4(s->node_x, s->node_body, s->node_set, s->node_orig));
   }
   PetscCall(PetscFree(s->edge_node));
-  PetscCall(PetscFree(s->neighbour));
   PetscCall(PetscFree(s->dirichlet_node));
   PetscCall(PetscFree(s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -444,8 +421,8 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
         continue;
 
       /* the node opposite across the face, and the weight of the cell's own node in the mean */
-      if (s->neighbour[face] >= 0) {
-        const PetscInt other = s->neighbour[face];
+      if (s->mesh->neighbour[face] >= 0) {
+        const PetscInt other = s->mesh->neighbour[face];
 
         *node = s->cell_node[4 * other + face_towards(s, other, cell)];
         s->batch_weight[4 * b + a - 4][l] = stiffness[cell] / (stiffness[cell] + stiffness[other]);

@@ -16,6 +16,8 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
       box[v][k] = x[3 * v + k % 3];
     for (int k = 0; k < 3; k++)
       largest = PetscMax(largest, PetscAbsReal(x[3 * v + k]));
+    PetscAssert(SbLengthsFit(3, x + 3 * v), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+                "Point %" PetscInt_FMT " is beyond the largest length", v);
   }
   PetscCall(SbBoxTreeCreate(n, (const PetscReal(*)[6])box, &tree));
   grown = tolerance + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * largest;

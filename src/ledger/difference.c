@@ -87,13 +87,22 @@ PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *
 {
   PetscReal own_rtol, atol;
   PetscBool warm, solved;
+  SbRun run = l->run;
   KSP ksp;
+  Vec U;
 
   PetscFunctionBeginUser;
   l->solving -= MPI_Wtime();
-  PetscCall(SbRunSolveTangent(l->run, B, X, its, &solved));
+  PetscCall(SbRunSolveTangent(run, B, X, its, &solved));
   if (!solved) {
-    PetscCall(SNESGetKSP(l->run->solve.snes, &ksp));
+    PetscCall(SNESGetKSP(run->solve.snes, &ksp));
+
+    /* Newton's method had nothing to do: no tangent was assembled */
+    if (!run->solve.tangent_known) {
+      PetscCall(SNESGetSolution(run->solve.snes, &U));
+      PetscCall(SNESComputeJacobian(run->solve.snes, U, run->solve.system, run->solve.J));
+      PetscCall(KSPSetOperators(ksp, run->solve.system, run->solve.J));
+    }
     PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, NULL, NULL));
     PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
     PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));

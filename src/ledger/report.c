@@ -339,7 +339,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   if (rank)
     PetscFunctionReturn(PETSC_SUCCESS);
-  f = fopen(file, "w");
+  f = SbFileCreate(file);
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot open %s for writing", file);
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, f,
                          "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));

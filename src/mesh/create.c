@@ -91,6 +91,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscCall(DMDestroy(&m->dm));
   PetscCall(PetscFree(m->face_point));
   PetscCall(PetscFree(m->edge_point));
+  PetscCall(PetscFree(m->neighbour));
   PetscCall(PetscSFDestroy(&m->cell_sf));
   PetscCall(PetscSFDestroy(&m->vert_sf));
   PetscCall(PetscFree5(m->gvert, m->vert_orig, m->vert_body, m->vert_set, m->x));

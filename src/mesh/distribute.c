@@ -27,47 +27,47 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
 static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
                                  SbLocalMesh *to)
 {
+  const MPI_Comm comm = PetscObjectComm((PetscObject)route->sf);
   const PetscInt *which = route->which;
-  const PetscMPIInt *dest = route->dest;
-  PetscInt *at, *order, *position, *count;
-  PetscMPIInt *mark;
+  PetscInt *at, *to_rank, *start, *order, *last;
+  PetscMPIInt size;
   SbRouteList list = {0};
   SbRoute vertices;
 
   PetscFunctionBeginUser;
   *to = (SbLocalMesh){0};
 
-  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell
-  // are there
-  PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
-  PetscCall(PetscCalloc4(route->nsend, &order, from->nvert, &position, route->size, &count,
-                         from->nvert, &mark));
+  // vertices to send to each rank, in the order of the cells; at[][4]: which of the list the
+  // vertices of a cell are, then their places there
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(
+    PetscMalloc3(4 * (size_t)route->nsend, &at, route->nsend, &to_rank, from->nvert, &last));
   for (PetscInt i = 0; i < route->nsend; i++)
-    order[route->position[i]] = i;
+    to_rank[i] = route->place[i].rank;
+  PetscCall(SbBucketByKey(route->nsend, to_rank, size, &start, &order));
   for (PetscInt v = 0; v < from->nvert; v++)
-    mark[v] = -1;
+    last[v] = -1;
   for (PetscInt k = 0; k < route->nsend; k++) {
     const PetscInt i = order[k];
     const PetscInt *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
     for (int a = 0; a < 4; a++) {
-      if (mark[v[a]] != dest[i]) {
-        PetscCall(SbRouteAdd(&list, v[a], dest[i]));
-        mark[v[a]] = dest[i];
-        position[v[a]] = count[dest[i]]++;
+      if (last[v[a]] < 0 || list.rank[last[v[a]]] != to_rank[i]) {
+        last[v[a]] = list.n;
+        PetscCall(SbRouteAdd(&list, v[a], (PetscMPIInt)to_rank[i]));
       }
-      at[4 * (size_t)i + a] = position[v[a]];
+      at[4 * (size_t)i + a] = last[v[a]];
     }
   }
-  PetscCall(PetscFree4(order, position, count, mark));
-  PetscCall(SbRouteCreate(route->comm, list.n, list.item, list.rank, &vertices));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(order));
+  PetscCall(SbRouteCreate(comm, list.n, list.item, list.rank, &vertices));
+  for (PetscInt i = 0; i < 4 * route->nsend; i++)
+    at[i] = vertices.place[at[i]].index;
   PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
-  PetscCall(PetscFree(at));
+  PetscCall(PetscFree3(at, to_rank, last));
   to->ncell = route->nrecv;
   to->nvert = vertices.nrecv;
-  for (PetscMPIInt r = 0; r < route->size; r++)
-    for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
-      to->cell[i] += vertices.rfirst[r];
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list.item, from->vertex, &to->vertex));
   if (owned)
@@ -87,6 +87,55 @@ static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, Pet
     order[i] = i;
   }
   PetscCall(PetscSortIntWithPermutation(n, number, order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends cells that have come, and those of their vertices that are not there yet, by original
+   number: a vertex may have come from several ranks. The first cells, which this rank owns, by
+   original number too. Destroys `from`. */
+static PetscErrorCode append(SbLocalMesh *local, SbLocalMesh *from)
+{
+  const PetscInt known = local->nvert;
+  const PetscInt before = local->ncell;
+  const PetscInt room = PetscMax(from->nvert, from->ncell);
+  const size_t nvert = (size_t)(known + from->nvert);
+  const size_t ncell = (size_t)(before + from->ncell);
+  PetscInt *orig, *number, *order, *position;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc4(known, &orig, room, &number, room, &order, from->nvert, &position));
+  for (PetscInt v = 0; v < known; v++)
+    orig[v] = local->vertex[v].orig;
+  PetscCall(ascending(from->nvert, sizeof(*from->vertex), from->vertex, number, order));
+  PetscCall(PetscRealloc(nvert * sizeof(*local->vertex), &local->vertex));
+  PetscCall(PetscRealloc(nvert * sizeof(*local->owner), &local->owner));
+  for (PetscInt i = 0; i < from->nvert; i++) {
+    const PetscInt v = order[i];
+    PetscInt *n = &local->nvert;
+
+    PetscCall(PetscFindInt(number[v], known, orig, &position[v]));
+    if (position[v] >= 0)
+      continue;
+    if (*n == known || local->vertex[*n - 1].orig != number[v]) {
+      local->vertex[*n] = from->vertex[v];
+      local->owner[(*n)++] = from->owner ? from->owner[v] : -1;
+    }
+    position[v] = *n - 1;
+  }
+  PetscCall(PetscFree(from->vertex));
+  PetscCall(ascending(from->ncell, sizeof(*from->data), from->data, number, order));
+  PetscCall(PetscRealloc(ncell * sizeof(*local->data), &local->data));
+  PetscCall(PetscRealloc(4 * ncell * sizeof(*local->cell), &local->cell));
+  for (PetscInt k = 0; k < from->ncell; k++) {
+    const PetscInt c = before ? k : order[k];
+    const PetscInt at = local->ncell++;
+
+    local->data[at] = from->data[c];
+    for (int a = 0; a < 4; a++)
+      local->cell[4 * (size_t)at + a] = position[from->cell[4 * (size_t)c + a]];
+  }
+  PetscCall(PetscFree4(orig, number, order, position));
+  PetscCall(SbLocalMeshDestroy(from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,9 +272,7 @@ PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMerge
   const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
-  PetscInt *orig, *number, *order, *position;
-  PetscInt n = 0;
-  PetscInt nvert;
+  PetscInt n;
   SbRouteList copies = {0};
   SbRoute route;
   SbLocalMesh owned, ghost;
@@ -257,33 +304,11 @@ PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMerge
   PetscCall(SbRouteDestroy(&route));
   PetscCall(SbLocalMeshDestroy(&whole));
 
-  // sort owned cells and their vertices by original number; a vertex may have come from several
-  // ranks
-  *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
-  PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number,
-                         PetscMax(owned.nvert, owned.ncell), &order, owned.nvert, &position));
-  PetscCall(ascending(owned.nvert, sizeof(*owned.vertex), owned.vertex, number, order));
-  PetscCall(PetscMalloc1(owned.nvert, &local->vertex));
-  for (PetscInt i = 0; i < owned.nvert; i++) {
-    if (!n || local->vertex[n - 1].orig != number[order[i]])
-      local->vertex[n++] = owned.vertex[order[i]];
-    position[order[i]] = n - 1;
-  }
-  local->nvert = nvert = n;
-  PetscCall(PetscFree(owned.vertex));
-  PetscCall(ascending(owned.ncell, sizeof(*owned.data), owned.data, number, order));
-  PetscCall(PetscMalloc1(4 * (size_t)owned.ncell, &local->cell));
-  PetscCall(PetscMalloc1(owned.ncell, &local->data));
-  for (PetscInt k = 0; k < owned.ncell; k++) {
-    local->data[k] = owned.data[order[k]];
-    for (int a = 0; a < 4; a++)
-      local->cell[4 * (size_t)k + a] = position[owned.cell[4 * (size_t)order[k] + a]];
-  }
-  PetscCall(PetscFree3(number, order, position));
-  PetscCall(SbLocalMeshDestroy(&owned));
+  *local = (SbLocalMesh){0};
+  PetscCall(append(local, &owned));
+  local->ncell_owned = local->ncell;
 
   // owners of the shared vertices
-  PetscCall(PetscCalloc1(local->nvert, &local->owner));
   PetscCall(border_create(comm, w->Nvert, local, &border));
 
   // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
@@ -313,37 +338,6 @@ PetscErrorCode SbDistribute(PetscPartitioner partitioner, PetscBool all, SbMerge
   PetscCall(SbRouteCreate(comm, copies.n, copies.item, copies.rank, &route));
   PetscCall(send_cells(local, PETSC_TRUE, &route, &ghost));
   PetscCall(SbRouteDestroy(&route));
-
-  // append the ghost cells, and those of their vertices that this rank does not have
-  n = nvert;
-  PetscCall(
-    PetscMalloc4(nvert, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert, &position));
-  for (PetscInt v = 0; v < nvert; v++)
-    orig[v] = local->vertex[v].orig;
-  PetscCall(ascending(ghost.nvert, sizeof(*ghost.vertex), ghost.vertex, number, order));
-  PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
-  PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
-  for (PetscInt i = 0; i < ghost.nvert; i++) {
-    const PetscInt v = order[i];
-
-    PetscCall(PetscFindInt(number[v], nvert, orig, &position[v]));
-    if (position[v] >= 0)
-      continue;
-    if (n == nvert || local->vertex[n - 1].orig != number[v]) {
-      local->vertex[n] = ghost.vertex[v];
-      local->owner[n++] = ghost.owner[v];
-    }
-    position[v] = n - 1;
-  }
-  local->nvert = n;
-  n = local->ncell;
-  local->ncell += ghost.ncell;
-  PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
-  PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
-  PetscCall(PetscArraycpy(local->data + n, ghost.data, ghost.ncell));
-  for (PetscInt i = 0; i < 4 * ghost.ncell; i++)
-    local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
-  PetscCall(PetscFree4(orig, number, order, position));
-  PetscCall(SbLocalMeshDestroy(&ghost));
+  PetscCall(append(local, &ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -104,8 +104,6 @@ PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank);
 /* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller.
    Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
-/* Rank that sent the received record i. */
-PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
 /* forest.c: ranks that have leaves of each root, user[start[k]] to user[start[k + 1] - 1]
    ascending; the caller frees both. Collective. */

@@ -121,23 +121,17 @@ static PetscErrorCode return_parts(PetscInt n, const PetscMPIInt part[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Star forest from n items of each rank to all N of them on rank 0, in the order of the ranks. */
+/* Star forest that gathers n items of each rank, N of them all, on rank 0. */
 static PetscErrorCode gather_forest(MPI_Comm comm, PetscInt n, PetscInt *N, PetscSF *forest)
 {
-  PetscInt before;
-  PetscSFNode *root;
-  PetscMPIInt rank;
+  PetscLayout layout;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, comm));
-  PetscCallMPI(MPI_Allreduce(&n, N, 1, MPIU_INT, MPI_SUM, comm));
-  PetscCall(PetscMalloc1(n, &root));
-  for (PetscInt i = 0; i < n; i++)
-    root[i] = (PetscSFNode){0, before - n + i};
+  PetscCall(PetscLayoutCreateFromSizes(comm, n, PETSC_DETERMINE, 1, &layout));
+  PetscCall(PetscLayoutGetSize(layout, N));
   PetscCall(PetscSFCreate(comm, forest));
-  PetscCall(
-    PetscSFSetGraph(*forest, rank ? 0 : *N, n, NULL, PETSC_COPY_VALUES, root, PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetGraphWithPattern(*forest, layout, PETSCSF_PATTERN_GATHER));
+  PetscCall(PetscLayoutDestroy(&layout));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,8 +155,8 @@ static SB_PARTITION_SIGNATURE(partition_metis)
   PetscCall(PetscMalloc3(N + 1, &first, Nadjacent, &next, N, &owner));
   for (PetscInt i = 0; i < n; i++)
     degree[i] = start[i + 1] - start[i];
-  PetscCall(SbForestReduce(vertices, 1, MPIU_INT, degree, first + (rank ? 0 : 1)));
-  PetscCall(SbForestReduce(edges, 1, MPIU_INT, adjacent, next));
+  PetscCall(SbForestBroadcast(vertices, 1, MPIU_INT, degree, first + (rank ? 0 : 1)));
+  PetscCall(SbForestBroadcast(edges, 1, MPIU_INT, adjacent, next));
   if (!rank) {
     idx_t nvertex = (idx_t)N;
     idx_t ncon = 1;
@@ -190,7 +184,7 @@ static SB_PARTITION_SIGNATURE(partition_metis)
   }
 
   // parts back to the ranks of the vertices
-  PetscCall(SbForestBroadcast(vertices, 1, MPI_INT, owner, part));
+  PetscCall(SbForestReduce(vertices, 1, MPI_INT, owner, part));
   PetscCall(return_parts(n, part, nparts, section, points));
   PetscCall(PetscSFDestroy(&vertices));
   PetscCall(PetscSFDestroy(&edges));
@@ -421,7 +415,7 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
   PetscInt *start = NULL;
   PetscInt *adjacent = NULL;
   const PetscInt *point;
-  PetscBool in_place;
+  PetscBool in_place, weights;
   PetscSF forest = NULL;
   PetscSection section;
   IS points;
@@ -431,6 +425,9 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
   PetscCall(PetscPartitionerSetType(
     partitioner, w->Ncell <= METIS_MOST ? SB_PARTITIONER_METIS : SB_PARTITIONER_BISECTION));
   PetscCall(PetscPartitionerSetFromOptions(partitioner));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-petscpartitioner_use_vertex_weights", &weights));
+  PetscCheck(!weights, comm, PETSC_ERR_USER_INPUT,
+             "-petscpartitioner_use_vertex_weights: tets have no weights; leave it out");
 
   // one rank; fewer cells than ranks, which some types do not allow
   if (size == 1 || w->Ncell <= size) {

@@ -97,6 +97,8 @@ static PetscErrorCode find_sides(SbMesh mesh, Sides *s)
       f++;
     s->face[i] = s->face[NFACE * other + f];
   }
+  mesh->neighbour = faces.neighbour;
+  faces.neighbour = NULL;
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(SbTetEdges(mesh->nvert, mesh->ncell, mesh->cell, &s->nedge, &s->edge));
 
@@ -204,41 +206,6 @@ static PetscErrorCode set_range(DMLabel label, PetscInt value, PetscInt first, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which points have the points of a stratum in their cones: a bucket sort of these cones. */
-typedef struct {
-  PetscInt n;            /* number of points of the stratum */
-  PetscInt cone_size;    /* of the points above */
-  PetscInt first, above; /* first points of both */
-  PetscInt *start;       /* [n + 1] */
-  PetscInt *item;        /* [start[n]] entries of the cones, ascending */
-} Supports;
-
-/* cone[nabove][cone_size] in numbers from zero on. Their sizes go to the plex. */
-static PetscErrorCode find_supports(DM dm, PetscInt nabove, const PetscInt cone[], Supports *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbBucketByKey(s->cone_size * nabove, cone, s->n, &s->start, &s->item));
-  for (PetscInt i = 0; i < s->n; i++)
-    PetscCall(DMPlexSetSupportSize(dm, s->first + i, s->start[i + 1] - s->start[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* After DMSetUp(): the supports of a stratum follow each other in the plex. */
-static PetscErrorCode fill_supports(DM dm, Supports *s)
-{
-  const PetscInt *there;
-
-  PetscFunctionBeginUser;
-  if (s->start[s->n]) {
-    PetscCall(DMPlexGetSupport(dm, s->first, &there));
-    for (PetscInt i = 0; i < s->start[s->n]; i++)
-      ((PetscInt *)there)[i] = s->above + s->item[i] / s->cone_size;
-  }
-  PetscCall(PetscFree(s->start));
-  PetscCall(PetscFree(s->item));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Points, cones, supports, strata. s: NULL without faces and edges. */
 static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
 {
@@ -248,8 +215,6 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
   static const PetscInt cone_size[4] = {4, 0, 3, 2};
   static const DMPolytopeType type[4] = {DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_POINT,
                                          DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_SEGMENT};
-  Supports supports[3];
-  const int nsupport = s ? 3 : 1;
   PetscInt *cone, *orientation;
   DMLabel types;
   DM dm = mesh->dm;
@@ -259,17 +224,6 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
   for (int k = 0; k < 4; k++)
     for (PetscInt p = first[k]; k != 1 && p < first[k + 1]; p++)
       PetscCall(DMPlexSetConeSize(dm, p, cone_size[k]));
-  if (s) {
-    supports[0] = (Supports){s->nface, 4, first[2], first[0], NULL, NULL};
-    supports[1] = (Supports){s->nedge, 3, first[3], first[2], NULL, NULL};
-    supports[2] = (Supports){mesh->nvert, 2, first[1], first[3], NULL, NULL};
-    PetscCall(find_supports(dm, mesh->ncell, s->face, &supports[0]));
-    PetscCall(find_supports(dm, s->nface, s->face_edge, &supports[1]));
-    PetscCall(find_supports(dm, s->nedge, s->edge_vert, &supports[2]));
-  } else {
-    supports[0] = (Supports){mesh->nvert, 4, first[1], first[0], NULL, NULL};
-    PetscCall(find_supports(dm, mesh->ncell, mesh->cell, &supports[0]));
-  }
   PetscCall(DMSetUp(dm));
   PetscCall(DMPlexGetCones(dm, &cone));
   PetscCall(DMPlexGetConeOrientations(dm, &orientation));
@@ -277,8 +231,7 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
     PetscCall(fill_cones(mesh, s, cone, orientation));
   for (PetscInt i = 0; !s && i < 4 * mesh->ncell; i++)
     cone[i] = mesh->ncell + mesh->cell[i - i % 4 + plex_vertex[i % 4]];
-  for (int k = 0; k < nsupport; k++)
-    PetscCall(fill_supports(dm, &supports[k]));
+  PetscCall(DMPlexSymmetrize(dm));
 
   // the types are known: PETSc need not look at every cone
   PetscCall(DMCreateLabel(dm, "celltype"));
@@ -289,108 +242,56 @@ static PetscErrorCode create_topology(SbMesh mesh, const Sides *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode set_coordinates(SbMesh mesh)
+/* Face or, behind the faces, edge number i = NSIDE cell + side. */
+static inline PetscInt side_of(const Sides *s, PetscInt i)
 {
-  PetscSection section;
-  PetscScalar *x;
-  Vec coordinates;
+  const PetscInt c = i / NSIDE;
+  const PetscInt k = i % NSIDE;
 
-  PetscFunctionBeginUser;
-  PetscCall(DMGetCoordinateSection(mesh->dm, &section));
-  PetscCall(PetscSectionSetNumFields(section, 1));
-  PetscCall(PetscSectionSetFieldComponents(section, 0, 3));
-  PetscCall(PetscSectionSetChart(section, mesh->ncell, mesh->ncell + mesh->nvert));
-  for (PetscInt v = mesh->ncell; v < mesh->ncell + mesh->nvert; v++) {
-    PetscCall(PetscSectionSetDof(section, v, 3));
-    PetscCall(PetscSectionSetFieldDof(section, v, 0, 3));
-  }
-  PetscCall(PetscSectionSetUp(section));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * mesh->nvert, &coordinates));
-  PetscCall(PetscObjectSetName((PetscObject)coordinates, "coordinates"));
-  PetscCall(VecSetBlockSize(coordinates, 3));
-  PetscCall(VecGetArrayWrite(coordinates, &x));
-  PetscCall(PetscArraycpy(x, mesh->x, 3 * (size_t)mesh->nvert));
-  PetscCall(VecRestoreArrayWrite(coordinates, &x));
-  PetscCall(DMSetCoordinatesLocal(mesh->dm, coordinates));
-  PetscCall(VecDestroy(&coordinates));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return k < NFACE ? s->face[NFACE * c + k] : s->nface + s->edge[NEDGE * c + k - NFACE];
 }
 
-/* Owner and number there of the sides of all cells, own[ncell][NSIDE]. Collective. */
-static PetscErrorCode own_sides(SbMesh mesh, const Sides *s, PetscSFNode own[])
+/* Owner of each face and edge, and the point that it is there. Collective. */
+static PetscErrorCode own_sides(SbMesh mesh, const Sides *s, PetscMPIInt rank, PetscSFNode side[])
 {
   const PetscInt nside = s->nface + s->nedge;
+  const PetscInt n = NSIDE * mesh->ncell;
   PetscInt *low, *high;
-  PetscSFNode *side;
-  PetscMPIInt rank;
+  PetscSFNode *sent;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
-  PetscCall(PetscMalloc3(nside, &low, nside, &high, nside, &side));
+  PetscCall(PetscMalloc3(nside, &low, nside, &high, n, &sent));
   for (PetscInt i = 0; i < nside; i++) {
     low[i] = PETSC_MAX_INT;
     high[i] = -1;
     side[i] = (PetscSFNode){-1, -1};
   }
 
-  // lowest and highest original number of the cells at each side; own: those that this rank decides
-  for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
-    const PetscInt c = i / NSIDE;
-    const PetscInt k = i % NSIDE;
-    const PetscInt at =
-      k < NFACE ? s->face[NFACE * c + k] : s->nface + s->edge[NEDGE * c + k - NFACE];
+  // lowest and highest original number of the cells at each side; those that this rank decides
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt at = side_of(s, i);
 
-    own[i].index = at;
-    low[at] = PetscMin(low[at], mesh->cell_orig[c]);
-    high[at] = PetscMax(high[at], mesh->cell_orig[c]);
+    low[at] = PetscMin(low[at], mesh->cell_orig[i / NSIDE]);
+    high[at] = PetscMax(high[at], mesh->cell_orig[i / NSIDE]);
   }
   for (PetscInt i = 0; i < NSIDE * mesh->ncell_owned; i++) {
-    const PetscInt at = own[i].index;
-    const PetscBool lowest = (PetscBool)((low[at] + high[at]) % 2);
+    const PetscInt at = side_of(s, i);
 
-    if (mesh->cell_orig[i / NSIDE] == (lowest ? low[at] : high[at]))
-      side[at] = (PetscSFNode){rank, at};
+    if (mesh->cell_orig[i / NSIDE] == ((low[at] + high[at]) % 2 ? low[at] : high[at]))
+      side[at] = (PetscSFNode){rank, mesh->ncell + mesh->nvert + at};
   }
 
   // the first round completes owned cells, the second one their copies
   for (int round = 0; round < 2; round++) {
-    PetscSFNode *sent;
-
-    PetscCall(PetscMalloc1(NSIDE * (size_t)mesh->ncell, &sent));
-    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++)
-      sent[i] = side[own[i].index];
+    for (PetscInt i = 0; i < n; i++)
+      sent[i] = side[side_of(s, i)];
     PetscCall(SbForestBroadcast(mesh->cell_sf, NSIDE * sizeof(*sent) / sizeof(PetscInt), MPIU_INT,
                                 sent, sent));
-    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++)
+    for (PetscInt i = 0; i < n; i++)
       if (sent[i].rank >= 0)
-        side[own[i].index] = sent[i];
-    PetscCall(PetscFree(sent));
+        side[side_of(s, i)] = sent[i];
   }
-  for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
-    own[i] = side[own[i].index];
-    PetscCheck(own[i].rank >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "No rank owns side %d of cell %" PetscInt_FMT, (int)(i % NSIDE), i / NSIDE);
-  }
-  PetscCall(PetscFree3(low, high, side));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Appends the leaves of a star forest; points of a rank start at first[rank][k]. */
-static PetscErrorCode append_leaves(PetscSF sf, PetscInt k, const PetscInt first[][3],
-                                    PetscMPIInt rank, PetscInt *n, PetscInt leaf[],
-                                    PetscSFNode root[])
-{
-  PetscInt nleaf;
-  const PetscInt *item;
-  const PetscSFNode *from;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscSFGetGraph(sf, NULL, &nleaf, &item, &from));
-  for (PetscInt i = 0; i < nleaf; i++) {
-    leaf[*n] = first[rank][k] + (item ? item[i] : i);
-    root[*n] = (PetscSFNode){from[i].rank, first[from[i].rank][k] + from[i].index};
-    (*n)++;
-  }
+  PetscCall(PetscFree3(low, high, sent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -398,12 +299,10 @@ static PetscErrorCode append_leaves(PetscSF sf, PetscInt k, const PetscInt first
 static PetscErrorCode set_point_forest(SbMesh mesh, const Sides *s)
 {
   const PetscInt nside = s ? s->nface + s->nedge : 0;
-  const PetscInt mine[3] = {0, mesh->ncell, mesh->ncell + mesh->nvert};
-  PetscInt(*first)[3]; /* [size] first cell, vertex and face of each rank */
+  const PetscInt npoint = mesh->ncell + mesh->nvert + nside;
   PetscInt n = 0;
-  PetscInt nghost = mesh->ncell - mesh->ncell_owned + mesh->nvert - mesh->nvert_owned + nside;
   PetscInt *leaf;
-  PetscSFNode *root;
+  PetscSFNode *root, *point;
   PetscMPIInt rank, size;
   PetscSF sf;
 
@@ -412,38 +311,36 @@ static PetscErrorCode set_point_forest(SbMesh mesh, const Sides *s)
   PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
   if (size == 1)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(size, &first));
-  PetscCallMPI(MPI_Allgather(mine, 3, MPIU_INT, first, 3, MPIU_INT, mesh->comm));
-  PetscCall(PetscMalloc1(nghost, &leaf));
-  PetscCall(PetscMalloc1(nghost, &root));
-  PetscCall(append_leaves(mesh->cell_sf, 0, first, rank, &n, leaf, root));
-  PetscCall(append_leaves(mesh->vert_sf, 1, first, rank, &n, leaf, root));
-  if (s) {
-    PetscSFNode *own;
-    PetscBool *known;
 
-    PetscCall(PetscMalloc1(NSIDE * (size_t)mesh->ncell, &own));
-    PetscCall(PetscCalloc1(nside, &known));
-    PetscCall(own_sides(mesh, s, own));
-    for (PetscInt i = 0; i < NSIDE * mesh->ncell; i++) {
-      const PetscInt c = i / NSIDE;
-      const PetscInt k = i % NSIDE;
-      const PetscInt at =
-        k < NFACE ? s->face[NFACE * c + k] : s->nface + s->edge[NEDGE * c + k - NFACE];
+  // the owner of each point, and which point it is there
+  PetscCall(PetscMalloc1(npoint, &point));
+  for (PetscInt p = 0; p < mesh->ncell + mesh->nvert; p++)
+    point[p] = (PetscSFNode){rank, p};
+  for (int k = 0; k < 2; k++) {
+    PetscSFNode *part = point + (k ? mesh->ncell : 0);
 
-      if (known[at] || own[i].rank == rank)
-        continue;
-      known[at] = PETSC_TRUE;
-      leaf[n] = first[rank][2] + at;
-      root[n++] = (PetscSFNode){own[i].rank, first[own[i].rank][2] + own[i].index};
-    }
-    PetscCall(PetscFree(own));
-    PetscCall(PetscFree(known));
+    PetscCall(SbForestBroadcast(k ? mesh->vert_sf : mesh->cell_sf,
+                                sizeof(*point) / sizeof(PetscInt), MPIU_INT, part, part));
   }
-  PetscCall(PetscFree(first));
+  if (s)
+    PetscCall(own_sides(mesh, s, rank, point + mesh->ncell + mesh->nvert));
+
+  // leaves: the points of other ranks
+  PetscCall(PetscMalloc1(npoint, &leaf));
+  PetscCall(PetscMalloc1(npoint, &root));
+  for (PetscInt p = 0; p < npoint; p++) {
+    PetscCheck(point[p].rank >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "No rank owns point %" PetscInt_FMT, p);
+    if (point[p].rank == rank)
+      continue;
+    leaf[n] = p;
+    root[n++] = point[p];
+  }
+  PetscCall(PetscFree(point));
   PetscCall(DMGetPointSF(mesh->dm, &sf));
-  PetscCall(PetscSFSetGraph(sf, mesh->ncell + mesh->nvert + nside, n, leaf, PETSC_OWN_POINTER, root,
-                            PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetGraph(sf, npoint, n, leaf, PETSC_COPY_VALUES, root, PETSC_COPY_VALUES));
+  PetscCall(PetscFree(leaf));
+  PetscCall(PetscFree(root));
   PetscCall(PetscSFSetUp(sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -509,8 +406,9 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
   // the boundary, then the sets: bit k of the masks
   for (PetscInt k = 0; k <= mesh->nset; k++) {
     const uint64_t bit = k ? SB_SET_BIT(k - 1) : SB_ON_BOUNDARY;
-    char name[SB_NAME_MAX + 16] = "boundary";
-    PetscBool taken = PETSC_FALSE;
+    const char *own = k ? mesh->set[k - 1].name : "boundary";
+    char name[SB_NAME_MAX + 16];
+    PetscBool taken;
 
     for (PetscInt p = 0; p < npoint; p++)
       key[p] = -1;
@@ -527,15 +425,11 @@ static PetscErrorCode set_labels(SbMesh mesh, const Sides *s)
         key[mesh->ncell + mesh->nvert + s->face[i]] = 1;
     }
 
-    // a set may have the name of another label
-    if (k)
-      PetscCall(PetscStrncpy(name, mesh->set[k - 1].name, sizeof(name)));
+    // a set may have the name of another label: set_NAME, set1_NAME, ...
+    PetscCall(PetscStrncpy(name, own, sizeof(name)));
     PetscCall(DMHasLabel(mesh->dm, name, &taken));
     for (int again = 0; taken; again++) {
-      if (again)
-        (void)snprintf(name, sizeof(name), "set%d_%s", again, mesh->set[k - 1].name);
-      else
-        (void)snprintf(name, sizeof(name), "set_%s", mesh->set[k - 1].name);
+      (void)snprintf(name, sizeof(name), "set%.*d_%s", again > 0, again, own);
       PetscCall(DMHasLabel(mesh->dm, name, &taken));
     }
     PetscCall(DMCreateLabel(mesh->dm, name));
@@ -555,11 +449,10 @@ PetscErrorCode SbPlexCreate(SbMesh mesh, PetscBool sides)
   PetscCall(DMSetType(mesh->dm, DMPLEX));
   PetscCall(PetscObjectSetName((PetscObject)mesh->dm, "mesh"));
   PetscCall(DMSetDimension(mesh->dm, 3));
-  PetscCall(DMSetCoordinateDim(mesh->dm, 3));
   if (sides)
     PetscCall(find_sides(mesh, &s));
   PetscCall(create_topology(mesh, sides ? &s : NULL));
-  PetscCall(set_coordinates(mesh));
+  PetscCall(DMPlexBuildCoordinatesFromCellList(mesh->dm, 3, mesh->x));
   PetscCall(set_point_forest(mesh, sides ? &s : NULL));
   PetscCall(DMPlexSetOverlap(mesh->dm, NULL, 1));
   PetscCall(DMPlexDistributeSetDefault(mesh->dm, PETSC_FALSE));

@@ -1,7 +1,7 @@
 /*
-  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one
-  of the records; replies return by the reverse route. Records to the own rank take the same route,
-  so that callers need no special case.
+  route.c - records of fixed size to other ranks, and answers to them: a star forest from the
+  records that a rank gets to those that others send, in the order of the ranks. Records to the own
+  rank take the same way, so that callers need no special case.
 */
 #include "mesh_impl.h"
 
@@ -18,76 +18,62 @@ PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank)
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, PetscInt *which, PetscMPIInt *dest,
                              SbRoute *route)
 {
+  PetscInt64 total = 0;
+  PetscInt *count, *next;
+  PetscSFNode *place;
+  PetscMPIInt size;
+
   PetscFunctionBeginUser;
-  *route = (SbRoute){.comm = comm, .nsend = n, .which = which, .dest = dest};
-  PetscCallMPI(MPI_Comm_size(comm, &route->size));
-  PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
-                         &route->rcount, route->size, &route->rfirst, n, &route->position));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscCalloc2(size, &count, size, &next));
+  PetscCall(PetscMalloc1(n, &place));
   for (PetscInt i = 0; i < n; i++)
-    route->scount[dest[i]]++;
-  PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
+    count[dest[i]]++;
 
-  // offsets of the records of each rank: sums of the counts before it
-  for (int k = 0; k < 2; k++) {
-    const PetscMPIInt *count = k ? route->rcount : route->scount;
-    PetscMPIInt *first = k ? route->rfirst : route->sfirst;
-    PetscInt64 total = 0;
-
-    for (PetscMPIInt r = 0; r < route->size; r++) {
-      PetscCall(PetscMPIIntCast((PetscInt)PetscMin(total, PETSC_MAX_INT), &first[r]));
-      total += count[r];
-    }
-    PetscCheck(
-      total <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
-      "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
-      (long long)total, PETSC_MPI_INT_MAX);
-    route->nrecv = (PetscInt)total;
+  // records that come from each rank, and where they begin, which that rank is told
+  PetscCallMPI(MPI_Alltoall(count, 1, MPIU_INT, next, 1, MPIU_INT, comm));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    count[r] = (PetscInt)PetscMin(total, PETSC_MAX_INT);
+    total += next[r];
   }
+  PetscCheck(total <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_SUP,
+             "One rank would get %lld records of the mesh, this build counts to %" PetscInt_FMT
+             "; take more ranks",
+             (long long)total, PETSC_MAX_INT);
+  PetscCallMPI(MPI_Alltoall(count, 1, MPIU_INT, next, 1, MPIU_INT, comm));
   for (PetscInt i = 0; i < n; i++)
-    route->position[i] = route->sfirst[dest[i]]++;
-  for (PetscMPIInt r = 0; r < route->size; r++)
-    route->sfirst[r] -= route->scount[r];
+    place[i] = (PetscSFNode){dest[i], next[dest[i]]++};
+  PetscCall(PetscFree2(count, next));
+  *route = (SbRoute){.nsend = n, .nrecv = (PetscInt)total, .which = which, .place = place};
+  PetscCall(PetscFree(dest));
+  PetscCall(PetscSFCreate(comm, &route->sf));
+  PetscCall(
+    PetscSFSetGraph(route->sf, route->nrecv, n, NULL, PETSC_COPY_VALUES, place, PETSC_USE_POINTER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRouteDestroy(SbRoute *route)
 {
   PetscFunctionBeginUser;
+  PetscCall(PetscSFDestroy(&route->sf));
   PetscCall(PetscFree(route->which));
-  PetscCall(PetscFree(route->dest));
-  PetscCall(
-    PetscFree5(route->scount, route->sfirst, route->rcount, route->rfirst, route->position));
-  PetscCall(PetscMemzero(route, sizeof(*route)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode exchange(const SbRoute *route, size_t unit, PetscBool back, const void *out,
-                               void *in)
-{
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Type_contiguous((int)unit, MPI_BYTE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCallMPI(MPI_Alltoallv(
-    out, back ? route->rcount : route->scount, back ? route->rfirst : route->sfirst, type, in,
-    back ? route->scount : route->rcount, back ? route->sfirst : route->rfirst, type, route->comm));
-  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(PetscFree(route->place));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[],
                            const void *record, void *received)
 {
-  char *out, *in;
+  char *out = NULL;
+  char *in;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
-  for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy(out + unit * (size_t)route->position[i],
-           (const char *)record + unit * (size_t)(which ? which[i] : i), unit);
+  if (which)
+    PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
+  for (PetscInt i = 0; which && i < route->nsend; i++)
+    memcpy(out + unit * (size_t)i, (const char *)record + unit * (size_t)which[i], unit);
   PetscCall(PetscMalloc(unit * (size_t)route->nrecv, &in));
-  PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
+  PetscCall(SbForestReduce(route->sf, (PetscInt)unit, MPI_BYTE, which ? out : record, in));
   PetscCall(PetscFree(out));
   *(void **)received = in;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,29 +81,7 @@ PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt whi
 
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result)
 {
-  char *in;
-
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc(unit * (size_t)route->nsend, &in));
-  PetscCall(exchange(route, unit, PETSC_TRUE, answer, in));
-  for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy((char *)result + unit * (size_t)i, in + unit * (size_t)route->position[i], unit);
-  PetscCall(PetscFree(in));
+  PetscCall(SbForestBroadcast(route->sf, (PetscInt)unit, MPI_BYTE, answer, result));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i)
-{
-  PetscMPIInt low = 0;
-  PetscMPIInt high = route->size;
-
-  while (high - low > 1) {
-    const PetscMPIInt middle = low + (high - low) / 2;
-
-    if (route->rfirst[middle] <= i)
-      low = middle;
-    else
-      high = middle;
-  }
-  return low;
 }

@@ -7,11 +7,10 @@
   found and vertex data of several ranks is combined. A face between tets of two ranks is matched at
   the home rank of its lowest vertex; so are the edges of the surface. A group triangle or a curved
   edge goes to the home rank of its lowest vertex and from there to all ranks that use this vertex,
-  one of which has the tet. Each rank finds its connected parts; rank 0 joins them by their shared
-  vertices.
+  one of which has the tet. Connected parts are found by the lowest number of a vertex that reaches
+  all of theirs, through the parts on each rank and the vertices that ranks share.
 
-  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0
-  joins (few, unless the tets of the file are in random order) and 4 bytes for each vertex number
+  Memory per rank is proportional to the size of its slab, apart from 4 bytes for each vertex number
   between the lowest and the highest one of its tets. The result is the same as that of a serial
   import (merge.c) on any number of ranks; volumes may differ by rounding.
 */
@@ -107,8 +106,8 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* A face that may be between tets of two ranks, and the tet across it. */
 typedef struct {
   PetscInt vert[3], at; /* ascending; slot at the sender, position in the received array */
-  PetscInt cell;  /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
-  int64_t number; /* file number of the tet */
+  PetscInt rank, cell;  /* as in SbPart.remote: index here plus the cells of earlier bodies */
+  int64_t number;       /* file number of the tet */
 } Face;
 typedef struct {
   PetscInt rank, cell;
@@ -135,8 +134,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
       m++;
     if (m == 2)
       for (int k = 0; k < 2; k++)
-        across[f[k].at] =
-          (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
+        across[f[k].at] = (Across){f[1 - k].rank, f[1 - k].cell, f[1 - k].number};
     else if (m > 2 && !nshared++)
       first = i;
   }
@@ -203,8 +201,11 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       continue;
     PetscCall(PetscSortInt(3, v));
     PetscCall(SbReserve(n + 1, sizeof(*face), &room, &face));
-    face[n++] =
-      (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, i, before + i / 4, tets->number[i / 4]};
+    face[n++] = (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]},
+                       i,
+                       s->rank,
+                       before + i / 4,
+                       tets->number[i / 4]};
   }
 
   // home ranks match the faces and reply with the cell across
@@ -224,56 +225,38 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number of connected parts of the body. */
+/* Number of connected parts of the body: each gets the lowest number of its vertices. */
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
-  const SbImport *im = s->im;
-  PetscInt *part, *got, n, first, total;
-  PetscInt npair = 0;
-  PetscInt kept = 0;
-  PetscInt *parent;
-  PetscInt64 *pair, *all;
-  PetscMPIInt *dest;
-  SbRoute route;
+  const PetscInt n = s->im->nvert;
+  PetscInt *part, *label, *got, *lowest, changed;
 
   PetscFunctionBeginUser;
-
-  /* parts of this rank, numbered across all ranks */
-  PetscCall(PetscMalloc3(im->nvert, &part, s->start[s->nkept], &got, s->start[s->nkept], &pair));
-  SbImportJoin(im, part, &n);
-  total = n;
-  PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
-  PetscCall(sum(s, 1, &total));
-  first -= n;
-  for (PetscInt v = 0; v < im->nvert; v++)
-    part[v] = part[v] == v ? first++ : part[part[v]];
-
-  /* pairs of parts that share a vertex, each pair once */
-  PetscCall(PetscSFGatherBegin(s->vert, MPIU_INT, part, got));
-  PetscCall(PetscSFGatherEnd(s->vert, MPIU_INT, part, got));
+  PetscCall(PetscMalloc4(n, &part, n, &label, n, &got, s->nkept, &lowest));
+  SbImportJoin(s->im, part, npart);
+  for (PetscInt v = 0; v < n; v++)
+    label[v] = s->part->orig[part[v]];
+  do {
+    // over the ranks at the home ranks, then over the vertices of each part on this rank
+    for (PetscInt v = 0; v < s->nkept; v++)
+      lowest[v] = PETSC_MAX_INT;
+    PetscCall(PetscSFReduceBegin(s->vert, MPIU_INT, label, lowest, MPI_MIN));
+    PetscCall(PetscSFReduceEnd(s->vert, MPIU_INT, label, lowest, MPI_MIN));
+    PetscCall(SbForestBroadcast(s->vert, 1, MPIU_INT, lowest, got));
+    changed = 0;
+    for (PetscInt v = 0; v < n; v++) {
+      changed |= got[v] < label[part[v]];
+      label[part[v]] = PetscMin(label[part[v]], got[v]);
+    }
+    for (PetscInt v = 0; v < n; v++)
+      label[v] = label[part[v]];
+    PetscCall(sum(s, 1, &changed));
+  } while (changed);
+  *npart = 0;
   for (PetscInt v = 0; v < s->nkept; v++)
-    for (PetscInt k = s->start[v] + 1; k < s->start[v + 1]; k++)
-      pair[npair++] = (PetscInt64)SbKeyOfPair(got[k - 1], got[k]);
-  PetscCall(PetscSortInt64(npair, pair));
-  for (PetscInt i = 0; i < npair; i++)
-    if (!kept || pair[i] != pair[kept - 1])
-      pair[kept++] = pair[i];
-
-  // rank 0 joins the parts of all ranks by union-find
-  PetscCall(PetscCalloc1(kept, &dest));
-  PetscCall(SbRouteCreate(s->comm, kept, NULL, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(*pair), NULL, pair, &all));
-  *npart = total;
-  PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
-  for (PetscInt p = 0; p < total && !s->rank; p++)
-    parent[p] = p;
-  for (PetscInt i = 0; i < route.nrecv; i++)
-    *npart -= SbUnionJoin(parent, (PetscInt)(all[i] >> 32), (PetscInt)(all[i] & 0xffffffff));
-  PetscCall(PetscFree(parent));
-  PetscCall(PetscFree(all));
-  PetscCall(SbRouteDestroy(&route));
-  PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
-  PetscCall(PetscFree3(part, got, pair));
+    *npart += s->number[v] >= 0 && lowest[v] == s->number[v];
+  PetscCall(sum(s, 1, npart));
+  PetscCall(PetscFree4(part, label, got, lowest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -50,8 +50,12 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 
     for (int i = 0; i < 3; i++)
       y[i] = im->scale * off[i];
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
       off[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2];
+      PetscCheck(PetscAbsReal(off[i]) <= SB_LENGTH_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s: an edge node is %g m from the middle of its edge; the largest length is %g m",
+                 im->where, (double)off[i], (double)SB_LENGTH_MAX);
+    }
   }
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscReal *x = im->x + 3 * v;
@@ -61,10 +65,12 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
       y[i] = im->scale * x[i];
     for (int i = 0; i < 3; i++) {
       x[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2] + body->translate[i];
-      PetscCheck(isfinite(x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s: node %lld leaves the range of numbers when scaled by %g; check %s and %s",
-                 im->where, (long long)im->vert_number[v], (double)body->scale,
-                 SbImportOption(im, "scale", scale), SbImportOption(im, "translate", translate));
+      PetscCheck(PetscAbsReal(x[i]) <= SB_LENGTH_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s: node %lld is beyond %g m, the largest length, when scaled by %g; check the "
+                 "file, %s and %s",
+                 im->where, (long long)im->vert_number[v], (double)SB_LENGTH_MAX,
+                 (double)body->scale, SbImportOption(im, "scale", scale),
+                 SbImportOption(im, "translate", translate));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

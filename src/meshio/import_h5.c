@@ -385,18 +385,35 @@ static int number_of(hid_t file, const char *object, const char *name)
 PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 {
   const hid_t attribute = open_attribute(file, mesh, "bodies");
-  const hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
-  const PetscBool text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
-                                     H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
+  const hid_t group = attribute < 0 ? H5Gopen2(file, mesh, H5P_DEFAULT) : -1;
+  const hid_t dataset = group >= 0 && H5Lexists(group, "bodies", H5P_DEFAULT) > 0
+                          ? H5Dopen2(group, "bodies", H5P_DEFAULT)
+                          : -1;
+  const hid_t space = dataset >= 0 ? H5Dget_space(dataset) : -1;
+  const hid_t object = attribute >= 0 ? attribute : dataset;
+  hid_t type = -1;
+  PetscBool text;
 
   PetscFunctionBeginUser;
+  if (object >= 0)
+    type = attribute >= 0 ? H5Aget_type(object) : H5Dget_type(object);
+  text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
+                     H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
   PetscCall(PetscCalloc1(text ? H5Tget_size(type) + 1 : 1, names));
-  if (text)
+  if (text && attribute >= 0)
     (void)H5Aread(attribute, type, *names);
+  else if (text && H5Sget_simple_extent_npoints(space) == 1)
+    (void)H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *names);
   if (type >= 0)
     (void)H5Tclose(type);
   if (attribute >= 0)
     (void)H5Aclose(attribute);
+  if (space >= 0)
+    (void)H5Sclose(space);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
+  if (group >= 0)
+    (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -599,6 +616,7 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
 {
   File f = {.im = im, .file = -1, .mesh = "/mesh", .part = k, .nparts = n};
   PetscErrorCode ierr;
+  char why[PETSC_MAX_PATH_LEN + 256];
   hid_t access;
   htri_t is_hdf5;
   FILE *file;
@@ -606,6 +624,8 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
   PetscFunctionBeginUser;
 
   // error: missing file, not an HDF5 file, or truncated
+  PetscCheck(SbH5IsOwn(path, sizeof(why), why), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s",
+             why);
   access = H5Pcreate(H5P_FILE_ACCESS);
   PetscCall(SbScanOpenFile(f.im->where, path, &file, &f.bytes));
   (void)fclose(file);
@@ -643,12 +663,14 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   const char *dot = strrchr(body->mesh, '.');
   hid_t file, set, space;
   hssize_t n;
+  char why[PETSC_MAX_PATH_LEN + 256];
 
   *ncell = 0;
   if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
     return;
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
+  file = SbH5IsOwn(body->mesh, sizeof(why), why) ? H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT)
+                                                 : -1; /* the reader says why not */
   if (file < 0)
     return;
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;

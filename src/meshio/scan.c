@@ -16,17 +16,15 @@
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size)
 {
   struct stat info;
+  const char *why;
 
   PetscFunctionBeginUser;
-  *file = fopen(path, "rb");
-  PetscCheck(*file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+  PetscCheck(stat(path, &info) || S_ISREG(info.st_mode), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "%s: is not a regular file; give a mesh file", where);
+  why = SbFileOpen(path, 0, file);
+  PetscCheck(*file && !fstat(fileno(*file), &info), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "%s: cannot open the file (%s); check the name and the folder the run starts in",
-             where, strerror(errno));
-  if (fstat(fileno(*file), &info) || !S_ISREG(info.st_mode)) {
-    (void)fclose(*file);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file",
-            where);
-  }
+             where, why);
   *size = (size_t)info.st_size;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

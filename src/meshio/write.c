@@ -22,7 +22,7 @@ static PetscErrorCode write_file(const SbImport *im, const char *path, SbMeshFor
   if (format == SB_MESH_H5 && !h5)
     ierr = SbWrite_H5(im, part);
   else {
-    FILE *file = fopen(part, "wb");
+    FILE *file = SbFileCreate(part);
 
     PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", part,
                strerror(errno));

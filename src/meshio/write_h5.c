@@ -6,6 +6,7 @@
 */
 #include <errno.h>
 #include <stdarg.h>
+#include <unistd.h>
 #include "meshio_impl.h"
 
 const char *const SbH5Items[4] = {"point", "line", "triangle", "cell"};
@@ -65,8 +66,9 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
              "%s: more vertices than the 32 bits of an .h5 mesh can number", im->where);
   (void)H5Eset_auto2(H5E_DEFAULT, NULL,
                      NULL); /* HDF5's error stack is replaced by one line of ours */
+  (void)unlink(path);       /* a link is not followed */
   errno = 0;
-  h.file = keep(&h, H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  h.file = keep(&h, H5Fcreate(path, H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT));
   PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              errno ? strerror(errno) : "HDF5 cannot make it");
 

@@ -392,7 +392,7 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
     const SbStart *start = &m->start[s->node_body[i]];
 
     for (int k = 0; start->moved && k < 3; k++)
-      v[3 * i + k] = SbFormulaEval(start->displacement[k], 0., s->node_x + 3 * i);
+      PetscCall(SbFormulaEval(start->displacement[k], 0., s->node_x + 3 * i, &v[3 * i + k]));
   }
   PetscCall(VecRestoreArray(U, &v));
   PetscCall(SbModelPrescribe(m, 0., U));
@@ -409,9 +409,11 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
     SbSubtract(s->node_x + 3 * i, centre[s->node_body[i]], r);
     SbCross(body->angular_velocity, r, spin);
     for (PetscInt k = 0; k < 3; k++) {
-      v[3 * i + k] = body->velocity[k] + spin[k];
+      PetscReal more = 0.;
+
       if (start->velocity[k])
-        v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
+        PetscCall(SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i, &more));
+      v[3 * i + k] = body->velocity[k] + spin[k] + more;
       if (s->fixed[i] & (1 << k))
         v[3 * i + k] = 0.;
     }

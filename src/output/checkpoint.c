@@ -5,8 +5,10 @@
   double precision, the step, its time, the next step's length, work and dissipation so far, and the
   history variables of effects. A file is written beside its target, flushed and renamed; the newest
   ones are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell
-  by its original number), and the same text of the options that determine the mechanics. A checksum
-  over the three vectors detects a file that was damaged later (both sums: mesh.c).
+  by its original number), and the same text of the options that determine the mechanics. Checksums
+  detect a file that was damaged later: one over the vectors and records, one over every number and
+  text beside them (both sums: mesh.c). Format 1 lacks the second; its step, times and energies must
+  be plausible.
 
   Effects have active contact constraints and friction states. Each gives records of numbers, whose
   entities have numbers that no partition changes (SbEffectOps.save); they are one dataset per
@@ -18,8 +20,10 @@
 #include <unistd.h>
 #include "output_impl.h"
 
-#define FORMAT 1
-#define SALT 0x5bd1e995u /* in the checksums of effects */
+#define FORMAT 2
+#define FORMAT_WITHOUT_SCALARS 1 /* older files: no checksum over scalars */
+#define SALT 0x5bd1e995u         /* in the checksums of effects */
+#define SHORTEST 1e-9            /* of -ts_dt: a next step that an adaptive run may have */
 
 /* An array of the state. Those with a checksum of their own may be missing in a file. */
 typedef struct {
@@ -224,6 +228,57 @@ static PetscErrorCode read_effects(SbRun run, SbH5 *h, PetscReal t, uint64_t *su
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define SCALARS "scalars_checksum"
+
+/* Adds name and value of an attribute: a number of 8 bytes, which the sums of arrays need, too. */
+static herr_t add_attribute(hid_t where, const char *name, const H5A_info_t *info, void *ctx)
+{
+  uint64_t *sum = (uint64_t *)ctx;
+  const hid_t attribute = strcmp(name, SCALARS) ? H5Aopen(where, name, H5P_DEFAULT) : -1;
+  const hid_t type = attribute < 0 ? -1 : H5Aget_type(attribute);
+  union {
+    uint64_t bits;
+    PetscReal real;
+    int64_t integer;
+  } value = {0};
+  herr_t bad = 0;
+
+  (void)info;
+  if (attribute < 0)
+    return strcmp(name, SCALARS) ? -1 : 0;
+  if (H5Tget_class(type) == H5T_FLOAT)
+    bad = H5Aread(attribute, H5T_NATIVE_DOUBLE, &value.real);
+  else if (H5Tget_class(type) == H5T_INTEGER)
+    bad = H5Aread(attribute, H5T_NATIVE_INT64, &value.integer);
+  else
+    bad = -1;
+  *sum += SbHashBytes(value.bits, strlen(name), name);
+  (void)H5Tclose(type);
+  (void)H5Aclose(attribute);
+  return bad;
+}
+
+/* Checksum of all numbers of an open file, of its re-meshed bodies' too, and of the text of its
+   options; in any order. Collective: all ranks have the same. */
+static void sum_of_scalars(SbRun run, SbH5 *h, const char *options, uint64_t *sum, PetscBool *ok)
+{
+  *sum = SbHashBytes(SALT, strlen(options), options);
+  for (PetscInt b = -1; b < run->model->nbody && *ok; b++) {
+    char name[2 * SB_NAME_MAX] = "/";
+    hid_t group;
+
+    if (b >= 0)
+      SbFormat(sizeof(name), name, "mesh_%s", run->model->body[b].name);
+    group = b < 0 ? H5Gopen2(h->file, name, H5P_DEFAULT) : SbH5OpenGroup(h->file, name);
+    if (b >= 0 && group < 0)
+      continue;
+    if (group < 0 || H5Aiterate2(group, H5_INDEX_NAME, H5_ITER_INC, NULL, add_attribute, sum) < 0)
+      *ok = PETSC_FALSE;
+    if (group >= 0)
+      (void)H5Gclose(group);
+  }
+}
+
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
@@ -232,7 +287,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN];
   char message[SB_MESSAGE_MAX] = "";
   PetscBool due = PETSC_FALSE;
-  uint64_t checksum;
+  PetscBool ok = PETSC_TRUE;
+  uint64_t checksum, scalars;
   Times times = {step->t, run->clock.dt, run->clock.dt, run->clock.t_end,
                  run->clock.paused ? run->monitors.post_step.dt : 0.};
   Number number[NNUMBER];
@@ -293,6 +349,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(SbH5PutInt(&h, h.file, "checksum", (int64_t)checksum));
   PetscCall(SbH5PutInt(&h, h.file, "format", FORMAT));
   PetscCall(SbH5WriteText(&h, h.file, "options", out->identity));
+  sum_of_scalars(run, &h, out->identity, &scalars, &ok);
+  PetscCheck(ok, out->comm, PETSC_ERR_PLIB, "%s: its own numbers cannot be read", h.path);
+  PetscCall(SbH5PutInt(&h, h.file, SCALARS, (int64_t)scalars));
   PetscCall(SbH5Flush(&h));
   PetscCall(SbH5Close(&h));
 
@@ -325,22 +384,23 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 }
 
 /* Refuses a checkpoint of other bodies, meshes or effects. */
-static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash)
+static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash,
+                                     int64_t format, const char *theirs)
 {
-  PetscBool ok = PETSC_TRUE;
-  char *options;
   char a[200] = "";
   char b[200] = "";
-  const char *theirs;
   const char *ours = out->identity;
 
   PetscFunctionBeginUser;
-  PetscCall(SbH5ReadText(h, "options", &options, &ok));
 
-  // the first lines in which the texts of options differ
-  for (theirs = options; ok && !a[0] && (*theirs || *ours);) {
+  // the first lines in which the texts of options differ; older files say nothing about contents
+  while (!a[0] && (*theirs || *ours)) {
     const size_t n = strcspn(theirs, "\n");
     const size_t m = strcspn(ours, "\n");
+
+    if (format == FORMAT_WITHOUT_SCALARS && !*theirs &&
+        !strncmp(ours, SB_CONTENT, strlen(SB_CONTENT)))
+      break;
 
     if (n != m || strncmp(theirs, ours, n)) {
       SbFormat(sizeof(a), a, "%.*s", n ? (int)n : 7, n ? theirs : "nothing");
@@ -349,11 +409,11 @@ static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t m
     theirs += n + (theirs[n] == '\n');
     ours += m + (ours[m] == '\n');
   }
-  PetscCall(PetscFree(options));
-  PetscCheck(!ok || !a[0], out->comm, PETSC_ERR_USER_INPUT,
-             "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects "
-             "must be the same",
-             h->path, a, b);
+  PetscCheck(
+    !a[0], out->comm, PETSC_ERR_USER_INPUT,
+    "cannot restart from %s: it was made with '%s', this run has '%s'; bodies, effects and "
+    "what is in their files must be the same",
+    h->path, a, b);
   PetscCheck(
     (uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
     "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s); "
@@ -377,7 +437,7 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
     uint64_t sum;
     int64_t own = 0;
 
-    if (p->sum && H5Lexists(h->file, p->name, H5P_DEFAULT) <= 0)
+    if (p->sum && H5Lexists(h->file, p->name, H5P_DEFAULT) <= 0 && H5Aexists(h->file, p->sum) <= 0)
       continue;
     PetscCall(SbH5ReadSlice(h, p->name, p->order, p->ncomp, slice, ok));
     if (p->sum)
@@ -402,6 +462,22 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether step, times and energies of a file may be those of a run. */
+static PetscBool plausible(SbRun run, int64_t step, const Times *t, const PetscReal values[NNUMBER])
+{
+  for (int i = 0; i < NNUMBER; i++)
+    if (PetscIsInfOrNanReal(values[i]))
+      return PETSC_FALSE;
+  if (step < 0 || step >= PETSC_MAX_INT)
+    return PETSC_FALSE;
+
+  // load factors of a static run may lie anywhere; a last step may end a little behind the end
+  return (PetscBool)(!run->model->dynamic ||
+                     (t->t >= 0. && t->t_end > 0. && t->dt > 0. && t->next >= SHORTEST * t->dt &&
+                      t->next <= t->dt / SHORTEST &&
+                      t->t <= t->t_end + PetscMax(t->dt, t->next) * (1. + 1e-9)));
+}
+
 /* Loads one file; not ok: truncated, damaged or no checkpoint. One that does not fit the run is an
    error. */
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
@@ -411,8 +487,10 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   Number number[NNUMBER];
   int64_t step, mesh_hash;
   int64_t checksum = 0;
-  int64_t format;
+  int64_t format, scalars;
   uint64_t sum = 0;
+  uint64_t scalar_sum = 0;
+  char *options = NULL;
   PetscReal values[NNUMBER] = {0.};
 
   PetscFunctionBeginUser;
@@ -431,12 +509,24 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
     if (!there && !number[i].optional)
       *ok = PETSC_FALSE;
   }
-  if (*ok && format != FORMAT)
+  if (*ok && format != FORMAT && format != FORMAT_WITHOUT_SCALARS)
     *ok = PETSC_FALSE;
+
+  /* the numbers and texts are whole before they are compared with the run's */
+  if (*ok)
+    PetscCall(SbH5ReadText(&h, "options", &options, ok));
+  if (*ok && format == FORMAT) {
+    SbH5GetInt(h.file, SCALARS, &scalars, ok);
+    sum_of_scalars(run, &h, options, &scalar_sum, ok);
+    *ok = (PetscBool)(*ok && (int64_t)scalar_sum == scalars);
+  }
+  if (*ok)
+    *ok = plausible(run, step, &(Times){values[0], values[1], values[2], values[3], 0.}, values);
 
   /* the identity, the state and its checksum */
   if (*ok)
-    PetscCall(check_identity(run, out, &h, mesh_hash));
+    PetscCall(check_identity(run, out, &h, mesh_hash, format, options));
+  PetscCall(PetscFree(options));
   if (*ok)
     PetscCall(read_parts(run, out, &h, &sum, ok));
   if (*ok)

@@ -6,6 +6,7 @@
 */
 #include <unistd.h>
 #include "output_impl.h"
+#include "sbmeshio.h"
 
 #define SALT 0x6d657368u
 
@@ -179,7 +180,7 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
 {
   SbOutput out = (SbOutput)run->monitors.output;
   const SbModel m = run->model;
-  char path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN], why[PETSC_MAX_PATH_LEN + 256];
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -194,7 +195,8 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
     if (!out->rank) {
       hid_t file = -1;
 
-      H5E_BEGIN_TRY if (!access(path, R_OK)) file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+      H5E_BEGIN_TRY if (SbH5IsOwn(path, sizeof(why), why)) file =
+        H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
       H5E_END_TRY
       ok = (PetscBool)(file >= 0);
       for (PetscInt b = 0; b < m->nbody && file >= 0; b++)

@@ -40,7 +40,7 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
 
   (void)snprintf(tmp, sizeof(tmp), "%s.tmp", path);
   errno = 0;
-  file = fopen(tmp, "w");
+  file = SbFileCreate(tmp);
   if (file) {
     bad = fwrite(text, 1, size, file) != size;
     bad = fclose(file) || bad || rename(tmp, path);
@@ -50,6 +50,21 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
   SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
            strerror(errno ? errno : EIO));
   (void)unlink(tmp);
+}
+
+void SbFileKeep(const char *path, PetscInt step, char other[SB_OTHER_MAX],
+                char message[SB_MESSAGE_MAX])
+{
+  const char *dot = strrchr(path, '.');
+
+  for (int k = 1; k == 1 || !access(other, F_OK); k++) {
+    SbFormat(SB_OTHER_MAX, other, "%.*s_before_%06" PetscInt_FMT, (int)(dot - path), path, step);
+    if (k > 1)
+      SbAppend(SB_OTHER_MAX, other, "_%d", k);
+    SbAppend(SB_OTHER_MAX, other, "%s", dot);
+  }
+  if (rename(path, other))
+    SbFormat(SB_MESSAGE_MAX, message, "cannot rename %s to %s: %s", path, other, strerror(errno));
 }
 
 void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN])
@@ -69,7 +84,7 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
 void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
-  int fd;
+  FILE *file;
   int error = 0;
 
   SbOutputPath(out, ".supple_tries_to_write", probe);
@@ -81,10 +96,10 @@ void SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
       error = errno;
   }
   if (!error) {
-    fd = open(probe, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    error = fd < 0 ? errno : 0;
-    if (fd >= 0)
-      (void)close(fd);
+    file = SbFileCreate(probe);
+    error = file ? 0 : errno;
+    if (file)
+      (void)fclose(file);
     (void)unlink(probe);
   }
   if (error)
@@ -116,7 +131,18 @@ static void lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 
   SbOutputPath(out, LOCK, path);
   for (PetscBool again = PETSC_TRUE; again;) {
-    out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+
+    /* never a link to another file, which would be truncated */
+    if (out->lock < 0 ? errno == ELOOP || errno == ENXIO
+                      : fstat(out->lock, &mine) || !S_ISREG(mine.st_mode) || mine.st_nlink > 1) {
+      SbFormat(SB_MESSAGE_MAX, message,
+               "-output_dir %s: %s there is a link to another file, or none: remove it", out->dir,
+               LOCK);
+      if (out->lock >= 0)
+        (void)close(out->lock);
+      out->lock = -1;
+    }
     if (out->lock < 0)
       return;
     if (fcntl(out->lock, F_SETLK, &all)) {

@@ -12,8 +12,11 @@
   later ones are removed and their space in the file is used again.
 */
 #include <ctype.h>
+#include <unistd.h>
 #include "output_impl.h"
 #include "sbgeometry.h"
+
+#define ATTRIBUTE_BYTES 60000 /* HDF5 holds an attribute of up to 64 KB in an object header */
 
 struct _p_SbFrames {
   SbH5 h5;
@@ -222,11 +225,15 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
 
-  /* the bodies that the numbers of /mesh/body stand for: "liver,stone" */
+  /* the bodies that the numbers of /mesh/body stand for: "liver,stone"; an attribute, or a dataset
+     where they are too long for one */
   PetscCall(PetscCalloc1(size, &names));
   for (PetscInt b = 0; b < run->model->nbody; b++)
     SbAppend(size, names, "%s%s", b ? "," : "", run->model->body[b].name);
-  PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  if (strlen(names) < ATTRIBUTE_BYTES)
+    PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  else
+    PetscCall(SbH5WriteText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
 
   /* points at rest, and cells */
@@ -436,8 +443,27 @@ static herr_t add_frame(hid_t top, const char *name, const H5L_info_t *info, voi
   return 0;
 }
 
-/* Opens the file of the run that is continued; ok is false when there is none, or one of another
-   mesh. */
+/* A file that cannot be continued stays, under another name. Collective. */
+static PetscErrorCode keep_aside(SbRun run, SbOutput out, const char *path)
+{
+  char other[SB_OTHER_MAX];
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!out->rank && !access(path, F_OK)) {
+    SbFileKeep(path, run->clock.step0, other, message);
+    if (!message[0])
+      PetscCall(SbWarning(PETSC_COMM_SELF,
+                          "%s is damaged, truncated or of another mesh: kept as %s; frames go on "
+                          "in a new file, from step %" PetscInt_FMT,
+                          path, other, run->clock.step0));
+  }
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Opens the file of the run that is continued; ok is false when there is none, or one that is
+   damaged or of another mesh. */
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
@@ -463,18 +489,30 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* its frames; the index has those up to the restart, so that it never lists a frame that is
-     removed */
-  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, add_frame, &l);
+  /* its frames; damage in their lists is seen before anything is written */
+  *ok = (PetscBool)(H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, add_frame, &l) >= 0);
   PetscCall(l.ierr);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
+  if (!*ok) {
+    PetscCall(PetscFree(l.frame));
+    PetscCall(SbFramesClose(out));
+    fr->top = -1;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* the index has those up to the restart, so that it never lists a frame that is removed */
   PetscCall(SbSortByKeys(l.n, sizeof(*l.frame), 1, l.frame));
   fr->nnode = l.nhundred;
   for (; k < l.n && l.frame[k].step <= run->clock.step0; k++, shown = mesh) {
     const hid_t group = H5Gopen2(fr->h5.file, l.frame[k].group, H5P_DEFAULT);
 
     fr->last_step = l.frame[k].step;
-    if (group < 0)
+    if (group < 0) {
+      PetscCall(SbWarning(out->comm,
+                          "%s is damaged: the frame of step %" PetscInt_FMT " cannot be read", path,
+                          l.frame[k].step));
       continue;
+    }
     mesh = 0;
     SbH5GetInt(group, "mesh", &mesh, &other);
     if (fr->index && mesh != shown)
@@ -566,6 +604,10 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     if (out->restart[0])
       PetscCall(resume(run, out, path, &has));
     if (!has) {
+      fr->mesh = fr->nnode = 0;
+      fr->last_step = -1;
+      if (out->restart[0])
+        PetscCall(keep_aside(run, out, path));
       PetscCall(SbH5Create(out->comm, path, &fr->h5));
       PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
     }

@@ -24,6 +24,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
+#include "sbmeshio.h"
 
 /* After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and
    crashes when MPI_Finalize() makes it end. The error has been reported; the remainder of the
@@ -94,10 +95,18 @@ static PetscErrorCode agree(SbH5 *h)
 static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags, SbH5 *h)
 {
   const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
+  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   *h = (SbH5){.comm = comm};
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
+
+  // A new file is one: what has its name is removed, and a link is not followed.
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (flags == H5F_ACC_EXCL && !rank)
+    (void)unlink(path);
+  if (flags == H5F_ACC_EXCL)
+    PetscCallMPI(MPI_Barrier(comm));
 
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
@@ -105,7 +114,7 @@ static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags,
   (void)H5Pset_alignment(list, 3000, 4096);
   (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
   h->file =
-    flags == H5F_ACC_TRUNC ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
+    flags == H5F_ACC_EXCL ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
   (void)H5Pclose(list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,14 +122,21 @@ static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags,
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
 {
   PetscFunctionBeginUser;
-  PetscCall(open_file(comm, path, H5F_ACC_TRUNC, h));
+  PetscCall(open_file(comm, path, H5F_ACC_EXCL, h));
   H5_CALL(h, h->file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h, PetscBool *ok)
 {
+  char why[SB_MESSAGE_MAX] = "";
+  PetscMPIInt rank;
+
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank)
+    (void)SbH5IsOwn(path, sizeof(why), why);
+  PetscCall(SbAgree(comm, PETSC_ERR_FILE_UNEXPECTED, why));
   PetscCall(open_file(comm, path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, h));
   *ok = (PetscBool)(h->file >= 0);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, comm));

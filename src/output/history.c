@@ -273,13 +273,14 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   PetscCheck(h->text, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   PetscCall(put_header(run, out, h));
   if (out->restart[0]) {
-    FILE *file = fopen(h->path, "r");
+    FILE *file;
     char *text = NULL;
     char *line, *end;
     size_t room = 0;
 
     // rows up to step0 of a file with the same columns are kept; one without its end was cut off by
     // a kill
+    (void)SbFileOpen(h->path, 0, &file);
     if (file && getdelim(&text, &room, 0, file) > 0 && !strncmp(text, h->row, h->size)) {
       for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
         const long step = strtol(line, NULL, 10);
@@ -297,18 +298,17 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
 
     /* a history with other columns stays, under another name */
     if (!kept && !access(h->path, F_OK)) {
-      char other[PETSC_MAX_PATH_LEN + 32];
+      char other[SB_OTHER_MAX];
 
-      (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv",
-                     (int)(strlen(h->path) - 4), h->path, run->clock.step0);
-      if (!rename(h->path, other))
-        PetscCall(
-          PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
+      SbFileKeep(h->path, run->clock.step0, other, message);
+      if (!message[0])
+        PetscCall(SbWarning(PETSC_COMM_SELF, "%s is damaged or has other columns: kept as %s",
+                            h->path, other));
     }
   }
   if (message[0])
     PetscFunctionReturn(PETSC_SUCCESS);
-  h->fd = open(h->path, O_WRONLY | O_CREAT | (kept ? O_APPEND : O_TRUNC), 0666);
+  h->fd = open(h->path, O_WRONLY | O_CREAT | O_NOFOLLOW | (kept ? O_APPEND : O_TRUNC), 0666);
   if (h->fd < 0)
     SbFormat(SB_MESSAGE_MAX, message, "cannot open %s for writing: %s", h->path, strerror(errno));
   else if (!kept)

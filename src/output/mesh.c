@@ -91,6 +91,15 @@ uint64_t SbMixReal(uint64_t position, PetscReal value)
   return mix(position ^ mix(bits));
 }
 
+uint64_t SbHashBytes(uint64_t start, size_t n, const char bytes[])
+{
+  uint64_t sum = mix(start ^ n);
+
+  for (size_t i = 0; i < n; i++)
+    sum = mix(sum ^ (unsigned char)bytes[i]);
+  return sum;
+}
+
 /* Points: vertices and P2's nodes at edges, or each cell's own; tets: a cell of P2 is eight, unless
    -output_quadratic. */
 static PetscErrorCode order_points(SbRun run, SbOutput out)

@@ -1,8 +1,11 @@
 /*
   Options of the output, the complete scenario, and the monitors of a run.
 */
+#include <inttypes.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <time.h>
+#include <unistd.h>
 #include "output_impl.h"
 
 const SbOption SbOutputRows[] = {
@@ -143,26 +146,87 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds a line with the hash of a file to the identity, unless it has one; only of regular files,
+   which can be read again. */
+static void add_content(const char *file, FILE *identity, char *const *text)
+{
+  char line[PETSC_MAX_PATH_LEN + 64];
+  char buffer[65536];
+  FILE *f = NULL;
+  struct stat info;
+  size_t n;
+  uint64_t sum = 0;
+
+  (void)fflush(identity);
+  SbFormat(sizeof(line), line, "\n" SB_CONTENT "%s ", file);
+  if (strstr(*text, line) || stat(file, &info) || !S_ISREG(info.st_mode) || !(f = fopen(file, "r")))
+    return;
+  while ((n = fread(buffer, 1, sizeof(buffer), f)) > 0)
+    sum = SbHashBytes(sum, n, buffer);
+  (void)fclose(f);
+  (void)fprintf(identity, SB_CONTENT "%s %016" PRIx64 "\n", file, sum);
+}
+
+/* The files that values of options name: `table:FILE` of formulas, `mesh:FILE` of obstacles. */
+static void add_contents(const char *value, FILE *identity, char *const *text)
+{
+  static const char *const kinds[] = {"table:", "mesh:"};
+
+  for (const char *v = value; *v; v++) {
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++) {
+      char file[PETSC_MAX_PATH_LEN];
+      int length;
+
+      if ((v > value && !strchr(" ;,\"", v[-1])) || strncmp(v, kinds[k], strlen(kinds[k])))
+        continue;
+      v += strlen(kinds[k]);
+      length = (int)strcspn(v, ";\"");
+
+      // the whole rest, unless commas separate it from other formulas
+      SbFormat(sizeof(file), file, "%.*s", length, v);
+      if (access(file, R_OK))
+        SbFormat(sizeof(file), file, "%.*s", (int)strcspn(v, ",;\""), v);
+      for (size_t n = strlen(file); n && file[n - 1] == ' ';)
+        file[--n] = 0;
+      add_content(file, identity, text);
+    }
+  }
+}
+
 /* The lines of the complete scenario that determine the mechanics, on which a checkpoint must
-   agree; the mesh itself is compared, not the name of its file. */
+   agree, and behind them the hashes of the files that they name; the mesh itself is compared, not
+   the name of its file. */
 static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 {
-  size_t n = 0;
+  char *lines;
+  size_t size;
+  FILE *identity = open_memstream(&lines, &size);
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(strlen(text) + 32, &out->identity));
-  n += (size_t)sprintf(out->identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
-  for (const char *line = text; *line;
-       line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
-    const size_t name = strcspn(line, " \n");
-    int length = (int)strcspn(line, "\n#");
+  PetscCheck(identity, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for the options");
+  (void)fprintf(identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
+  for (int pass = 0; pass < 2; pass++) {
+    for (const char *line = text; *line;
+         line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
+      const size_t name = strcspn(line, " \n");
+      int length = (int)strcspn(line, "\n#");
+      char option[2 * PETSC_MAX_PATH_LEN];
 
-    while (length && line[length - 1] == ' ')
-      length--;
-    if (SbHasPrefix(line, "-bodies -body_ -sets -set_ -effects -effect_ -mass") &&
-        !memmem(line, name, "_mesh", 5) && !memmem(line, name, "_remesh_", 8))
-      n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
+      while (length && line[length - 1] == ' ')
+        length--;
+      if (!SbHasPrefix(line, "-bodies -body_ -sets -set_ -effects -effect_ -mass") ||
+          memmem(line, name, "_mesh", 5) || memmem(line, name, "_remesh_", 8))
+        continue;
+      SbFormat(sizeof(option), option, "%.*s", length, line);
+      if (pass)
+        add_contents(option, identity, &lines);
+      else
+        (void)fprintf(identity, "%.*s\n", length, line);
+    }
   }
+  (void)fclose(identity);
+  PetscCall(PetscStrallocpy(lines, &out->identity));
+  free(lines);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -62,7 +62,8 @@ typedef struct {
 
 /* The type in memory of numbers of this type in a file: that of PetscInt for H5T_STD_I64LE. */
 hid_t SbH5TypeInMemory(hid_t type);
-/* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
+/* Files are opened collectively for MPI-IO; SbH5Create() replaces what has the
+   name; SbH5Open() refuses files with links to others (SbH5IsOwn). */
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
                         PetscBool *ok); /* no error: see ok */
@@ -113,6 +114,11 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 /* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
 void SbFileReplace(const char *path, const void *text, size_t size, char message[SB_MESSAGE_MAX]);
+/* Renames NAME.END, from before a restart at this step, to NAME_before_STEP.END, with a number if
+   that is taken. Rank 0 only; other: the new path; message: the error, if any. */
+#define SB_OTHER_MAX (PETSC_MAX_PATH_LEN + 48)
+void SbFileKeep(const char *path, PetscInt step, char other[SB_OTHER_MAX],
+                char message[SB_MESSAGE_MAX]);
 
 /* state */
 
@@ -327,8 +333,13 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const SbStage *stage,
                            PetscReal values[]);
+/* Hash of bytes, from a start value. */
+uint64_t SbHashBytes(uint64_t start, size_t n, const char bytes[]);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
+
+/* In the identity of a run: what its files contain, behind its options. */
+#define SB_CONTENT "content of "
 
 /* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum.
    Collective. */

@@ -13,12 +13,14 @@
   is gone, it shows what the tet has that holds the position at rest. Checkpoints carry the position
   (SbProbesWrite).
 */
+#include <ctype.h>
 #include <math.h>
 #include <stddef.h>
 #include "output_impl.h"
 
 /* Numbers of a probe in a checkpoint: the position, the body. */
 #define NNUMBER 4
+#define FAR 0.05 /* of a body's diagonal: warn of points farther from the box of each body */
 static const char *const number_names[NNUMBER] = {"x", "y", "z", "body"};
 
 static const char *const keys[] = {"at", "on",
@@ -44,6 +46,23 @@ const SbOption SbProbeRows[] = {
   {0},
 };
 
+/* Names are parts of columns of history.csv: letters, digits and underscores, each once. */
+static PetscErrorCode check_name(PetscInt p, const char (*names)[SB_NAME_MAX])
+{
+  PetscBool fine = (PetscBool)(isalpha((unsigned char)names[p][0]) != 0);
+
+  PetscFunctionBeginUser;
+  for (const char *c = names[p]; *c; c++)
+    fine = (PetscBool)(fine && (isalnum((unsigned char)*c) || *c == '_'));
+  PetscCheck(fine, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-probes: the name '%s' may hold letters, digits and underscores only, a letter first",
+             names[p]);
+  for (PetscInt i = 0; i < p; i++)
+    PetscCheck(strcasecmp(names[i], names[p]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-probes: two are named '%s'", names[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 {
   char(*names)[SB_NAME_MAX], (*fields)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
@@ -59,6 +78,7 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 
     /* its position or set */
     PetscCall(PetscStrncpy(probe->name, names[p], SB_NAME_MAX));
+    PetscCall(check_name(p, (const char(*)[SB_NAME_MAX])names));
     SbScopeSet(&scope, "probe", "", probe->name);
     for (int k = 0; k < 3; k++) {
       PetscCall(SbOptionGiven(&scope, keys[k], &given));
@@ -256,6 +276,32 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Warns of a point far outside of all bodies. */
+static PetscErrorCode warn_far(const SbMesh mesh, SbOutput out, const SbProbe *probe)
+{
+  PetscReal nearest = PETSC_MAX_REAL;
+  PetscBool far = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    const PetscReal *box = mesh->body[b].bbox;
+    PetscReal r[3], d;
+
+    for (int k = 0; k < 3; k++)
+      r[k] = PetscMax(0., PetscMax(box[k] - probe->at[k], probe->at[k] - box[3 + k]));
+    d = PetscSqrtReal(SbDot3(r, r));
+    nearest = PetscMin(nearest, d);
+    far = (PetscBool)(far && d > FAR * SbBoxDiagonal(box));
+  }
+  if (far)
+    PetscCall(SbWarning(out->comm,
+                        "-probe_%s_at %g,%g,%g is %.3g m outside of the nearest body's box: the "
+                        "probe follows the nearest vertex",
+                        probe->name, (double)probe->at[0], (double)probe->at[1],
+                        (double)probe->at[2], (double)nearest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* On the first mesh the nearest vertex or node; later that at the probe's rest position, or the tet
    there. */
 static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
@@ -281,6 +327,7 @@ static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
     PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
     PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
     probe->found = PETSC_TRUE;
+    PetscCall(warn_far(mesh, out, probe));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (best == 0.)

@@ -135,6 +135,10 @@ PetscErrorCode SbReportHeader(SbRun run)
   print_bodies(run->model, out);
   if (out->scenario[0])
     entry("scenario", "%s", out->scenario);
+  PetscCall(SbOptionsEnvironment(sizeof(text), text));
+  if (text[0])
+    entry("environment", "PETSC_OPTIONS gives %s", text);
+  text[0] = 0;
 
   // effects, with the notes of their set-up
   for (PetscInt e = 0; e < run->model->neffect; e++) {
@@ -234,6 +238,7 @@ PetscErrorCode SbReportSummary(SbRun run)
 {
   SbOutput out = (SbOutput)run->monitors.output;
   const PetscBool stopped = (PetscBool)(run->clock.stop_reason[0] != 0);
+  const char *const status = run->clock.cut_short ? "cut short" : "completed";
   SbPhases phases;
   char files[1024] = "";
   char memory[32], sum[32], solver[SB_NAME_MAX], text[512];
@@ -243,7 +248,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscFunctionBeginUser;
   SbProgressEnd(out);
   PetscCall(SbFramesClose(out));
-  PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->clock.stop_reason));
+  PetscCall(SbRunJson(run, out, stopped ? "stopped" : status,
+                      run->clock.cut_short && !stopped ? "-ts_max_steps" : run->clock.stop_reason));
   PetscCall(SbPhasesGet(out, &phases));
   if (run->monitors.want_energies && run->state.energies.ninverted)
     PetscCall(

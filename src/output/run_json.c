@@ -59,6 +59,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   char *text = NULL;
   char *options, name[SB_NAME_MAX];
   char parts[SB_NAME_MAX] = "";
+  char environment[1024];
   char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
@@ -113,6 +114,8 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   }
   PetscCall(PetscOptionsGetAll(NULL, &options));
   put(f, "  'options': $s,\n", options);
+  PetscCall(SbOptionsEnvironment(sizeof(environment), environment));
+  put(f, "  'options_of_environment': $s,\n", environment);
   PetscCall(PetscFree(options));
 
   // events of re-meshing

@@ -115,6 +115,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
   char name[SB_MESH_NAME], *comma, *names, *rest;
+  char why[PETSC_MAX_PATH_LEN + 256];
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
   PetscInt which = -1;
@@ -134,6 +135,8 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   }
   if (!stat(o->path, &info) && S_ISDIR(info.st_mode))
     PetscCall(PetscStrlcat(o->path, "/fields.h5", sizeof(o->path)));
+  PetscCheck(SbH5IsOwn(o->path, sizeof(why), why), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s", option, text, why);
   o->file = stat(o->path, &info) ? -1 : H5Fopen(o->path, H5F_ACC_RDONLY, H5P_DEFAULT);
   PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them",
@@ -174,6 +177,12 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
              "displacement,velocity there, "
              "or it is damaged",
              option, text, o->path);
+  PetscCheck(SbLengthsFit(3 * o->npoint, o->x) && SbLengthsFit(3 * o->npoint, o->u) &&
+               (!o->v || SbLengthsFit(3 * o->npoint, o->v)),
+             PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s holds positions, displacements or velocities that are not finite or beyond "
+             "%g m (m/s): that run went astray, or the file is damaged",
+             option, text, o->path, (double)SB_LENGTH_MAX);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,6 +241,9 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
     if (s->node_body[i] != b)
       continue;
     far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, L));
+    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s: no tetrahedron of the body in %s has a volume at rest; the file is damaged",
+               option, o->path);
     point = o->cell + 4 * cell;
     if (o->cell10 && o->cell10[10 * cell + 4] >= 0) {
       point = o->cell10 + 10 * cell;
@@ -381,6 +393,8 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
       if (!has)
         continue;
       PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &order, 3, slice, &ok));
+      ok = (PetscBool)(ok && SbLengthsFit(3 * order.n, slice));
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
       if (!ok)
         break;
       PetscCall(SbForestBroadcast(order.sf, 3, MPIU_REAL, slice, owned));

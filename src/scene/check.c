@@ -9,8 +9,10 @@
 #include <unistd.h>
 #include "scene_impl.h"
 
-#define LARGE 2.  /* m; files of larger soft bodies are usually in mm */
-#define LIGHT 10. /* kg/m^3; no soft body in SI units has a lower density */
+#define LARGE 2.       /* m; files of larger soft bodies are usually in mm */
+#define LOCKS 0.495    /* Poisson's ratio from which on linear tets lock */
+#define AUXETIC (-0.9) /* Poisson's ratio below which there is hardly a material */
+#define LIGHT 10.      /* kg/m^3; no soft body in SI units has a lower density */
 
 /* Similar file names in the folder of `path`, with the folder; "" if there are none. Rank 0
    only. */
@@ -84,11 +86,38 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Warns of Poisson's ratios with which results are seldom what was meant; copies have that of the
+   first one. */
+static PetscErrorCode check_poisson(SbModel model, PetscInt i)
+{
+  const SbBody *body = &model->body[i];
+  const PetscReal nu = SbMaterialPoisson(model->material[i]);
+  const char *name = body->copy_of[0] ? body->copy_of : body->name;
+
+  PetscFunctionBeginUser;
+  if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (nu >= LOCKS && !strcmp(body->element, "p1"))
+    PetscCall(SbWarning(model->comm,
+                        "-body_%s_poisson %g with -body_%s_element p1: linear tets lock, the body "
+                        "is too stiff; take p2, cr or dg",
+                        name, (double)nu, name));
+  if (nu < AUXETIC)
+    PetscCall(
+      SbWarning(model->comm,
+                "-body_%s_poisson %g is near -1, where the shear modulus E/(2(1+nu)) has no "
+                "limit: it is %g times that of nu = 0",
+                name, (double)nu, (double)(1. / (1. + nu))));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSceneCheck(SbModel model)
 {
   PetscBool constrained = model->dynamic;
 
   PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < model->nbody; i++)
+    PetscCall(check_poisson(model, i));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained =
       (PetscBool)(model->effect[e]->ops.prescribe ||

@@ -3,11 +3,9 @@
 
   PETSc takes the word after an option as its value and ignores every other word; so `-translate 0,
   0, 1` would become `-translate 0,`. Such words are an error here. PETSc reads option files on rank
-  0 while the other ranks wait: missing files are found before.
+  0 while the other ranks wait: missing files are found before, and those with options that no file
+  may give (base/option_source.c).
 */
-#include <errno.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "scene_impl.h"
 
 const SbOption SbCommandRows[] = {
@@ -42,24 +40,30 @@ static PetscBool is_option(const char *word, const char *key)
    Collective. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
-  int error = 0;
+  char why[3 * SB_NAME_MAX + 192] = "";
   PetscMPIInt rank;
-  struct stat info;
 
   (void)MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (!rank && access(file, R_OK))
-    error = errno;
-  if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode))
-    error = EISDIR;
-  (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
-  if (!error) {
+  if (!rank) {
+    FILE *f;
+    const char *reason = SbFileOpen(file, 0, &f);
+
+    if (f)
+      (void)fclose(f);
+    if (reason)
+      SbFormat(sizeof(why), why, "%s", reason);
+    else
+      SbOptionsRefused(file, sizeof(why), why);
+  }
+  (void)MPI_Bcast(why, sizeof(why), MPI_CHAR, 0, MPI_COMM_WORLD);
+  if (!why[0]) {
     if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
       command->file[command->nfile++] = file;
     return PETSC_TRUE;
   }
   if (!command->problem[0])
     (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s",
-                   file, strerror(error));
+                   file, why);
   return PETSC_FALSE;
 }
 

@@ -4,22 +4,27 @@
   With scale s, rotation R and translation t of the body's own options and those of a copy (s', R',
   t'), a mesh point x is at R' R s' s x + t + t'. Rotations are composed as quaternions: q' q.
 */
-#include <errno.h>
 #include "scene_impl.h"
 
 #define NUMBERS 11 /* numbers on a line: x y z, axis, degrees, scale, velocity */
 
 /* Parses the placement on a line, numbers with blanks or commas; not found: a blank line or a
    comment. */
-static PetscErrorCode read_line(const char *option, const char *file, int number, char *line,
-                                SbPlacement *place, PetscBool *found)
+static PetscErrorCode read_line(const char *option, const char *file, int number, size_t length,
+                                char *line, SbPlacement *place, PetscBool *found)
 {
   PetscReal v[NUMBERS] = {0., 0., 0., 0., 0., 1., 0., 1., 0., 0., 0.};
   char *rest;
   char *end = line;
+  const char *cr;
   int n = 0;
 
   PetscFunctionBeginUser;
+  cr = (const char *)memchr(line, '\r', length);
+  PetscCheck(strlen(line) == length && (!cr || !cr[1] || cr[1] == '\n'), PETSC_COMM_SELF,
+             PETSC_ERR_FILE_UNEXPECTED, "%s %s line %d holds %s", option, file, number,
+             strlen(line) < length ? "a zero byte; it is no text file"
+                                   : "a carriage return alone; end lines with a newline");
   line[strcspn(line, "#\r\n")] = 0;
   for (char *word = strtok_r(line, ", \t", &rest); word; word = strtok_r(NULL, ", \t", &rest)) {
     if (n < NUMBERS)
@@ -49,20 +54,24 @@ static PetscErrorCode read_line(const char *option, const char *file, int number
 static PetscErrorCode read_file(const char *option, const char *file, PetscInt *n,
                                 SbPlacement **place)
 {
-  char line[1024];
-  FILE *f = fopen(file, "r");
+  char *line = NULL;
+  size_t size = 0;
+  ssize_t length;
+  FILE *f;
+  const char *why = SbFileOpen(file, SB_TEXT_BYTES, &f);
   PetscInt room = 0;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s %s: %s", option, file, strerror(errno));
-  for (int number = 1; !ierr && fgets(line, sizeof(line), f); number++) {
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s %s: %s", option, file, why);
+  for (int number = 1; !ierr && (length = getline(&line, &size, f)) >= 0; number++) {
     PetscBool found = PETSC_FALSE;
 
     PetscCall(SbReserve(*n + 1, sizeof(**place), &room, place));
-    ierr = read_line(option, file, number, line, &(*place)[*n], &found);
+    ierr = read_line(option, file, number, (size_t)length, line, &(*place)[*n], &found);
     *n += found;
   }
+  free(line);
   (void)fclose(f);
   PetscCall(ierr);
   PetscCheck(*n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s has no line with numbers",

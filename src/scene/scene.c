@@ -217,7 +217,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
     /* constant velocities are stored in the body */
     if (SbFormulaUses(model->start[i].velocity[k], 'x'))
       continue;
-    body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
+    PetscCall(SbFormulaEval(model->start[i].velocity[k], 0., NULL, &body->velocity[k]));
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }
   PetscCall(SbOptionGiven(&scope, "displacement", &model->start[i].moved));
@@ -242,6 +242,31 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
     body->inclusion[body->ninclusion++].material = model->nmaterial++;
   }
   PetscCall(PetscFree(inclusions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_names(const void *a, const void *b)
+{
+  return strcasecmp((*(const SbBody *const *)a)->name, (*(const SbBody *const *)b)->name);
+}
+
+/* No two bodies may have one name. Sorted, as there may be many thousand copies. */
+static PetscErrorCode check_body_names(SbModel model)
+{
+  const SbBody **sorted;
+  const char *twice = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(model->nbody, &sorted));
+  for (PetscInt b = 0; b < model->nbody; b++)
+    sorted[b] = &model->body[b];
+  qsort(sorted, (size_t)model->nbody, sizeof(*sorted), compare_names);
+  for (PetscInt b = 1; b < model->nbody && !twice; b++)
+    if (!compare_names(&sorted[b - 1], &sorted[b]))
+      twice = sorted[b]->name;
+  PetscCall(PetscFree(sorted));
+  PetscCheck(!twice, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-bodies: two bodies are named '%s', which copies are too; rename one", twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,15 +297,12 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
         PetscCall(PetscSNPrintf(body->name, SB_NAME_MAX, "%s%" PetscInt_FMT, names[i], k + 1));
         PetscCall(SbOptionsInherit("body", body->name, body->copy_of));
       }
-      for (PetscInt j = 0; j < b; j++)
-        PetscCheck(strcasecmp(model->body[j].name, body->name), PETSC_COMM_SELF, PETSC_ERR_USER,
-                   "-bodies: two bodies are named '%s', which copies are too; rename one",
-                   body->name);
       PetscCall(read_body(model, b));
       if (ncopy[i])
         SbPlacementAdd(&copy[i][k], body);
     }
   }
+  PetscCall(check_body_names(model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -96,10 +96,10 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   // scale and translate; check for invalid numbers
   for (PetscInt i = 0; i < 3 * t->nvert; i++) {
     t->x[i] = im->scale * t->x[i] + at[i % 3];
-    PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    PetscCheck(PetscAbsReal(t->x[i]) <= SB_LENGTH_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: vertex %" PetscInt_FMT
-               " leaves the range of numbers when scaled by %g; check %s",
-               f->where, i / 3 + 1, (double)im->scale,
+               " is beyond %g m, the largest length, when scaled by %g; check the file and %s",
+               f->where, i / 3 + 1, (double)SB_LENGTH_MAX, (double)im->scale,
                f->body ? SbImportOption(im, "scale", option) : "the scale");
   }
   for (PetscInt i = 0; i < 3 * f->nhole; i++)

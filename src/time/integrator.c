@@ -342,6 +342,13 @@ PetscErrorCode SbRunIntegrate(SbRun run)
   PetscCall(TSGetStepNumber(run->solve.ts, &step));
   PetscCall(TSGetTime(run->solve.ts, &t));
   PetscCall(TSGetTimeStep(run->solve.ts, &dt));
+  run->clock.cut_short =
+    (PetscBool)(reason == TS_CONVERGED_ITS && t < run->clock.t_end * (1. - 1e-12));
+  if (run->clock.cut_short)
+    PetscCall(SbWarning(run->model->comm,
+                        "-ts_max_steps ends the run after step %" PetscInt_FMT
+                        " at t = %g s, before -ts_max_time %g s",
+                        step, (double)t, (double)run->clock.t_end));
   if (reason < 0 && !run->clock.stop_reason[0] && !run->clock.stopped)
     PetscCall(
       SbRunFail(run,

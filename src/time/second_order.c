@@ -231,6 +231,31 @@ static SbSolvedStep solved_step(TS ts)
                         s->X1,     s->V1,         s->A1, ts->usessnes};
 }
 
+/* Whether the state at the end is finite, and positions and velocities within SB_LENGTH_MAX. Not
+   by norms: MPI_MAX may lose what is not a number. */
+static PetscErrorCode is_finite(TS ts, PetscBool *ok)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const Vec state[] = {so->X1, so->V1, so->A1};
+  const PetscScalar *x;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  *ok = PETSC_TRUE;
+  PetscCall(VecGetLocalSize(so->X1, &n));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecGetArrayRead(state[k], &x));
+    if (k < 2)
+      *ok = (PetscBool)(*ok && SbLengthsFit(n, x));
+    for (PetscInt i = 0; i < n && k == 2; i++)
+      *ok = (PetscBool)(*ok && !PetscIsInfOrNanReal(x[i]));
+    PetscCall(VecRestoreArrayRead(state[k], &x));
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Computes velocity and acceleration at the end. */
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
@@ -238,13 +263,12 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
   const PetscReal h = ts->time_step;
-  PetscReal size;
 
   PetscFunctionBeginUser;
   if (ts->usessnes)
     PetscCall(end_state(ts, so->X1));
-  PetscCall(VecNorm(ts->usessnes ? so->V1 : so->A1, NORM_INFINITY, &size));
-  *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
+  PetscCall(is_finite(ts, ok));
+  *ok = (PetscBool)(*ok && reason > 0);
   if (*ok && so->set.separate) {
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
@@ -269,11 +293,12 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(VecAXPY(so->A1, 1. / h, so->work));
   }
   if (!*ok && !ts->usessnes)
-    PetscCall(SbRunFail(run,
-                        "step %" PetscInt_FMT
-                        " at t = %g s: the explicit solution is not finite; its step "
-                        "of %g s is beyond the stable one (see the header)",
-                        ts->steps + 1, (double)ts->ptime, (double)h));
+    PetscCall(
+      SbRunFail(run,
+                "step %" PetscInt_FMT
+                " at t = %g s: the explicit solution is not finite, or beyond 1e15 m; its step "
+                "of %g s is beyond the stable one (see the header)",
+                ts->steps + 1, (double)ts->ptime, (double)h));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     char why[512] = "";
 
@@ -283,7 +308,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       PetscCall(SbContactSetNearest(&run->model->contacts, sizeof(why), why));
     PetscCall(SbRunFail(run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)h,
-                        reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],
+                        reason > 0 ? "the solution is not finite, or beyond 1e15 m"
+                                   : SNESConvergedReasons[reason],
                         why[0] ? "; " : "", why));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -225,7 +225,7 @@ static PetscErrorCode choose_snes(SbRun run)
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial law = m->material[b];
 
-    force += (SbMaterialYoungModulus(law) + 0.01 * SbMaterialVolumetricModulus(law)) *
+    force += (SbMaterialYoungModulus(law) + 0.01 * PetscAbsReal(SbMaterialVolumetricModulus(law))) *
              PetscPowReal(m->body[b].volume, 2. / 3.);
   }
   PetscCall(SNESSetDivergenceTolerance(snes, SB_UNLIMITED_REAL));

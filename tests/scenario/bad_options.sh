@@ -198,6 +198,13 @@ for ranks in 0 bin/supple -2 ""; do
   check "scripts/mpi '$ranks': exit code $code" test "$code" -ne 0
   check "scripts/mpi '$ranks': $(cat err.txt)" grep -q "'$ranks' is no number of ranks" err.txt
 done
+# a planned stop (75) is followed by nothing of the launcher's, an error by one line
+for code in 75 3; do
+  "$top/scripts/mpi" 2 sh -c "exit $code" 2>err.txt
+  ended=$?
+  check "exit code $code became $ended" test $ended = $code
+  check "after exit code $code: $(cat err.txt)" test "$(wc -l <err.txt)" = $((code == 3))
+done
 "$top/scripts/mpi" 2 bin/nothing -version >out.txt 2>err.txt
 code=$?
 check "scripts/mpi 2 bin/nothing: exit code $code" test "$code" = 127

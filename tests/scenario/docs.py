@@ -125,6 +125,8 @@ def main():
     pages = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
     links(pages)
     sources()
+    style = (TOP / "docs" / "site.css").read_text() if "extra_css: [site.css]" in (TOP / "mkdocs.yml").read_text() else ""
+    check("tables of the site hide columns", "white-space: normal" in style)
     for name in ("scripts", "scenarios", "tests", "docs", "meshes", ".venv"):
         if (TOP / name).exists():
             (OUT / name).symlink_to(TOP / name)

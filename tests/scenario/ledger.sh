@@ -74,6 +74,13 @@ check "a reaction that statics tell has an error" awk -v e="$(column react/ledge
 check "the field space_error: exit code $?" test $? = 0
 check "no field" grep -q space_error field/fields.xmf
 
+# nothing can move, so Newton's method solves nothing before the error of its solves is asked for
+for n in 1 2; do
+  "${mpi[@]}" $n "$supple" swing.opts -body_bar_mesh box:0.1,0.1,0.1:1 -effect_hold_on boundary -solver rotated -ledger yes -output_dir still >still.txt 2>&1
+  check "everything fixed, $n ranks: exit code $?" test $? = 0
+  check "everything fixed, $n ranks: an error" grep -q 'No error was found' still.txt
+done
+
 # errors go on over a restart, on any number of ranks
 swing="-ledger yes -time newmark -ts_max_time 0.2 -ledger_quantity volume"
 # shellcheck disable=SC2086

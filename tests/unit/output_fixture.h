@@ -101,6 +101,14 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes a whole file; one rank. */
+static inline void fixture_write(const char *path, const char *text, size_t size)
+{
+  FILE *file = fopen(path, "w");
+
+  SB_CHECK(file && fwrite(text, 1, size, file) == size && !fclose(file), "cannot write %s", path);
+}
+
 /* A whole file; NULL when it cannot be read. PetscFree. */
 static inline PetscErrorCode fixture_read_file(const char *path, char **text, size_t *size)
 {

@@ -110,14 +110,14 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
   PetscReal mean[3] = {0., 0., 0.};
   PetscReal square = 0.;
 
-  h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->neighbour[i])) / (2. * area);
+  h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->mesh->neighbour[i])) / (2. * area);
   for (int k = 0; k < 3; k++) {
     PetscReal at[3], a[3], b[3];
 
     for (int c = 0; c < 3; c++)
       at[c] = 0.5 * (corner[k][c] + corner[(k + 1) % 3][c]);
     cell_value(s, i / 4, u, at, a);
-    cell_value(s, s->neighbour[i], u, at, b);
+    cell_value(s, s->mesh->neighbour[i], u, at, b);
     for (int c = 0; c < 3; c++) {
       mean[c] += (a[c] - b[c]) / 3.;
       square += PetscSqr(a[c] - b[c]) / 3.;
@@ -153,7 +153,7 @@ static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
   PetscFunctionBeginUser;
   *energy = 0.;
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
-    if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->neighbour[i] >= 0)
+    if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->mesh->neighbour[i] >= 0)
       *energy += 0.5 * face_energy(m, i, u);
     if (s->dirichlet_node && s->dirichlet_node[i] >= 0)
       *energy += support_energy(m, i, u);

@@ -69,7 +69,7 @@ static void check_cells(SbModel m)
     const PetscInt *v = mesh->cell + 4 * (i / 4);
     const PetscInt *per = SbSpaceCellElement(s, i / 4)->nodes_per;
     const PetscInt node = s->cell_node[i];
-    const PetscInt other = s->faces ? s->neighbour[i] : -1;
+    const PetscInt other = s->faces ? s->mesh->neighbour[i] : -1;
 
     SB_CHECK(node >= 0 && node < s->nnode, "node %d of %d", (int)node, (int)s->nnode);
     SB_CHECK(s->node_body[node] == mesh->cell_body[i / 4], "a node belongs to another body");
@@ -207,7 +207,7 @@ static void check_cliques(SbSpace s)
       SB_CHECK(node[4 * SB_BATCH] == s->dirichlet_node[4 * cell + a] && weight == 0. &&
                  s->fixed[s->dirichlet_node[4 * cell + a]] == 7,
                "a held face has weight %g", weight);
-    } else if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
+    } else if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->mesh->neighbour[4 * cell + a] < 0) {
       SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1.,
                "a side without another has weight %g", weight);
     } else {

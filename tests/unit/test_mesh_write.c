@@ -1,5 +1,7 @@
 // Written meshes are read back unchanged: all formats, overlapping groups, orientation, order.
 // @ranks 1
+#include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 #include "../../src/meshio/meshio_impl.h"
 #include "mesh_same.h"
@@ -88,6 +90,7 @@ static PetscErrorCode test_numbers(void)
 int main(int argc, char **argv)
 {
   char path[512], part[520];
+  struct rlimit whole, few;
   SbImport *im;
 
   SB_TEST_BEGIN(argc, argv);
@@ -107,8 +110,16 @@ int main(int argc, char **argv)
                  "/nowhere/mesh.h5.part");
   PetscCall(test_path("full.msh", path));
   (void)snprintf(part, sizeof(part), "%s.part", path);
-  SB_CHECK(!symlink("/dev/full", part), "no link to /dev/full");
+  SB_CHECK(!getrlimit(RLIMIT_FSIZE, &whole) && signal(SIGXFSZ, SIG_IGN) != SIG_ERR, "no limit");
+  few = (struct rlimit){100, whole.rlim_max};
+  SB_CHECK(!setrlimit(RLIMIT_FSIZE, &few), "no limit of 100 bytes");
   SB_CHECK_ERROR(SbMeshFileWrite(im, path, SB_MESH_AUTO), PETSC_ERR_FILE_WRITE, path);
+  SB_CHECK(!setrlimit(RLIMIT_FSIZE, &whole), "the limit stays");
+
+  /* a link that somebody has put in the place of the new file is replaced, not followed */
+  (void)unlink(part);
+  SB_CHECK(!symlink("/dev/full", part), "no link to /dev/full");
+  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
   PetscCall(test_free(&im));
   SB_TEST_END();
 }

@@ -6,6 +6,15 @@
 #include "file.h"
 #include "test.h"
 
+/* Its value; NaN where it has none. */
+static PetscReal value_at(SbFormula f, PetscReal t, const PetscReal x[3])
+{
+  PetscReal value = NAN;
+
+  (void)SbFormulaEval(f, t, x, &value);
+  return value;
+}
+
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "", "mesh file"},
   {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the file's coordinates"},
@@ -172,10 +181,8 @@ static PetscErrorCode read_all(PetscBool given)
   PetscCall(PetscFree(names));
   PetscCall(SbOptionFormulas(&body_scope, "pull", f));
   x[0] = 7, x[1] = 8, x[2] = 9;
-  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g",
-           SbFormulaEval(f[0], 3, x));
-  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g",
-           SbFormulaEval(f[2], 3, x));
+  SB_CHECK(value_at(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", value_at(f[0], 3, x));
+  SB_CHECK(value_at(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", value_at(f[2], 3, x));
   for (int i = 0; i < 3; i++)
     PetscCall(SbFormulaDestroy(&f[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -444,6 +451,7 @@ static PetscErrorCode test_underscores(void)
 static PetscErrorCode test_nearest(void)
 {
   const char *const names[] = {"gravity", "traction", "pressure", "p1", "cr"};
+  const char *const solvers[] = {"direct", "cg_hypre", "cg_icc", "cg"};
   char text[64];
 
   PetscFunctionBeginUser;
@@ -456,6 +464,12 @@ static PetscErrorCode test_nearest(void)
   SbSuggestNames("rc", 5, names, sizeof(text), text);
   SB_CHECK(!strcmp(text, "cr"), "'%s'", text);
   SbSuggestNames("contact", 5, names, sizeof(text), text);
+  SB_CHECK(!text[0], "'%s'", text);
+
+  /* a word of a name, where none is alike */
+  SbSuggestNames("hypre", 4, solvers, sizeof(text), text);
+  SB_CHECK(!strcmp(text, "cg_hypre"), "'%s'", text);
+  SbSuggestNames("hyp", 4, solvers, sizeof(text), text);
   SB_CHECK(!text[0], "'%s'", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -182,6 +182,135 @@ static PetscErrorCode test_refused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Changes a number of a file on rank 0: a high exponent bit of a real one, bit 1 of others.
+   old: takes the sum of scalars away, as older files have none. Returns the number's name. */
+static const char *damage(const char *path, const char *text, size_t size, int number,
+                          PetscBool old, char name[SB_NAME_MAX])
+{
+  hid_t file, attribute, type;
+  unsigned char bytes[8];
+  int64_t format = 1;
+
+  fixture_write(path, text, size);
+  file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+  if (number >= 0) {
+    attribute = H5Aopen_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)number, H5P_DEFAULT,
+                               H5P_DEFAULT);
+    (void)H5Aget_name(attribute, SB_NAME_MAX, name);
+    type = H5Aget_type(attribute);
+    (void)H5Aread(attribute, type, bytes);
+    if (H5Tget_class(type) == H5T_FLOAT)
+      bytes[7] ^= 0x40;
+    else
+      bytes[0] ^= 2;
+    (void)H5Awrite(attribute, type, bytes);
+    (void)H5Tclose(type);
+    (void)H5Aclose(attribute);
+  }
+  if (old) {
+    (void)H5Adelete(file, "scalars_checksum");
+    attribute = H5Aopen(file, "format", H5P_DEFAULT);
+    (void)H5Awrite(attribute, H5T_NATIVE_INT64, &format);
+    (void)H5Aclose(attribute);
+  }
+  (void)H5Fclose(file);
+  return name;
+}
+
+/* Any number and the text of the options may be damaged: the checkpoint before is taken. Files of
+   format 1 are read, unless their time or step cannot be one. */
+static PetscErrorCode test_damage(void)
+{
+  static const char scene_text[] = HELD EULER "-output_fields none -checkpoint_every_steps 1 ";
+  TestScene scene;
+  char path[PETSC_MAX_PATH_LEN];
+  char name[SB_NAME_MAX] = "options";
+  char *text, *options;
+  size_t size;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(test_scene_open_in(dir, scene_text, &scene));
+  for (PetscInt k = 0; k <= 2; k++)
+    PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  PetscCall(test_scene_close(&scene));
+  SbFormat(sizeof(path), path, "%s/checkpoint_000002.h5", dir);
+  PetscCall(fixture_read_file(path, &text, &size));
+  SB_CHECK(text, "no checkpoint of step 2");
+  options = text ? (char *)memmem(text, size, "-body_a_young 1000", 18) : NULL;
+  SB_CHECK(options, "no options in the checkpoint");
+
+  // -3: whole, -2: whole and old, -1: the options; then each number until there is none
+  for (int i = -3; text && i < 64; i++) {
+    const PetscInt expected = i < -1 ? 2 : 1;
+
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    if (i == -1)
+      options[16] ^= 1;
+    name[0] = 0;
+    if (!rank)
+      damage(path, text, size, i, (PetscBool)(i == -2), name);
+    if (i == -1)
+      options[16] ^= 1;
+    PetscCallMPI(MPI_Bcast(name, SB_NAME_MAX, MPI_CHAR, 0, PETSC_COMM_WORLD));
+    if (i >= 0 && !name[0])
+      break;
+    PetscCall(test_open_in(dir, &scene, "%s -restart latest", scene_text));
+    SB_CHECK(scene.run->clock.step0 == expected && scene.run->clock.t0 == 0.1 * (double)expected,
+             "number %d, %s: restart at step %d, t = %g", i, name, (int)scene.run->clock.step0,
+             scene.run->clock.t0);
+    PetscCall(test_scene_close(&scene));
+
+    // of an old file what no run can have
+    if (strcmp(name, "time") && strcmp(name, "dt_next"))
+      continue;
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    if (!rank)
+      damage(path, text, size, i, PETSC_TRUE, name);
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    PetscCall(test_open_in(dir, &scene, "%s -restart latest", scene_text));
+    SB_CHECK(scene.run->clock.step0 == 1, "old file, %s: restart at step %d", name,
+             (int)scene.run->clock.step0);
+    PetscCall(test_scene_close(&scene));
+  }
+  PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A table with other numbers is another scenario. */
+static PetscErrorCode test_table(void)
+{
+  static const char *const rows[] = {"0 0\n1 1\n", "0 0\n1 2\n"};
+  TestScene scene;
+  char path[PETSC_MAX_PATH_LEN];
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  SbFormat(sizeof(path), path, "%s/table.csv", dir);
+  for (int k = 0; k < 3; k++) {
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    if (!rank)
+      fixture_write(path, rows[k / 2], strlen(rows[k / 2]));
+    if (k < 2)
+      PetscCall(test_open_in(dir, &scene,
+                             BOX EULER "-output_fields none -checkpoint_every_steps 1 -effects g "
+                                       "-effect_g_type gravity -effect_g_time table:%s %s",
+                             path, k ? "-restart latest" : ""));
+    else
+      SB_CHECK_ERROR(test_open_in(dir, &scene,
+                                  BOX EULER "-output_fields none -effects g -effect_g_type gravity "
+                                            "-effect_g_time table:%s -restart latest",
+                                  path),
+                     PETSC_ERR_USER_INPUT, "table.csv");
+    for (PetscInt i = 0; i <= 1 && !k; i++)
+      PetscCall(fixture_step(&scene, i, 0.1, PETSC_FALSE));
+    PetscCall(test_scene_close(&scene));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
@@ -191,6 +320,8 @@ int main(int argc, char *argv[])
   PetscCall(test_next_step());
   PetscCall(test_hash());
   PetscCall(test_refused());
+  PetscCall(test_damage());
+  PetscCall(test_table());
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -405,6 +405,66 @@ static PetscErrorCode test_nothing(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A restart on a file that is cut, no HDF5, or has no list of frames: it stays as it was, beside a
+   new one. */
+static PetscErrorCode test_restart_damaged(void)
+{
+  static const char scene_text[] =
+    HELD EULER "-output_fields displacement -checkpoint_every_steps 1 ";
+  static const char *const ending[] = {"", "_2", "_3"};
+  TestScene scene;
+  char path[PETSC_MAX_PATH_LEN], kept[PETSC_MAX_PATH_LEN];
+  char *text, *now;
+  size_t size, kept_size;
+  PetscMPIInt rank;
+  SbH5 h;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
+  for (int k = 0; k < 3; k++) {
+    PetscCall(test_scene_open_in(dir, scene_text, &scene));
+    for (PetscInt i = 0; i <= 2; i++)
+      PetscCall(fixture_step(&scene, i, 0.1, (PetscBool)(i == 2)));
+    PetscCall(test_scene_close(&scene));
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    PetscCall(fixture_read_file(path, &text, &size));
+    SB_CHECK(text && size > 2000, "no fields.h5");
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    if (k == 0)
+      size--;
+    if (k == 1)
+      memset(text, 7, size);
+    if (!rank)
+      fixture_write(path, text, size);
+    if (!rank && k == 2) {
+      const hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+
+      (void)H5Ldelete(file, "step", H5P_DEFAULT);
+      (void)H5Fclose(file);
+    }
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+
+    PetscCall(test_open_in(dir, &scene, "%s -restart latest", scene_text));
+    PetscCall(fixture_step(&scene, 2, 0.1, PETSC_FALSE));
+    PetscCall(fixture_step(&scene, 3, 0.1, PETSC_TRUE));
+    PetscCall(test_scene_close(&scene));
+    SbFormat(sizeof(kept), kept, "%s/fields_before_000002%s.h5", dir, ending[k]);
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    PetscCall(fixture_read_file(kept, &now, &kept_size));
+    SB_CHECK(now && (k == 2 || (kept_size == size && !memcmp(now, text, size))),
+             "case %d: %s is not the file that was there", k, kept);
+    PetscCall(fixture_fields(dir, &h));
+    SB_CHECK(H5Lexists(h.file, "step/0000/000002", H5P_DEFAULT) > 0 &&
+               H5Lexists(h.file, "step/0000/000003", H5P_DEFAULT) > 0,
+             "case %d: the new file lacks frames", k);
+    PetscCall(SbH5Close(&h));
+    PetscCall(PetscFree(text));
+    PetscCall(PetscFree(now));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
@@ -417,6 +477,7 @@ int main(int argc, char *argv[])
   PetscCall(test_which_frames());
   PetscCall(test_hundreds());
   PetscCall(test_restart());
+  PetscCall(test_restart_damaged());
   PetscCall(test_nothing());
   PetscCall(SbOptionsReset());
   SB_TEST_END();

@@ -67,6 +67,7 @@ for kind, more, words in (
     ("shell", (), ("shell",)),
     ("bisection", ("-petscpartitioner_view_graph",), ("-petscpartitioner_view_graph", "bisection")),
     ("simple", ("-petscpartitioner_simple_node_grid", "1,1,1"), ("-petscpartitioner_type simple",)),
+    ("metis", ("-petscpartitioner_use_vertex_weights",), ("-petscpartitioner_use_vertex_weights",)),
 ):
     text, none = run(f"bad_{kind}", 3, *mesh, "-petscpartitioner_type", kind, *more)
     lines = [line for line in text.splitlines() if "error" in line.lower()]
@@ -91,6 +92,19 @@ for element, nodes in (("p1", "vertices"), ("p2", "vertices and edges"), ("cr", 
           f"{element}: displacements of {nodes} up to {largest}, {row['max_displacement']} in the history")
 text, none = run("view_vtk_cr", 1, *mesh, "-displacement_view", f"vtk:{OUT}/cr.vtu")
 check(not none and "-displacement_view" in text, "cr has no place in VTK files, and this is not said")
+
+# Viewers that cannot be had: one line that names the option.
+for option, value in (
+    ("-dm_view", "draw"),
+    ("-dm_view", "nonsense"),
+    ("-dm_view", f"hdf5:{OUT}/none/a.h5"),
+    ("-dm_view", f"vtk:{OUT}/none/a.vtu"),
+    ("-displacement_view", f"hdf5:{OUT}/none/a.h5"),
+    ("-ksp_view", f"hdf5:{OUT}/none/a.h5"),
+):
+    text, _ = run("view_bad", 2, *mesh, option, value)
+    lines = [line for line in text.splitlines() if "supple: error" in line or "PETSC ERROR" in line]
+    check(len(lines) == 1 and f"{option} {value}" in lines[0], f"{option} {value}: {lines[:4]}")
 
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)

@@ -98,6 +98,9 @@ def check_move():
         wait(process, lambda: window.update() and force() < -0.05 and depth() > 1e-3, "nothing is pressed")
         window.picture(OUT / "pressed.png")
         check(window.place[2] < -5e-3, f"the tool is wanted at {window.place}")
+        window.key("bracketright")  # the angle is not live
+        told = (OUT / "moved" / "live.txt").read_text()
+        check(told.startswith("tool ") and "angle" not in told, f"the run will warn of what live.txt has: {told}")
         parts = [numpy.asarray(Image.open(OUT / name).convert("RGB")).astype(int)[:, 330:] for name in ("before.png", "pressed.png")]
         check((numpy.abs(parts[0] - parts[1]).max(axis=2) > 30).mean() > 0.01, "the picture is the same")
         window.drag((500, 300))

@@ -118,6 +118,54 @@ def check_convergence():
     return study
 
 
+def check_no_convergence():
+    """Differences that grow have no order, no limit and no error; values that agree have no error."""
+    study = supple.Convergence("strain", (1, 0.5, 0.25), (1.0, 1.1, 1.5))
+    check(not study.converges and math.isnan(study.limit) and numpy.isnan(study.errors).all(), f"{study}")
+    check("no convergence seen" in str(study) and "nan" not in str(study), f"{study}")
+    same = supple.Convergence("strain", (1, 0.5, 0.25), (1.0, 2.0, 2.0))
+    check(same.converges and same.limit == 2 and "same value" in str(same), f"{same}")
+    folders = []
+    for k, value in enumerate(study.values):
+        folders.append(OUT / f"grow{k}")
+        folders[-1].mkdir(exist_ok=True)
+        (folders[-1] / "run.json").write_text("{}")
+        (folders[-1] / "history.csv").write_text(f"step,time,strain\n#1,s,J\n0,0,{value}\n")
+    told = plot(*folders, "--converge", "-x", "1,0.5,0.25", "-y", "strain", "-o", OUT / "grow.svg")
+    text = (OUT / "grow.svg").read_text()
+    check("no convergence seen" in told and ">strain (J)<" in text and "no convergence seen" in text and "error" not in text, told)
+
+
+def check_start():
+    """Runs in a loop leave one folder of results; workers compute side by side and give the same table."""
+    for _ in range(3):
+        supple.start(scenario(), OUT / "loop", **STATIC)
+    check(not list((OUT / "loop").glob("before_*")), "folders of earlier runs")
+    supple.start(scenario(), OUT / "loop", output_overwrite=False, **STATIC)
+    check(len(list((OUT / "loop").glob("before_*"))) == 1, "results that were to be kept")
+    tables = [supple.sweep(scenario(), OUT / f"workers{n}", columns=["strain"], workers=n, young=[1e5, 2e5, 3e5], **STATIC) for n in (1, 3)]
+    check(numpy.array_equal(tables[0]["strain"], tables[1]["strain"]) and list(tables[1]["young"]) == [1e5, 2e5, 3e5], f"{tables[1]}")
+    refused(lambda: supple.sweep(scenario(), OUT / "none", workers=0, young=[1e5]), "workers=0")
+    seen, shown = [], supple.study.bar
+    supple.study.bar = lambda done, total: seen.append((done, total))
+    supple.sweep(scenario(), OUT / "workers3", columns=["strain"], workers=2, young=[1e5, 2e5, 3e5], **STATIC)
+    supple.study.bar = shown
+    check(seen[-3:] == [(1, 3), (2, 3), (3, 3)], f"bars {seen}")
+
+
+def check_needed():
+    """What other packages are needed for is said, with their names."""
+    it, imported = supple.Run(OUT / "run"), supple.run.importlib.import_module
+    for missing, call in (("meshio", it.to_meshio), ("pyvista", it.to_pyvista), ("meshio", it.to_pyvista)):
+        def without(name, missing=missing):
+            if name == missing:
+                raise ImportError(f"No module named '{name}'")
+            return math
+        supple.run.importlib.import_module = without
+        refused(call, f"package {missing}", "pip install")
+        supple.run.importlib.import_module = imported
+
+
 def plot(*args, fails=False):
     done = subprocess.run([sys.executable, "scripts/plot", *map(str, args)], capture_output=True, text=True)
     check((done.returncode != 0) == fails, f"plot {args}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
@@ -130,6 +178,11 @@ def check_plot(study):
     text = (OUT / "run" / "plot.svg").read_text()
     check(all(f">{word}<" in text for word in ("time (s)", "kinetic, strain (J)", "kinetic", "strain")), "labels of the diagram")
     check(re.search(r"fill: #ffffff", text) and re.search(r"fill: #1a1a1a", text), "dark text on white")
+    plot(OUT / "run", "-y", "max_displacement", "-y", "strain", "-o", OUT / "two.svg")
+    text = (OUT / "two.svg").read_text()
+    check(all(f">{words}<" in text for words in ("max displacement (m)", "strain (J)", "max displacement, strain")), "quantities of two units")
+    plot(OUT / "run", "-y", "kinetic + strain", "-o", OUT / "sum.svg")
+    check(">kinetic + strain (J)<" in (OUT / "sum.svg").read_text(), "unit of a sum")
     plot(OUT / "run", "-y", "kinetic + strain", "-o", OUT / "sum.png")
     check((OUT / "sum.png").stat().st_size > 5000, "a formula of columns")
     runs = [OUT / "converge" / f"{k:04d}" for k in range(3)]
@@ -161,10 +214,28 @@ def check_notebook():
     check((OUT / "notebook" / "curves.svg").exists(), "the diagram of the notebook")
 
 
+def check_many_bodies():
+    """Names of more bodies than an attribute can hold, 64 KB: a run writes them, the package, a mesh and a state read them."""
+    name = "a_name_that_is_nearly_as_long_as_the_names_of_bodies_may_be"
+    options = {"bodies": name, f"body_{name}_mesh": "box:0.1,0.1,0.1:1", f"body_{name}_material": "linear", f"body_{name}_young": "1e5",
+               f"body_{name}_poisson": "0.3", f"body_{name}_copies": "grid:10,10,11,0.2,0.2,0.2", "ts_dt": "0.01", "ts_max_time": "0.01"}
+    path = OUT / "many.opts"
+    path.write_text("".join(f"-{key} {value}\n" for key, value in options.items()))
+    it = supple.start(path, OUT / "many", ranks=2)
+    check(len(it.bodies) == 1100 and it.bodies[0] == name + "1" and it.bodies[-1] == name + "1100", "names of many bodies")
+    check("bodies" not in it.fields(), "names of bodies are no field")
+    path.write_text("".join(f"-{key} {value}\n" for key, value in options.items() if not key.endswith("mesh")) + f"-body_{name}_state {OUT / 'many'}\n")
+    check(len(supple.start(path, OUT / "many_again", ranks=2).bodies) == 1100, "states of many bodies")
+
+
 def main():
     check_run()
+    check_many_bodies()
     check_growing()
     check_sweep()
+    check_no_convergence()
+    check_start()
+    check_needed()
     check_plot(check_convergence())
     check_installed()
     check_notebook()

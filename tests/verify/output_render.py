@@ -14,6 +14,10 @@ from PIL import Image
 
 from output_common import ELEMENTS, OUT, run
 
+sys.path.insert(0, str(Path("python").resolve()))
+import supple
+from supple.run import colour_range
+
 RENDER = [sys.executable, str(Path(__file__).resolve().parents[2] / "scripts" / "render")]
 WITHOUT_DISPLAY = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
 
@@ -74,6 +78,39 @@ def check_open_obstacles():
               f"{name} reaches from {columns.min()} to {columns.max()}, down to {rows.max()}")
 
 
+def check_copies():
+    """The floor reaches below all copies of a body, and a field that is zero nearly everywhere has a scale of its own."""
+    run(1, "copies", "-ts_max_time", "0.01", "-quiet", "-time", "euler_implicit", "-body_bar_copies", "grid:1,4,1,0.1,0.2,0.1", "-effects", "gravity,floor",
+        "-effect_floor_type", "contact", "-effect_floor_obstacle", "plane:0,0,1,-0.1", "-effect_floor_on", "zmin", "-output_fields", "displacement,contact_force")
+    it = supple.Run(OUT / "copies")
+    floor = supple.obstacles(it)[0].x
+    check(len(it.bodies) == 4 and floor[:, 1].min() < 0 and floor[:, 1].max() > 0.7, f"the floor lies from {floor.min(axis=0)} to {floor.max(axis=0)}")
+    few = numpy.zeros(10000)
+    few[:20] = 0.02
+    check(colour_range([few]) == (0, 0.02) and colour_range([few - 1]) == (-1, -0.98) and colour_range([0 * few]) == (0, 1), f"scale {colour_range([few])} of a few forces")
+
+
+def dark(path, box):
+    """Share of the picture's part (left, top, right, bottom), as fractions of its size, that texts and lines cover."""
+    picture = Image.open(path).convert("L")
+    part = picture.crop([int(f * size) for f, size in zip(box, picture.size * 2)])
+    return (numpy.asarray(part) < 120).mean()
+
+
+def check_marks(folder):
+    """Axes at the upper right, a length at the lower right; several views have names and one scale."""
+    render(folder, "--frame", "0", "--field", "displacement", "--range", "0", "1", "-o", OUT / "marks.png")
+    axes, length = dark(OUT / "marks.png", (0.82, 0, 1, 0.14)), dark(OUT / "marks.png", (0.82, 0.92, 1, 1))
+    check(axes > 0.004 and length > 0.01, f"axes {axes:.2%}, length {length:.2%}")
+    render(folder, "--frame", "0", "--views", "front,right,top", "--field", "displacement", "--range", "0", "1", "-o", OUT / "views.png")
+    sizes = [box_of(OUT / "views.png", 3, panel) for panel in range(3)]
+    # 0.1 m of the bar's end and of its side have the same length, but for what is nearer to the eye
+    check(abs(sizes[1][1] / sizes[0][1] - 1) < 0.2 and abs(sizes[2][1] / sizes[0][1] - 1) < 0.2, f"the views have different scales: {sizes}")
+    for panel in range(3):
+        name = dark(OUT / "views.png", (0.27 * panel + 0.02, 0.08, 0.27 * panel + 0.12, 0.14))
+        check(name > 0.02, f"view {panel} has no name: {name:.2%}")
+
+
 def box_of(path, panels, panel):
     """Width and height in pixels of what is drawn in one of several views."""
     left, body = body_pixels(path, 230)
@@ -117,6 +154,7 @@ def check_scale(folder):
 def main():
     check_obstacles()
     check_open_obstacles()
+    check_copies()
     run(1, "run", "-ts_max_time", "0.1", "-quiet", "-output_fields", "displacement,von_mises,stress")
     folder = OUT / "run"
 
@@ -149,6 +187,7 @@ def main():
     film = list(imageio_ffmpeg.read_frames(str(OUT / "bar.mp4")))
     check(film[0]["size"] == (300, 200) and len(film) == 7, f"{len(film) - 1} pictures in the .mp4")
     check_views(folder)
+    check_marks(folder)
     check_scale(folder)
     render(folder, "--animate", OUT / "bar.png", "--size", "300x200", "--fps", "50", "--field", "displacement_z")
     check(len(list(OUT.glob("bar_0*.png"))) == 6, "the sequence of pictures")

@@ -191,7 +191,7 @@ static PetscErrorCode check_plain_space(void)
   PetscCall(test_scene_open(FREE "-body_a_material corotated -time newmark", &t));
   s = t.model->space;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
-  SB_CHECK(!s->faces && !s->neighbour && !s->dirichlet_node && !s->jump && !s->batch_weight &&
+  SB_CHECK(!s->faces && !s->mesh->neighbour && !s->dirichlet_node && !s->jump && !s->batch_weight &&
              s->width == 4,
            "a space of vertices holds something of faces");
   SB_CHECK(s->node_body == s->mesh->vert_body && s->node_set == s->mesh->vert_set &&
