@@ -261,6 +261,9 @@ void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], Pet
    cell the linear function nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
                       PetscReal psi[], PetscReal point[]);
+/* Adds rest volumes of owned cells of the law `linear`, m^3: of all of them, and of those that are
+   turned by more than `angle`, rad. Local: reduce them. */
+void SbSpaceTurned(SbSpace space, const PetscReal u[], PetscReal angle, PetscReal volume[2]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL),
    smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
 void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,

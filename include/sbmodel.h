@@ -103,6 +103,9 @@ PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
    Collective. */
 PetscErrorCode SbModelStepSpeed(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V,
                                 PetscReal *speed);
+/* Share of the volume of the law `linear` that is turned by more than `angle`, rad; 0 without that
+   law. Collective. */
+PetscErrorCode SbModelTurned(SbModel model, Vec U, PetscReal angle, PetscReal *share);
 /* Strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N (may be
    NULL), and how many tets are inverted there. Collective. */
 PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi,

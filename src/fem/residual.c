@@ -308,6 +308,24 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
     *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
 }
 
+void SbSpaceTurned(SbSpace s, const PetscReal u[], PetscReal angle, PetscReal volume[2])
+{
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    SbPack F[SB_POINTS][9], R[9];
+
+    if (strcmp(s->batch_region[b]->material->type->name, "linear"))
+      continue;
+    SbBatchState(s, b, u, F, NULL, NULL, NULL);
+    SbPolar((const SbPack *)F[0], R);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscReal cosine = (R[0][l] + R[4][l] + R[8][l] - 1.) / 2.;
+
+      volume[0] += s->batch_V[b][l];
+      volume[1] += cosine < PetscCosReal(angle) ? s->batch_V[b][l] : 0.;
+    }
+  }
+}
+
 PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[],
                                    PetscReal *power)
 {

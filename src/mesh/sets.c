@@ -307,6 +307,44 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Warns where a set that the scenario has by itself hides a group of the same name: `all`,
+   `boundary`, or a body's name where the group is not just that body. */
+static PetscErrorCode hidden_groups(PetscInt nbody, const SbBody body[], const SbImport import[],
+                                    const SbSet *set)
+{
+  const PetscBool of_body =
+    (PetscBool)(set->shape == SB_SET_BODY && !strcmp(set->name, set->group));
+  const PetscBool all = (PetscBool)(set->shape == SB_SET_HALFSPACE && !strcmp(set->name, "all") &&
+                                    set->p[3] == PETSC_MAX_REAL);
+  const PetscBool hull =
+    (PetscBool)(set->shape == SB_SET_BOUNDARY && !strcmp(set->name, "boundary"));
+
+  const char *what = all ? "every point" : "the boundary of all bodies";
+
+  PetscFunctionBeginUser;
+  if (!of_body && !all && !hull)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (of_body)
+    what = "that body";
+  for (PetscInt b = 0; b < nbody; b++) {
+    const PetscBool own = (PetscBool)(of_body && (!strcmp(body[b].name, set->name) ||
+                                                  !strcmp(body[b].copy_of, set->name)));
+
+    for (PetscInt g = 0; g < import[b].ngroup; g++) {
+      const SbGroup *group = &import[b].group[g];
+
+      if (!is_named(group, set->name) || (own && group->dim == 3))
+        continue;
+      PetscCall(SbWarning(PETSC_COMM_SELF,
+                          "the name '%s' is %s; the group '%s' in the mesh of body '%s' is another "
+                          "set: -sets NAME -set_NAME_at group:%s",
+                          set->name, what, set->name, body[b].name, set->name));
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[],
                            PetscInt nset, const SbSet set[])
 {
@@ -314,6 +352,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
   for (PetscInt k = 0; k < nset; k++) {
     PetscReal box[6];
 
+    PetscCall(hidden_groups(nbody, body, import, &set[k]));
     if (set[k].nvert || set[k].nfacet || set[k].ncell)
       continue;
     if (set[k].shape == SB_SET_GROUP)

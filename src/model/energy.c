@@ -127,6 +127,20 @@ PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelTurned(SbModel m, Vec U, PetscReal angle, PetscReal *share)
+{
+  SbEvaluation at = {.U = U};
+  PetscReal volume[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  SbSpaceTurned(m->space, at.stage.u, angle, volume);
+  PetscCall(SbEvaluationEnd(m, &at));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, volume, 2, MPIU_REAL, MPI_SUM, m->comm));
+  *share = volume[0] > 0. ? volume[1] / volume[0] : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelStepSpeed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V,
                                 PetscReal *speed)
 {

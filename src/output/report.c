@@ -9,6 +9,8 @@
 
 #define WIDTH 79
 #define INDENT 11
+#define TURNED 10.        /* degrees from which on the law `linear` is wrong by some per cent */
+#define TURNED_SHARE 0.01 /* of the volume: less is a corner */
 
 /* "title      words ..." with the words wrapped at WIDTH and indented. */
 static void entry(const char *title, const char *format, ...)
@@ -239,6 +241,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbOutput out = (SbOutput)run->monitors.output;
   const PetscBool stopped = (PetscBool)(run->clock.stop_reason[0] != 0);
   const char *const status = run->clock.cut_short ? "cut short" : "completed";
+  PetscReal turned;
   SbPhases phases;
   char files[1024] = "";
   char memory[32], sum[32], solver[SB_NAME_MAX], text[512];
@@ -259,6 +262,13 @@ PetscErrorCode SbReportSummary(SbRun run)
                 "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
                 "they come back, see docs/reference/guarantees.md",
                 run->state.energies.ninverted, run->state.energies.min_J));
+  PetscCall(SbModelTurned(run->model, run->state.U, TURNED * PETSC_PI / 180., &turned));
+  if (turned > TURNED_SHARE)
+    PetscCall(SbWarning(run->model->comm,
+                        "%.3g %% of what has -body_NAME_material linear is turned by more than %g "
+                        "degrees at the end: the law is one of small rotations, and takes a turn "
+                        "for a strain; corotated or neohookean do not",
+                        (double)(100. * turned), TURNED));
   if (out->quiet)
     PetscFunctionReturn(PETSC_SUCCESS);
 

@@ -128,6 +128,14 @@ warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2 -output_di
 check "cut/run.json: $(tail -n 3 cut/run.json)" grep -q '"status": "cut short"' cut/run.json
 "${mpi[@]}" 1 "$supple" block.opts -ts_max_steps 4 -output_dir whole >out.txt 2>&1
 check "whole/run.json: $(tail -n 3 whole/run.json)" grep -q '"status": "completed"' whole/run.json
+turn=(-body_block_material linear -body_block_poisson 0 -effects turn -effect_turn_type prescribed_displacement -effect_turn_on top -effect_turn_angle)
+warns "-body_NAME_material linear|10 degrees" block.opts "${turn[@]}" "1500*t"
+"${mpi[@]}" 2 "$supple" block.opts "${turn[@]}" "200*t" >out.txt 2>err.txt
+check "8 degrees: $(cat err.txt)" test $? = 0 -a ! -s err.txt
+for name in all boundary block; do
+  sed "s/\"low\"/\"$name\"/" "$top/meshes/cushion.msh" >named.msh
+  warns "'$name'|group:$name" block.opts -body_block_mesh named.msh -ts_max_time 0.01 -effects push -effect_push_type traction -effect_push_vector "0;0;0" -effect_push_on "$name"
+done
 error 1 "-probes|'a#b'" block.opts -probes "'a#b'" -probe_a#b_at 0,0,0
 error 1 "-probes|tip" block.opts -probes tip,tip -probe_tip_at 0,0,0
 
