@@ -142,6 +142,12 @@ PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
 /* ASCII viewer on a file, "" or "-": standard output; an error on every rank if not writable.
    Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
+/* Destroys it; an error on every rank (PETSC_ERR_FILE_WRITE) if not all could be written.
+   Collective. */
+PetscErrorCode SbViewerClose(MPI_Comm comm, const char *file, PetscViewer *viewer);
+/* The error alone, of what rank 0 has printed to standard output; a reader that left early is
+   none. Collective. */
+PetscErrorCode SbStandardOutputCheck(MPI_Comm comm);
 PetscErrorCode
 SbOptionsReset(void); /* forgets what was read and registered; before PetscFinalize() */
 

@@ -270,7 +270,7 @@ void SbRunIntegrator(SbRun run, size_t size, char name[]);
 /* After SbModelSetUp(): vectors, matrix, solver, integrator. Collective. */
 PetscErrorCode SbRunSetUp(SbRun run);
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);
-/* From now on SIGTERM, SIGINT, SIGUSR1 end the only run after its step, a second SIGINT the
+/* From now on SIGTERM, SIGHUP, SIGINT, SIGUSR1 end the only run after its step, a second SIGINT the
    process. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
 /*

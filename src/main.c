@@ -106,6 +106,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   } else if (command.version) {
     PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
+    PetscCall(SbStandardOutputCheck(PETSC_COMM_WORLD));
   } else if (command.table) {
     PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
   } else {
@@ -124,7 +125,7 @@ static PetscErrorCode supple(int argc, char *argv[])
 
       PetscCall(SbViewerOpen(PETSC_COMM_WORLD, command.view, &viewer));
       PetscCall(SbOptionsView(viewer));
-      PetscCall(PetscViewerDestroy(&viewer));
+      PetscCall(SbViewerClose(PETSC_COMM_WORLD, command.view, &viewer));
     } else
       PetscCall(simulate(&scene));
 

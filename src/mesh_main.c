@@ -28,6 +28,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
     PetscCall(SbToolSetFromOptions(&line, &tool));
     PetscCall(SbToolRun(&tool));
   }
+  PetscCall(SbStandardOutputCheck(PETSC_COMM_WORLD));
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   PetscFunctionReturn(PETSC_SUCCESS);

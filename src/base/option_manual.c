@@ -172,7 +172,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
   /* only the options of highest relevance */
   for (int least = 3; topic[0] && !n && least > 0; least--)
     PetscCall(print_options(viewer, topic, least, &n));
-  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(SbViewerClose(comm, "", &viewer));
   PetscCheck(n || !topic[0], comm, PETSC_ERR_USER,
              "-help %s: no option has this word in its name or text; supple -help lists the topics",
              topic);
@@ -197,6 +197,6 @@ PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file)
       kinds[o->kind][1], o->count, o->unit, o->preset ? "no" : "yes", o->preset ? o->preset : "",
       o->range, o->help));
   }
-  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(SbViewerClose(comm, file, &viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

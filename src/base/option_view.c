@@ -151,3 +151,56 @@ PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer
   PetscCall(PetscViewerASCIIOpen(comm, file, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* Writes what a stream still holds; whether all of it could be written. */
+static int flush_failed(FILE *f)
+{
+  errno = 0;
+  if (!fflush(f) && !ferror(f))
+    return 0;
+  return errno ? errno : EIO; /* an earlier write failed */
+}
+
+/* An error of rank 0 is one of all. */
+static PetscErrorCode raise(MPI_Comm comm, int error, const char *name)
+{
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot write all of %s: %s", name,
+             error == EIO ? "the disk may be full" : strerror(error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbStandardOutputCheck(MPI_Comm comm)
+{
+  PetscMPIInt rank;
+  int error = 0;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank)
+    error = flush_failed(stdout);
+  PetscCall(raise(comm, error == EPIPE ? 0 : error, "standard output"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbViewerClose(MPI_Comm comm, const char *file, PetscViewer *viewer)
+{
+  PetscMPIInt rank;
+  FILE *f;
+  int error = 0;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!file[0] || !strcmp(file, "-")) {
+    PetscCall(PetscViewerDestroy(viewer));
+    PetscCall(SbStandardOutputCheck(comm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscViewerASCIIGetPointer(*viewer, &f));
+  if (!rank)
+    error = flush_failed(f);
+  PetscCall(PetscViewerDestroy(viewer));
+  PetscCall(raise(comm, error, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -67,6 +67,31 @@ void SbFileKeep(const char *path, PetscInt step, char other[SB_OTHER_MAX],
     SbFormat(SB_MESSAGE_MAX, message, "cannot rename %s to %s: %s", path, other, strerror(errno));
 }
 
+void SbFileRemember(const char *path, SbFileIdentity *file)
+{
+  struct stat info;
+
+  *file = (SbFileIdentity){0};
+  if (!stat(path, &info))
+    *file = (SbFileIdentity){info.st_dev, info.st_ino, PETSC_FALSE};
+}
+
+PetscBool SbFileLost(const char *path, SbFileIdentity *file)
+{
+  struct stat info;
+
+  if (!file->number || file->lost)
+    return file->lost;
+  file->lost =
+    (PetscBool)(stat(path, &info) || info.st_dev != file->device || info.st_ino != file->number);
+  if (file->lost)
+    (void)SbWarning(PETSC_COMM_SELF,
+                    "%s was deleted or replaced while the run writes it: what is written from now "
+                    "on is lost",
+                    path);
+  return file->lost;
+}
+
 void SbOutputPath(SbOutput out, const char *name, char path[PETSC_MAX_PATH_LEN])
 {
   SbFormat(PETSC_MAX_PATH_LEN, path, "%s/%s", out->dir, name);

@@ -124,6 +124,7 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
   PetscFunctionBeginUser;
   PetscCall(open_file(comm, path, H5F_ACC_EXCL, h));
   H5_CALL(h, h->file);
+  SbFileRemember(path, &h->on_disk);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,6 +145,8 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
     (void)H5Fclose(h->file);
   if (!*ok)
     h->file = -1;
+  if (writable)
+    SbFileRemember(path, &h->on_disk);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,8 +178,8 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
   PetscFunctionBeginUser;
   h->bytes = bytes;
   PetscCallMPI(MPI_Comm_rank(h->comm, &rank));
-  if (!rank) {
-    const int fd = open(h->path, O_WRONLY | O_CREAT, 0666);
+  if (!rank && !SbFileLost(h->path, &h->on_disk)) {
+    const int fd = open(h->path, O_WRONLY);
     struct stat info;
     int error = errno;
 

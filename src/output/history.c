@@ -19,6 +19,7 @@
 
 struct _p_SbHistory {
   int fd; /* rank 0; -1 elsewhere */
+  SbFileIdentity on_disk;
   char path[PETSC_MAX_PATH_LEN];
   FILE *text; /* rank 0: in memory, a row or the header, row[size] */
   char *row;
@@ -159,6 +160,7 @@ static void write_row(SbHistory h, char message[SB_MESSAGE_MAX])
   const off_t before = lseek(h->fd, 0, SEEK_END);
   const ssize_t n = write(h->fd, h->row, h->size);
 
+  (void)SbFileLost(h->path, &h->on_disk);
   if (n == (ssize_t)h->size)
     return;
   SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size,
@@ -309,6 +311,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   if (message[0])
     PetscFunctionReturn(PETSC_SUCCESS);
   h->fd = open(h->path, O_WRONLY | O_CREAT | O_NOFOLLOW | (kept ? O_APPEND : O_TRUNC), 0666);
+  SbFileRemember(h->path, &h->on_disk);
   if (h->fd < 0)
     SbFormat(SB_MESSAGE_MAX, message, "cannot open %s for writing: %s", h->path, strerror(errno));
   else if (!kept)

@@ -50,6 +50,16 @@ PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowne
                                    const PetscInt key[], SbOrder *order);
 PetscErrorCode SbOrderDestroy(SbOrder *order);
 
+/* Which file is open; number 0: not known. Rank 0. */
+typedef struct {
+  dev_t device;
+  ino_t number;
+  PetscBool lost; /* and reported */
+} SbFileIdentity;
+void SbFileRemember(const char *path, SbFileIdentity *file);
+/* Whether path no longer is that file; warns the first time. Rank 0. */
+PetscBool SbFileLost(const char *path, SbFileIdentity *file);
+
 /* HDF5 and files */
 typedef struct {
   MPI_Comm comm;
@@ -58,6 +68,7 @@ typedef struct {
   PetscBool failed; /* a write failed, and all ranks know */
   char reason[160]; /* why a write failed on this rank; the next flush reports it to the others */
   char path[PETSC_MAX_PATH_LEN];
+  SbFileIdentity on_disk; /* rank 0, of files that are written */
 } SbH5;
 
 /* The type in memory of numbers of this type in a file: that of PetscInt for H5T_STD_I64LE. */

@@ -74,7 +74,8 @@ const SbOption SbTimeRows[] = {
    "wall time limit of the program, h:mm:ss or d-hh:mm:ss: the run stops in time to write a "
    "checkpoint, with exit code 75, and -restart latest resumes it; empty: no limit"},
   {"stop_grace", SB_OPTION_REAL, 1, "s", "10", "[0, inf)",
-   "after a signal to stop (SIGTERM, SIGINT, SIGUSR1): time in which the current step may be "
+   "after a signal to stop (SIGTERM, SIGHUP, SIGINT, SIGUSR1): time in which the current step may "
+   "be "
    "finished; then it is abandoned, and the run ends with the step before"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "contact with response multiplier: how the saddle-point system of displacements and Lagrange "

@@ -1,11 +1,11 @@
 /*
   Early end of a run: reason of the failure, end of halving, requests to stop.
 
-  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the
-  current step; monitors take that step as the last one, so that a checkpoint and the last frame are
-  written. A step that takes longer than -stop_grace, or would exceed -wall_time, is abandoned
-  between two iterations, and the run ends with the step before. All ranks decide together, by a
-  reduction after each step and iteration.
+  A signal (SIGTERM, SIGHUP, SIGINT, SIGUSR1 on any rank; SIGHUP unless it was ignored, as by nohup)
+  or the end of -wall_time ends the run after the current step; monitors take that step as the last
+  one, so that a checkpoint and the last frame are written. A step that takes longer than
+  -stop_grace, or would exceed -wall_time, is abandoned between two iterations, and the run ends
+  with the step before. All ranks decide together, by a reduction after each step and iteration.
 */
 #include <signal.h>
 #include <stdarg.h>
@@ -78,8 +78,9 @@ static void note_signal(int number)
 
 PetscErrorCode SbRunCatchSignals(SbRun run)
 {
-  static const int signals[] = {SIGTERM, SIGINT, SIGUSR1};
+  static const int signals[] = {SIGTERM, SIGHUP, SIGINT, SIGUSR1};
   struct sigaction action = {.sa_handler = note_signal, .sa_flags = SA_RESTART};
+  struct sigaction before;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -87,7 +88,8 @@ PetscErrorCode SbRunCatchSignals(SbRun run)
   asked.speak = !rank;
   (void)sigemptyset(&action.sa_mask);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(signals); i++)
-    (void)sigaction(signals[i], &action, NULL);
+    if (signals[i] != SIGHUP || sigaction(SIGHUP, NULL, &before) || before.sa_handler != SIG_IGN)
+      (void)sigaction(signals[i], &action, NULL);
   run->clock.stop.listens = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,6 +160,8 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
     why = "the end of -wall_time is near";
   if (reason == SIGTERM)
     why = "SIGTERM";
+  if (reason == SIGHUP)
+    why = "SIGHUP";
   if (reason == SIGINT)
     why = "SIGINT";
   run->clock.stopped = PETSC_TRUE;

@@ -104,6 +104,19 @@ arc="-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 -b
 }
 error 3 "/nonexistent/view.opts" bar.opts -scenario_view /nonexistent/view.opts
 
+# a disk that fills, while a file is written or standard output
+error 3 "/dev/full" bar.opts -scenario_view /dev/full
+error 1 "/dev/full" -options_table /dev/full
+for print in -scenario_view -options_table -version "-help all"; do
+  # shellcheck disable=SC2086
+  "$supple" bar.opts $print >/dev/full 2>err.txt
+  code=$?
+  check "$print: exit code $code on a full disk" test $code = 1
+  check "$print: a full disk is not said" grep -q "^supple: error: .*standard output" err.txt
+done
+"$supple" -help all 2>err.txt | head -1 >out.txt
+check "a reader that leaves early is an error: $(cat err.txt)" test "${PIPESTATUS[0]} $(wc -c <err.txt)" = "0 0"
+
 # a PETSc option that nobody reads is reported loudly, but the run goes on
 "$supple" bar.opts -quiet -output_dir opts -ksp_nothing 1e-3 >out.txt 2>err.txt
 check "-ksp_nothing: exit code $?" test $? = 0

@@ -48,6 +48,9 @@ ok info "$data/two_cubes_41.msh" -scale 0.1 -translate 1,2,3
 says "from (1, 2, 3) to (1.2, 2.1, 3.1)"
 says " volume 0.002 m^3"
 ok info box:1,2,3:2 -quiet
+"$tool" info box:1,2,3:2 >/dev/full 2>err.txt
+code=$?
+check "info: exit code $code on a full disk: $(cat err.txt)" test "$code $(grep -c '^supple-mesh: error: .*standard output' err.txt)" = "1 1"
 says " volume 6 m^3"
 ok info "$data/odd.msh"
 says " to know: unused vertices left out: 2, inverted tets turned: 1, parts that share no vertex: 2"

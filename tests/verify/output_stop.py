@@ -70,6 +70,23 @@ def check_same(folder, ranks, step):
             sys.exit(f"{folder}: {name} differs by {worst:.2g} from the run that was not stopped")
 
 
+def check_lost():
+    """Files that are deleted during the run are named once; the run goes on, and makes no empty ones in their place."""
+    process = start(1, "lost", "-output_fields", "displacement")
+    names = ("history.csv", "fields.h5")
+    for name in names:
+        (OUT / "lost" / name).unlink()
+    while process.poll() is None and (OUT / "lost" / "errors.txt").read_text().count("was deleted") < 2:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    code = process.wait()
+    text = (OUT / "lost" / "errors.txt").read_text()
+    if code != STOPPED or any(len(re.findall(rf"warning: \S+{name} was deleted", text)) != 1 for name in names):
+        sys.exit(f"lost: exit code {code}: {text}")
+    if any((OUT / "lost" / name).exists() for name in names):
+        sys.exit("lost: a deleted file is there again")
+
+
 def main():
     run(1, "whole", *SLOW, "-restart", "auto")  # nothing to go on from: from the beginning
 
@@ -78,6 +95,11 @@ def main():
     os.kill(ranks_of(process.pid)[-1], signal.SIGTERM)
     steps = [check_stopped("term", process.wait(), "SIGTERM")]
     check_same("term", 2, steps[-1])
+    # a closed terminal, which nohup ignores
+    process = start(1, "hup")
+    process.send_signal(signal.SIGHUP)
+    steps.append(check_stopped("hup", process.wait(), "SIGHUP"))
+    check_lost()
     process = start(2, "usr1")
     process.send_signal(signal.SIGUSR1)
     steps.append(check_stopped("usr1", process.wait(), "SIGUSR1"))
