@@ -51,7 +51,8 @@ static const SbOption rows[] = {
    "never pass through each other. Between bodies and in self-contact, all five act on the same "
    "pairs of features, and collision detection limits their steps"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "between surfaces: response barrier: activation distance, the gap below which surfaces repel each "
+   "between surfaces: response barrier: activation distance, the gap below which surfaces repel "
+   "each "
    "other; other responses: the gap that surfaces keep as their constraint; 0: a "
    "thousandth of "
    "the diagonal of the smallest body, at most 0.003 times the cube root of its volume and half of "
