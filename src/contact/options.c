@@ -48,9 +48,12 @@ static const SbOption rows[] = {
    "barrier: a "
    "potential that grows without bound as the gap closes (incremental potential contact), so that "
    "surfaces "
-   "never pass through each other"},
+   "never pass through each other. Between bodies and in self-contact, all five act on the same "
+   "pairs of features, and collision detection limits their steps"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "response barrier: activation distance, the gap below which surfaces repel each other; 0: a "
+   "between surfaces: response barrier: activation distance, the gap below which surfaces repel "
+   "each "
+   "other; other responses: the gap that surfaces keep as their constraint; 0: a "
    "thousandth of "
    "the diagonal of the smallest body, at most 0.003 times the cube root of its volume and half of "
    "its "
@@ -79,11 +82,13 @@ static const SbOption rows[] = {
    "response barrier: tolerance of lagged friction, its change in an iteration relative to "
    "Coulomb's limit"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
-   "kinetic coefficient of friction; negative: equal to the static one; not with barrier"},
+   "kinetic coefficient of friction; negative: equal to the static one; only for nodes "
+   "against obstacles, not with barrier"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "penalty, augmented and friction: factor on the stiffness min(lambda + 2 mu, 11 mu) area / "
    "height of the "
-   "tet behind the surface"},
+   "tet behind the surface; between bodies and in self-contact area / mean edge, where projected "
+   "and multiplier take 10 times as much"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -93,7 +98,8 @@ static const SbOption rows[] = {
    "euler_implicit, and steps in which elastic waves cross the body; projected, multiplier and "
    "barrier"},
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
-   "yes: a step in which contact begins is cut at the first time of impact; not with barrier"},
+   "yes: a step in which contact begins is cut at the first time of impact; only for nodes "
+   "against obstacles, not with barrier"},
   {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "penetration that is there at the start is resolved gradually: number of steps in which its "
    "depth falls "
