@@ -1,0 +1,156 @@
+"""Responses between bodies: penalty, augmented, multiplier and projected, on the pairs of the barrier.
+
+Patch test: two blocks, one on the other, with meshes that do not match and sides that cannot move outwards, are pressed with 1e4 Pa: the
+stress is uniform, exactly so for multiplier and projected. A cube flies into another: momentum stays, no energy is made, nothing passes
+through anything, and no pair pulls. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
+A strip that is folded meets itself. What a response lacks is an error.
+"""
+# cpu 60
+import csv
+import re
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy
+
+from output_common import MPI, OUT, SUPPLE
+
+ALL = ("penalty", "augmented", "multiplier", "projected")
+EXACT = ("multiplier", "projected")
+BODY = ("-body_{0}_mesh box:{1} -body_{0}_translate {2} -body_{0}_material {3} -body_{0}_young {4} -body_{0}_poisson {5} "
+        "-body_{0}_density 1000 ")
+PATCH = ("-bodies a,b " + BODY.format("a", "1,1,0.5:4", "0,0,0", "linear", "1e6", "0.2")
+         + BODY.format("b", "1,1,0.6:3", "0,0,0.5", "linear", "2e6", "0.4")
+         + "-effects bottom,x,y,press,meet -effect_bottom_type fixed -effect_bottom_on a.zmin -effect_bottom_components z "
+         "-effect_x_type fixed -effect_x_on a.xmin,a.xmax,b.xmin,b.xmax -effect_x_components x "
+         "-effect_y_type fixed -effect_y_on a.ymin,a.ymax,b.ymin,b.ymax -effect_y_components y "
+         "-effect_press_type traction -effect_press_on b.zmax -effect_press_vector 0;0;-1e4 -effect_meet_type contact -time static "
+         "-output_precision double ")
+FLY = ("-bodies a,b " + BODY.format("a", "0.1,0.1,0.1:2", "0,0,0", "neohookean", "1e5", "0.3")
+       + BODY.format("b", "0.1,0.1,0.1:3", "0.13,0.03,0.02", "neohookean", "2e5", "0.4")
+       + "-body_a_velocity 2,0,0 -effects meet -effect_meet_type contact -effect_meet_verify yes -time euler_implicit -ts_dt 0.002 "
+       "-ts_max_time 0.06 ")
+DROP = ("-bodies a,b " + BODY.format("a", "0.2,0.2,0.1:3", "0,0,0", "neohookean", "1e5", "0.4")
+        + BODY.format("b", "0.1,0.1,0.1:2", "0.03,0.04,0.102", "neohookean", "5e4", "0.4") + "-body_b_rotate 0,0,1,20 "
+        "-effects gravity,bottom,meet -effect_gravity_vector 2,0,-9.6 -effect_bottom_type fixed -effect_bottom_on a.zmin "
+        "-effect_meet_type contact -effect_meet_friction 0.4 -effect_meet_verify yes -time euler_implicit -ts_dt 0.005 ")
+COMMON = "-quiet -snes_rtol 1e-12 -ksp_rtol 1e-12 -reproducible "
+
+
+def run(folder, options, ranks=1, code=0):
+    command = [*MPI, str(ranks), SUPPLE, *(COMMON + options).split(), "-output_dir", str(OUT / folder)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode != code:
+        sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
+    return result.stdout + result.stderr
+
+
+def history(folder):
+    with open(OUT / folder / "history.csv", newline="") as f:
+        names, _, *rows = csv.reader(f)
+    return {name: numpy.array([float(row[k]) for row in rows]) for k, name in enumerate(names)}
+
+
+def check(good, text):
+    if not good:
+        sys.exit(text)
+
+
+def check_patch():
+    for response in ALL:
+        name = f"patch-{response}"
+        shutil.rmtree(OUT / name, ignore_errors=True)
+        run(name, PATCH + "-effect_meet_response " + response)
+        with h5py.File(OUT / name / "fields.h5") as f:
+            step = f["step"]
+            last = step[sorted(step)[-1]]
+            last = last[sorted(last)[-1]] if "von_mises" not in last else last
+            stress = last["von_mises"][:]
+        # p (1 - 2 nu) / (1 - nu)
+        off = numpy.minimum(abs(stress - 7500), abs(stress - 1e4 / 3)).max() / 1e4
+        found = history(name)
+        width = 0.0015
+        print(f"  {name}: stress {off:.1e} off, gap {found['meet_gap'][-1] / width:.9f} of the width, "
+              f"{found['newton'][-1]:.0f} Newton iterations")
+        check(off < (2e-8 if response in EXACT else 0.05), f"{name}: the stress is {off:.3g} of the pressure off")
+        check(abs(found["meet_normal_force"][-1] / 1e4 - 1) < 1e-5, f"{name}: force {found['meet_normal_force'][-1]}")
+        if response != "penalty":
+            check(abs(found["meet_gap"][-1] / width - 1) < (1e-8 if response in EXACT else 2e-3),
+                  f"{name}: gap {found['meet_gap'][-1]} m, not {width}")
+
+
+def check_flight():
+    for response in ALL:
+        name = f"fly-{response}"
+        text = run(name, FLY + f"-effect_meet_response {response} -output_contacts yes -output_every 0.006")
+        found = history(name)
+        energy = found["kinetic"] + found["strain"]
+        moved = max(abs(found[f"momentum_{c}"] - found[f"momentum_{c}"][0]).max() for c in "xyz") / found["momentum_x"][0]
+        print(f"  {name}: momentum {moved:.1e} off, energy {energy[0]:.3f} to {energy[-1]:.3f} J, "
+              f"{found['meet_normal_force'].max():.0f} N at most")
+        check(found["meet_normal_force"].max() > 1, f"{name}: no contact\n{text}")
+        check(found["meet_normal_force"].min() >= 0, f"{name}: a pair pulls")
+        check(moved < 1e-9, f"{name}: momentum changes by {moved:.3g} of itself")
+        rise = (energy - energy[0]).max() / energy[0]
+        check(rise < 1e-3, f"{name}: energy rises by {rise:.3g} of itself")
+
+
+def compare(name, one, other, tolerance):
+    a, b = history(one), history(other)
+    for column in ("kinetic", "strain", "max_displacement", "meet_normal_force", "meet_gap", "bottom_reaction_z"):
+        size = abs(a[column]).max()
+        off = abs(a[column] - b[column]).max() / size
+        check(off < tolerance, f"{name}: {column} differs by {off:.3g} of its size between {one} and {other}")
+
+
+def check_ranks():
+    for response in ALL:
+        options = DROP + f"-ts_max_time 0.08 -effect_meet_response {response}"
+        if response == "projected":
+            options += " -body_b_element cr"
+        run(f"ranks-{response}-1", options)
+        for ranks in (2, 3):
+            run(f"ranks-{response}-{ranks}", options, ranks)
+            compare("ranks", f"ranks-{response}-1", f"ranks-{response}-{ranks}", 1e-6)
+
+
+def check_restart():
+    for response in ("augmented", "projected"):
+        options = DROP + f"-effect_meet_response {response} -checkpoint_every_steps 12 -output_fields none -ts_max_time "
+        whole, half = f"whole-{response}", f"half-{response}"
+        for folder in (whole, half):
+            shutil.rmtree(OUT / folder, ignore_errors=True)
+        run(whole, options + "0.12")
+        run(half, options + "0.06")
+        check(history(half)["meet_normal_force"][-1] > 1, f"{half}: no contact at the checkpoint")
+        run(half, options + "0.12 -restart latest", 2)
+        compare("restart", whole, half, 1e-6)
+
+
+def check_self():
+    for response in ("penalty", "projected"):
+        name = f"fold-{response}"
+        run(name, f"-options_file scenarios/fold.opts -ts_max_time 0.85 -effect_self_response {response} -effect_self_verify yes "
+            "-output_fields none -snes_rtol 1e-6 -ksp_rtol 1e-5")
+        check(history(name)["self_contacts"].max() > 5, f"{name}: the sheet does not touch itself")
+
+
+def check_refusals():
+    for option, words in (("barrier -effect_meet_stiffness 3", "barrier has not"), ("projected -effect_meet_time_of_impact yes", "leave it out"),
+                          ("penalty -effect_meet_friction_kinetic 0.1", "leave it out")):
+        text = run("refused", FLY + "-effect_meet_response " + option, code=1)
+        check(words in text, f"{option}: {text}")
+    for response in ALL:
+        text = run("same", FLY.replace("0.13,0.03,0.02", "0,0,0").replace(":3", ":2") + "-effect_meet_response " + response, code=1)
+        check(re.search("inside body|same place", text), f"{response}, bodies in the same place: {text}")
+
+
+check_patch()
+check_flight()
+check_ranks()
+check_restart()
+check_self()
+check_refusals()
+print("responses between bodies are as they should be")
