@@ -13,7 +13,7 @@
 #include "barrier.h"
 
 #define SETTLED 1e-3     /* tolerance of gaps, over those that are kept */
-#define EXACT 1e-10       /* the same of exact constraints in static runs */
+#define EXACT 1e-10      /* the same of exact constraints in static runs */
 #define EXACT_STEPS 1e-5 /* and in time steps */
 #define UPDATES 100      /* most updates of multipliers in a step */
 #define FALLS 0.9        /* the worst gap falls to this part in ... */
