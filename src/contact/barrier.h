@@ -82,6 +82,7 @@ typedef struct {
 /* By body, [nbody+1]; the obstacle's are infinite. */
 typedef struct {
   PetscReal *w, *k, *mass; /* width, m; stiffness (SbPairLaw), Pa or Pa/m; mass, kg */
+  PetscReal *guard;        /* pressure of a barrier, Pa */
   PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
@@ -193,7 +194,8 @@ static inline SbPairLaw SbPairLawOf(const Barrier *b, const Active *a)
   return (SbPairLaw){.spring = (PetscBool)!is_barrier(b),
                      .width = of_pair(b, b->widths.w, &a->pair),
                      .stiffness = (is_exact(b) ? STIFFER : 1.) * of_pair(b, b->widths.k, &a->pair),
-                     .force = a->force};
+                     .force = a->force,
+                     .guard = of_pair(b, b->widths.guard, &a->pair)};
 }
 /* The same of its part in the matrix of linear systems; row: the rest is in a row. */
 SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row);

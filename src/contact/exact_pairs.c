@@ -3,7 +3,8 @@
   the linear systems of Newton's method (src/solver/contact_constraints.c).
 
   In the matrix a pair has the stiffness of the response `augmented`, the rest is in its row. A pair
-  of nearly parallel edges, which counts less, is in the matrix alone.
+  of nearly parallel edges, which counts less, and one that is pressed together, are in the matrix
+  alone.
 */
 #include "barrier.h"
 
@@ -13,7 +14,8 @@ SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row)
   PetscReal d[3];
 
   *row = PETSC_FALSE;
-  if (!is_exact(b) || SbPairIsMollified(b->surface, &a->pair, a->gap, &a->at, b->motion.x))
+  if (!is_exact(b) || a->gap < SB_GUARD * law.width ||
+      SbPairIsMollified(b->surface, &a->pair, a->gap, &a->at, b->motion.x))
     return law;
   SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
   *row = (PetscBool)(d[1] < 0.);

@@ -685,7 +685,8 @@ static PetscErrorCode take_points(SbContactSurface m, SbContactOverlap *o)
     if (!all || !mine)
       continue;
     o->point[n] = o->point[i];
-    PetscCall(PetscArraycpy(o->point[n++].v, v + 5 * i, 5));
+    PetscCall(PetscArraycpy(o->point[n].v, v + 5 * i, 5));
+    n++;
   }
   o->n = n;
   PetscCall(PetscFree2(number, v));

@@ -13,6 +13,9 @@
 
     b = (<l + c (w - d)>^2 - l^2) / (2 c)
 
+  A spring that is pressed together would leave its pair to collision detection, whose steps get
+  ever shorter: below a part of the width it has a barrier as well.
+
   Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is
   multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5);
   vertex-triangle pairs supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a|
@@ -53,6 +56,13 @@ void SbPairLawEvaluate(const SbPairLaw *law, PetscReal d, PetscReal area, PetscR
   b[0] = (PetscSqr(force) - PetscSqr(law->force)) / (2. * c);
   b[1] = -force;
   b[2] = force > 0. ? c : 0.;
+  if (d < SB_GUARD * law->width && law->guard > 0.) {
+    PetscReal near[3];
+
+    SbBarrier(d, SB_GUARD * law->width, law->guard, area, near);
+    for (int k = 0; k < 3; k++)
+      b[k] += near[k];
+  }
 }
 
 /* The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its

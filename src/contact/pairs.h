@@ -267,7 +267,9 @@ typedef struct {
   PetscReal width;     /* m */
   PetscReal stiffness; /* of a barrier: its pressure, Pa; of a spring: Pa/m */
   PetscReal force;     /* multiplier of a spring at its width, N */
+  PetscReal guard; /* of a spring: pressure of a barrier that begins at SB_GUARD of its width, Pa */
 } SbPairLaw;
+#define SB_GUARD 0.2
 /* Energy of a gap d, J, and its first two derivatives, of a pair with this area, m^2. */
 void SbPairLawEvaluate(const SbPairLaw *law, PetscReal d, PetscReal area, PetscReal b[3]);
 /* The same of a barrier of the width w (m) and pressure k (Pa): 0 from w on, infinite at 0. */

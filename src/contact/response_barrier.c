@@ -44,14 +44,12 @@
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
-/* Stiffness of a side of this material (SbPairLaw): of springs by the layer of cells below. */
-static PetscReal stiffness_of(const Barrier *b, SbMaterial law)
+/* Stiffness of springs of this material, Pa/m: that of a layer of cells. */
+static PetscReal spring_of(const Barrier *b, SbMaterial law)
 {
-  if (b->contact.response != BARRIER)
-    return b->options.stiffness *
-           PetscMin(SbMaterialWaveModulus(law), STIFFEST * SbMaterialShearModulus(law)) /
-           b->surface->mean_edge;
-  return b->options.pressure > 0. ? b->options.pressure : PRESSURE * SbMaterialYoungModulus(law);
+  return b->options.stiffness *
+         PetscMin(SbMaterialWaveModulus(law), STIFFEST * SbMaterialShearModulus(law)) /
+         b->surface->mean_edge;
 }
 
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
@@ -78,12 +76,13 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.x));
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.start));
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.other));
-  PetscCall(PetscMalloc4(3 * nbody + 3, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+  PetscCall(PetscMalloc4(4 * nbody + 4, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
                          &b->motion.from, nobstacle, &b->motion.to));
   b->widths.k = b->widths.w + nbody + 1;
   b->widths.mass = b->widths.k + nbody + 1;
-  b->widths.w[nbody] = b->widths.k[nbody] = b->widths.mass[nbody] = b->contact.base.width =
-    PETSC_MAX_REAL;
+  b->widths.guard = b->widths.mass + nbody + 1;
+  b->widths.w[nbody] = b->widths.k[nbody] = b->widths.mass[nbody] = b->widths.guard[nbody] =
+    b->contact.base.width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->widths.w[i] = b->options.width > 0.
                        ? b->options.width
@@ -91,7 +90,10 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
                                   0.5 * b->surface->shortest);
     b->contact.base.width = PetscMin(b->contact.base.width, b->widths.w[i]);
     b->widths.mass[i] = s->material[i]->density * s->mesh->body[i].volume;
-    b->widths.k[i] = stiffness_of(b, s->material[i]);
+    b->widths.guard[i] = b->options.pressure > 0.
+                           ? b->options.pressure
+                           : PRESSURE * SbMaterialYoungModulus(s->material[i]);
+    b->widths.k[i] = is_barrier(b) ? b->widths.guard[i] : spring_of(b, s->material[i]);
   }
   PetscCheck(
     b->widths.w[0] <= b->surface->shortest, s->comm, PETSC_ERR_USER_INPUT,

@@ -98,8 +98,8 @@ static PetscErrorCode append(SbLocalMesh *local, SbLocalMesh *from)
   const PetscInt known = local->nvert;
   const PetscInt before = local->ncell;
   const PetscInt room = PetscMax(from->nvert, from->ncell);
-  const size_t nvert = (size_t)(known + from->nvert);
-  const size_t ncell = (size_t)(before + from->ncell);
+  const size_t nvert = (size_t)known + (size_t)from->nvert;
+  const size_t ncell = (size_t)before + (size_t)from->ncell;
   PetscInt *orig, *number, *order, *position;
 
   PetscFunctionBeginUser;
