@@ -133,8 +133,8 @@ CASES = [
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2", ["0.0025 s"]),
     # PETSc's own integrator stops without a message
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time alpha2", ["-ts_dt", "genalpha"]),
-    # there is no load beyond 0.0152 s: repeated halving of the step must end
-    ("R1", "error", "bar.opts -effect_pull_vector 0;0;sqrt(0.0152-t)", ["1.86265e-11 s", "-ts_dt"]),
+    # there is no load beyond 0.0152 s
+    ("R1", "error", "bar.opts -effect_pull_vector 0;0;sqrt(0.0152-t)", ["-effect_pull_vector", "0.02 s"]),
     # the inverted cube, which carries the load too, is not accepted
     ("R2", "error", f"{LIMIT} -effect_press_type traction -effect_press_vector 0;0;-0.2", ["0.962"]),
     ("R2", "error", f"{LIMIT} -effect_press_type traction -effect_press_vector 0;0;-0.2 -body_a_element p2 -static_steps 1", ["0.96"]),
@@ -145,7 +145,7 @@ CASES = [
        ["the load factor reached 0.", "a limit load", "-static_control arc_length"]) for more in ("p2 -solver cg_gamg -static_steps 1", "cr -solver cg_gamg", "p1 -pc_type cholesky -mat_cholmod_factor supernodal")),
     ("R3", "warning", "bar.opts -solver cg_jacobi -ksp_max_it 2", ["cg_jacobi", "-solver"]),
     ("R4", "warning", "bar.opts -time euler_explicit -ts_dt 0.005 -ts_max_time 0.01", ["-ts_dt", "0.005 s"]),
-    ("R4", "error", "bar.opts -time euler_explicit -ts_dt 0.01 -ts_max_time 10", ["0.01 s", "t = 3"]),
+    ("R4", "error", "bar.opts -time euler_explicit -ts_dt 0.01 -ts_max_time 10", ["0.01 s", "t = 0.24"]),
     ("R5", "warning", f"cube.opts {DRIVEN} -0.12;0;0", ["6 ", "-0.2"]),
     ("R6", "warning", "bar.opts -snes_type ksponly -time_predictor velocity -body_bar_tangent warped", ["-snes_type", "-time_predictor", "exact_spd"]),
     ("R7", "warning", f"cube.opts -body_a_mesh box:0.4,0.1,0.1:6 -body_a_element cr -solver cg_two_level {HELD.replace('hold ', 'hold,gravity ', 1)}", ["-solver"]),
