@@ -388,8 +388,10 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscCall(PetscArraycpy(b->motion.start, b->motion.x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->active.n; i++)
     least = PetscMin(least, b->active.pair[i].gap);
-  PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
+  PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "The effect %s: a gap of %g m at the start of a step: edges or corners lie exactly in "
+             "each other; move a body a little by -body_NAME_translate",
+             e->name, (double)least);
   b->sums.energy = gap_energy(b, &b->sums.obstacle_power);
 
   /* friction with the normal forces at the start */

@@ -31,7 +31,7 @@
 #include "solver_impl.h"
 
 #define GIVE 1e-2      /* e */
-#define TOLERANCE 1e-5 /* relative, of the preconditioned residual */
+#define TOLERANCE 1e-8 /* relative, of the preconditioned residual */
 #define MOST 2000      /* iterations */
 #define RESTART 100    /* of FGMRES */
 

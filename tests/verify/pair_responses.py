@@ -5,7 +5,7 @@ stress is uniform, exactly so for multiplier and projected. A cube flies into an
 through anything, and no pair pulls. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
-# cpu 60
+# cpu 80
 import csv
 import re
 import shutil
@@ -97,6 +97,20 @@ def check_flight():
         check(rise < 1e-3, f"{name}: energy rises by {rise:.3g} of itself")
 
 
+def check_fast():
+    """A cell on a cell at 20 m/s: more than springs can bear; without their barrier all motion was lost."""
+    fast = ("-bodies a,b " + BODY.format("a", "0.1,0.1,0.1:1", "0,0,0", "neohookean", "1e5", "0.3")
+            + BODY.format("b", "0.1,0.1,0.1:1", "0.02,0.03,0.11", "neohookean", "1e5", "0.3")
+            + "-body_b_velocity 0,0,-20 -effects meet -effect_meet_type contact -effect_meet_verify yes -ts_dt 0.001 -ts_max_time 0.02 ")
+    for response in ALL:
+        run(f"fast-{response}", fast + "-effect_meet_response " + response)
+        found = history(f"fast-{response}")
+        momentum = found["momentum_z"]
+        energy = found["kinetic"][-1] + found["strain"][-1]
+        check(abs(momentum[-1] / momentum[0] - 1) < 1e-6, f"fast-{response}: momentum {momentum[0]} to {momentum[-1]}")
+        check(100 < energy < 200, f"fast-{response}: energy 200 to {energy} J")
+
+
 def compare(name, one, other, tolerance):
     a, b = history(one), history(other)
     for column in ("kinetic", "strain", "max_displacement", "meet_normal_force", "meet_gap", "bottom_reaction_z"):
@@ -149,6 +163,7 @@ def check_refusals():
 
 check_patch()
 check_flight()
+check_fast()
 check_ranks()
 check_restart()
 check_self()
