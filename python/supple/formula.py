@@ -155,7 +155,10 @@ def number_of(word):
     """A number as C reads it, with its sign; nan where the word is none."""
     if not NUMBER.fullmatch(word[word[:1] in ("+", "-"):]):
         return numpy.nan
-    return float.fromhex(word) if "x" in word.lower() else float(word)
+    try:
+        return float.fromhex(word) if "x" in word.lower() else float(word)
+    except OverflowError:  # C's strtod() gives infinity, too
+        return -numpy.inf if word[0] == "-" else numpy.inf
 
 
 def read_table(path, where="table"):
