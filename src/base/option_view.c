@@ -9,6 +9,7 @@
 */
 #include <ctype.h>
 #include <errno.h>
+#include <poll.h>
 #include <unistd.h>
 #include "option.h"
 
@@ -171,6 +172,14 @@ static PetscErrorCode raise(MPI_Comm comm, int error, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the other end of a pipe was closed: no error of a program in a row of them. */
+static PetscBool reader_left(FILE *f)
+{
+  struct pollfd end = {.fd = fileno(f), .events = POLLOUT};
+
+  return (PetscBool)(poll(&end, 1, 0) > 0 && end.revents & (POLLERR | POLLHUP));
+}
+
 PetscErrorCode SbStandardOutputCheck(MPI_Comm comm)
 {
   PetscMPIInt rank;
@@ -180,7 +189,9 @@ PetscErrorCode SbStandardOutputCheck(MPI_Comm comm)
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank)
     error = flush_failed(stdout);
-  PetscCall(raise(comm, error == EPIPE ? 0 : error, "standard output"));
+  if (error == EPIPE || (error && reader_left(stdout)))
+    error = 0;
+  PetscCall(raise(comm, error, "standard output"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
