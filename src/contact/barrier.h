@@ -25,7 +25,9 @@ typedef struct {
 /* Multipliers above zero, the same on every rank. */
 typedef struct {
   PetscInt n, size;
-  PairForce *pair;  /* [n] in the order of pairs */
+  PairForce *pair; /* [n] in the order of pairs */
+  PetscInt nkept, kept_size;
+  PairForce *kept;  /* [nkept] those of the last accepted step, with which an attempt begins */
   PetscInt updates; /* in this step */
   PetscReal least;  /* smallest error of gaps of its solutions, over the width */
   PetscInt stuck;   /* updates since */
@@ -308,6 +310,9 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
    Collective. */
 PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
 PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
+/* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
+PetscErrorCode SbMultipliersKeep(Multipliers *m);
+PetscErrorCode SbMultipliersRestore(Barrier *b);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows);

@@ -136,3 +136,26 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbMultipliersKeep(Multipliers *m)
+{
+  PetscFunctionBeginUser;
+  m->nkept = m->n;
+  PetscCall(SbReserve(m->n, sizeof(*m->kept), &m->kept_size, &m->kept));
+  PetscCall(PetscArraycpy(m->kept, m->pair, m->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMultipliersRestore(Barrier *b)
+{
+  Multipliers *m = &b->multipliers;
+
+  PetscFunctionBeginUser;
+  m->updates = 0;
+  m->n = m->nkept;
+  PetscCall(SbReserve(m->n, sizeof(*m->pair), &m->size, &m->pair));
+  PetscCall(PetscArraycpy(m->pair, m->kept, m->n));
+  if (has_multipliers(b))
+    b->motion.known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

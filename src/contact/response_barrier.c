@@ -353,7 +353,7 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   PetscFunctionBeginUser;
   PetscCall(find_path(b, t, dt));
   b->contact.base.progress = 0.;
-  b->multipliers.updates = 0;
+  PetscCall(SbMultipliersRestore(b));
   b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;
   SbContactPairsForget(b->pairs);
   b->motion.known = (PetscBool)(b->motion.known && b->pairs->known);
@@ -479,6 +479,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, progress, 2, MPIU_REAL, MPI_SUM, s->comm));
   b->sums.work += b->contact.base.work;
+  PetscCall(SbMultipliersKeep(&b->multipliers));
   b->separation.parted = PETSC_FALSE;
   if (progress[1] > 0.)
     b->separation.stiffer = progress[0] < HALF * progress[1]
@@ -553,6 +554,7 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
       m->pair[m->n].key[i] = (PetscInt)record[i];
     m->pair[m->n++].force = record[PAIR_KEY];
   }
+  PetscCall(SbMultipliersKeep(m));
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
   b->separation.stiffer = sum[2];
@@ -590,6 +592,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
   PetscCall(PetscFree(b->multipliers.pair));
+  PetscCall(PetscFree(b->multipliers.kept));
   PetscCall(PetscFree(b->friction.pairs.pair));
   PetscCall(PetscFree(b->friction.next.pair));
   PetscCall(PetscFree(b->blocks.block));
