@@ -124,7 +124,6 @@ pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/pic
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
 check: deps ## install missing packages, build, run the tests (25 minutes of processor time, on all cores; one of them: T=name)
 	$(AGAIN) bin/supple bin/supple-mesh tests $(MESHES)
-	@scripts/check-layers $(BUILD)/src
 	@scripts/venv
 	@$(CHECK)
 

@@ -33,8 +33,7 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
    line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where,
                                   SbFormula formula);
-/* Creates the row->count formulas of an option that is `live` (live.c); where: its name. Destroy
-   each. */
+/* Makes row->count empty formulas those of an option that is `live` (live.c); where: its name. */
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);

@@ -75,7 +75,6 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     for (PetscInt i = 0; i < live.n; i++)
       if (!strcmp(live.value[i].column, v->column))
         old = live.value[i].formula->row[0][1];
-    PetscCall(SbFormulaNew(where, &formula[k]));
     formula[k]->uses[0] = PETSC_TRUE;
     formula[k]->nrow = 2;
     PetscCall(PetscMalloc1(2, &formula[k]->row));

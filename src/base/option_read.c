@@ -304,6 +304,8 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   if (is_absent(r))
     PetscFunctionReturn(PETSC_SUCCESS);
   if (!strcmp(r->text, "live") && !strcmp(scope->klass, "effect")) {
+    for (PetscInt i = 0; i < count; i++)
+      PetscCall(SbFormulaNew(r->name, &formulas[i]));
     PetscCall(SbLiveCreate(r->name, r->row, formulas));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

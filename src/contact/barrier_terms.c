@@ -239,6 +239,25 @@ static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A pair of nearly parallel edges, which counts less, and one that is pressed together, have no
+   row. */
+SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row)
+{
+  SbPairLaw law = SbPairLawOf(b, a);
+  PetscReal d[3];
+
+  *row = PETSC_FALSE;
+  if (!is_exact(b) || a->gap < SB_GUARD * law.width ||
+      SbPairIsMollified(b->surface, &a->pair, a->gap, &a->at, b->motion.x))
+    return law;
+  SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
+  *row = (PetscBool)(d[1] < 0.);
+  law.force = -d[1];
+  law.width = a->gap;
+  law.stiffness /= STIFFER;
+  return law;
+}
+
 PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
                                         SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
 {

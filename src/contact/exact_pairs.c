@@ -2,28 +2,10 @@
   exact_pairs.c - the responses `projected` and `multiplier` of pairs: their constraints as rows of
   the linear systems of Newton's method (src/solver/contact_constraints.c).
 
-  In the matrix a pair has the stiffness of the response `augmented`, the rest is in its row. A pair
-  of nearly parallel edges, which counts less, and one that is pressed together, are in the matrix
-  alone.
+  In the matrix a pair has the stiffness of the response `augmented`, the rest is in its row
+  (SbPairMatrixLaw).
 */
 #include "barrier.h"
-
-SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row)
-{
-  SbPairLaw law = SbPairLawOf(b, a);
-  PetscReal d[3];
-
-  *row = PETSC_FALSE;
-  if (!is_exact(b) || a->gap < SB_GUARD * law.width ||
-      SbPairIsMollified(b->surface, &a->pair, a->gap, &a->at, b->motion.x))
-    return law;
-  SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
-  *row = (PetscBool)(d[1] < 0.);
-  law.force = -d[1];
-  law.width = a->gap;
-  law.stiffness /= STIFFER;
-  return law;
-}
 
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows)

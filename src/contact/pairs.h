@@ -110,7 +110,7 @@ static inline PetscReal *const *SbContactSurfaceFollow(SbContactSurface mesh, co
       return mesh->array[i];
   return NULL;
 }
-/* Of contact_surface.c and contact_halo.c: room for features; nodes of vertex v; where groups, the
+/* Of contact_array.c and contact_halo.c: room for features; nodes of vertex v; where groups, the
    star forest and columns are set up. */
 PetscErrorCode SbContactSurfaceRoom(SbContactSurface mesh, PetscInt nvertex, PetscInt nentry,
                                     PetscInt ntriangle, PetscInt nedge);
