@@ -15,11 +15,12 @@ typedef struct {
   SbDistance at;
 } Active;
 
-/* The multiplier of a pair. */
+/* The multipliers of a pair. */
 #define PAIR_KEY 6
 typedef struct {
   PetscInt key[PAIR_KEY]; /* side, kind, numbers of its vertices (SbContactNumber()) */
-  PetscReal force;        /* N */
+  PetscReal force;        /* normal, N */
+  PetscReal tangent[3];   /* friction: that against a slip of the first side, N */
 } PairForce;
 
 /* Multipliers above zero, the same on every rank. */
@@ -36,8 +37,10 @@ typedef struct {
 
 /* A pair with friction in this step. */
 typedef struct {
-  Active on;       /* when its normal force was taken */
-  PetscReal force; /* mu N, N */
+  Active on;            /* when its normal force was taken */
+  PetscReal force;      /* mu N, N */
+  PetscReal stiffness;  /* c of a pair that sticks, N/m */
+  PetscReal tangent[3]; /* t, its multiplier, N; 0: the response has none */
   PetscReal
     rotation[3];     /* displacement of the obstacle's contact point by rotation, beyond that of its
                               vertices, m; with the sign of its weights */
@@ -62,6 +65,7 @@ typedef struct {
 typedef struct {
   PetscReal width, pressure; /* m, Pa; 0: by body */
   PetscReal stiffness;       /* factor on that of springs */
+  PetscReal settled;         /* tolerance of multipliers, over the width; 0: by default */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
   SbContactSearch search;
@@ -240,10 +244,25 @@ static inline PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *fric
     u[i] -= normal * friction->on.at.n[i];
   return PetscSqrtReal(SbDot3(u, u));
 }
-/* f0'/y of the slip y, 1/m. */
-static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
+/* q = t + c u of the slip u, the force of a pair that sticks; its length over Coulomb's limit. */
+static inline PetscReal SbBarrierSticking(const Barrier *b, const FrictionPair *friction,
+                                          PetscReal q[3])
 {
-  return y < b->friction.slip ? 2. / b->friction.slip - y / PetscSqr(b->friction.slip) : 1. / y;
+  (void)SbBarrierSlip(b, friction, q);
+  for (int i = 0; i < 3; i++)
+    q[i] = friction->tangent[i] + friction->stiffness * q[i];
+  return PetscSqrtReal(SbDot3(q, q)) / friction->force;
+}
+/* Whether the rest of its stiffness is in rows. */
+static inline PetscBool SbFrictionSticks(const Barrier *b, const FrictionPair *friction,
+                                         PetscReal p)
+{
+  return (PetscBool)(is_exact(b) && (p < 1. || friction->sticks));
+}
+/* The friction force over q, of its length p over Coulomb's limit. */
+static inline PetscReal SbBarrierFactor(const Barrier *b, PetscReal p)
+{
+  return p >= 1. ? 1. / p : has_multipliers(b) ? 1. : 2. - p;
 }
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
 PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,
@@ -305,10 +324,10 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[]);
 
-/* Multipliers (multipliers.c). Find: of a pair, N; -1: it has none. Update: takes the forces at the
-   current positions, of a solution; `again`: they have changed by more than a tolerance.
-   Collective. */
-PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
+/* Multipliers (multipliers.c). Find: of a pair; NULL: it has none. Update: takes the forces at the
+   current positions, of a solution, for the friction of the next one as well; `again`: they have
+   changed by more than a tolerance. Collective. */
+const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
 PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
 PetscErrorCode SbMultipliersKeep(Multipliers *m);

@@ -40,14 +40,14 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PetscReal multiplier = b->multipliers.n ? SbMultiplierFind(b, pair) : -1.;
-    Active a = {.pair = *pair, .force = PetscMax(0., multiplier)};
+    const PairForce *known = b->multipliers.n ? SbMultiplierFind(b, pair) : NULL;
+    Active a = {.pair = *pair, .force = known ? known->force : 0.};
 
-    if (multiplier < 0. &&
+    if (!known &&
         SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
       continue;
     a.gap = SbContactPairGap(b->surface, pair, b->motion.x, &a.at);
-    if (multiplier < 0. && a.gap >= of_pair(b, b->widths.w, pair))
+    if (!known && a.gap >= of_pair(b, b->widths.w, pair))
       continue;
     PetscCall(
       SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));
@@ -141,14 +141,18 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     if (k < 0)
       t->force = SbBarrierNormalForce(b, a, &t->energy, t->gradient);
     else {
-      PetscReal u[3];
-      const PetscReal y = SbBarrierSlip(b, &b->friction.pairs.pair[k], u);
-      const PetscReal w = b->friction.slip;
-      const PetscReal N = b->friction.pairs.pair[k].force;
+      const FrictionPair *friction = &b->friction.pairs.pair[k];
+      const PetscReal most = PetscSqr(friction->force) / friction->stiffness;
+      PetscReal q[3];
+      const PetscReal p = SbBarrierSticking(b, friction, q);
 
       for (int c = 0; c < 12; c++)
-        t->gradient[c] = N * SbBarrierSlope(b, y) * t->weight[c / 3] * u[c % 3];
-      t->energy = N * (y < w ? y * y / w - y * y * y / (3. * w * w) + w / 3. : y);
+        t->gradient[c] = SbBarrierFactor(b, p) * t->weight[c / 3] * q[c % 3];
+      if (has_multipliers(b))
+        t->energy = most * (p < 1. ? 0.5 * p * p : p - 0.5) -
+                    0.5 * SbDot3(friction->tangent, friction->tangent) / friction->stiffness;
+      else
+        t->energy = most * (p < 1. ? p * p - p * p * p / 3. + 1. / 3. : p);
     }
   } else {
     const Spring *spring = &b->springs.spring[k - b->friction.pairs.n];
@@ -278,37 +282,35 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
     PetscCall(add_blocks(b, a->pair.side ? 1 : 4, a->pair.v, NULL, H));
   }
 
-  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from
-     above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is
-     treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full
-     step leaves it beyond e, it slides. */
+  /* friction a q, its derivative by the slip c (a (I - n n - q q/q^2) + (a p)' q q/q^2); a bound
+     from above has a instead of (a p)'. A sliding pair whose slip reversed in the last trial step
+     is treated as sticking, with the force q. If a full step leaves it beyond mu N, it slides. */
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     FrictionPair *friction = &b->friction.pairs.pair[i];
-    PetscReal T[9];
-    const PetscReal y = SbBarrierSlip(b, friction, friction->slip);
-    const PetscReal w = b->friction.slip;
-    PetscReal slope = SbBarrierSlope(b, y);
-    PetscReal curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
+    PetscReal T[9], q[3];
+    const PetscReal p = SbBarrierSticking(b, friction, q);
+    PetscReal factor = SbBarrierFactor(b, p);
+    PetscReal curve = p >= 1. ? 0. : has_multipliers(b) ? 1. : 2. - 2. * p;
 
+    (void)SbBarrierSlip(b, friction, friction->slip);
     friction->sticks =
-      (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
+      (PetscBool)(p > 1. && kind != SB_HESSIAN_MAJORIZED &&
                   (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
     friction->turns = PETSC_FALSE;
     if (friction->sticks) {
       PetscReal force[12];
 
       for (int k = 0; k < 12; k++)
-        force[k] = friction->force * (1. / w - slope) * friction->on.at.weight[k / 3] *
-                   friction->slip[k % 3];
+        force[k] = (1. - factor) * friction->on.at.weight[k / 3] * q[k % 3];
       spread(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v, 1., force, r);
-      slope = curve = 1. / w;
+      factor = curve = 1.;
     } else if (kind == SB_HESSIAN_MAJORIZED)
-      curve = slope;
+      curve = factor;
     for (int k = 0; k < 9; k++) {
-      T[k] = slope * ((k % 4 ? 0. : 1.) - friction->on.at.n[k / 3] * friction->on.at.n[k % 3]);
-      if (y > 0.)
-        T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
-      T[k] *= friction->force;
+      T[k] = factor * ((k % 4 ? 0. : 1.) - friction->on.at.n[k / 3] * friction->on.at.n[k % 3]);
+      if (p > 0.)
+        T[k] += (curve - factor) * q[k / 3] * q[k % 3] / PetscSqr(p * friction->force);
+      T[k] *= friction->stiffness / (SbFrictionSticks(b, friction, p) ? STIFFER : 1.);
     }
     PetscCall(add_blocks(b, friction->on.pair.side ? 1 : 4, friction->on.pair.v,
                          friction->on.at.weight, T));

@@ -1,5 +1,6 @@
 /*
-  friction_pairs.c - lagged friction of pairs, whose energy is described in response_barrier.c.
+  friction_pairs.c - lagged friction of pairs: of the barrier and of penalty springs by the smooth
+  energy of response_barrier.c, of responses with multipliers by exact ones (multipliers.c).
 
   Normal forces and slip directions of friction are those of an earlier state y: the start of the
   step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is
@@ -17,6 +18,22 @@
 #define MUCH \
   0.5 /* lag over mu N above which a time step is solved once more, as where contact begins */
 #define PARTINGS 20 /* solves of a load step that separate overlaps */
+
+/* Its multiplier, turned to the tangent plane of now and within Coulomb's limit. */
+static void find_tangent(const Barrier *b, FrictionPair *friction)
+{
+  const PairForce *known = SbMultiplierFind(b, &friction->on.pair);
+  const PetscReal *n = friction->on.at.n;
+  PetscReal length;
+
+  if (!known)
+    return;
+  for (int i = 0; i < 3; i++)
+    friction->tangent[i] = known->tangent[i] - SbDot3(known->tangent, n) * n[i];
+  length = PetscSqrtReal(SbDot3(friction->tangent, friction->tangent));
+  for (int i = 0; i < 3 && length > friction->force; i++)
+    friction->tangent[i] *= friction->force / length;
+}
 
 /* Displacement in the step of the obstacle's contact point by rotation, beyond that of its
    vertices. */
@@ -59,9 +76,16 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
   for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->active.n; i++) {
     PetscReal energy, gradient[12];
     FrictionPair friction = {.on = b->active.pair[i]};
+    const SbPairLaw law = SbPairLawOf(b, &friction.on);
 
     friction.force =
       b->contact.friction.mu * SbBarrierNormalForce(b, &friction.on, &energy, gradient);
+    if (friction.force <= 0.)
+      continue;
+    friction.stiffness = has_multipliers(b) ? law.stiffness * friction.on.pair.area
+                                            : friction.force / b->friction.slip;
+    if (has_multipliers(b))
+      find_tangent(b, &friction);
     if (b->contact.partner.obstacle)
       find_rotation(b, end, &friction);
     PetscCall(SbReserve(b->friction.next.n + 1, sizeof(*b->friction.next.pair),
@@ -161,6 +185,8 @@ PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, con
     b->separation.parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (solved && has_multipliers(b))
+    PetscFunctionReturn(PETSC_SUCCESS); /* settled with them */
   PetscCall(needs_more(e, b, last, solved, &more));
   if (!more)
     PetscFunctionReturn(PETSC_SUCCESS);

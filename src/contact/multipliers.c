@@ -9,6 +9,10 @@
   Hueeber and Wohlmuth, A primal-dual active set strategy for non-linear multibody contact problems,
   CMAME 194, 2005). It takes what redundant constraints, as of surfaces that lie flat on each
   other, leave open.
+
+  Friction likewise: q = t + c u of the slip u since the start of the step, with the multiplier t,
+  is the force of a pair that sticks, and what exceeds mu N of it slips (Simo and Laursen). At the
+  end t stays, so that u = 0 where a pair sticks. N and directions are those of the solution before.
 */
 #include "barrier.h"
 
@@ -41,7 +45,7 @@ static int by_pair(const void *p, const void *q)
   return compare(((const PairForce *)p)->key, ((const PairForce *)q)->key);
 }
 
-PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
+const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
 {
   const Multipliers *m = &b->multipliers;
   PetscInt key[PAIR_KEY];
@@ -54,13 +58,13 @@ PetscReal SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
     const int order = compare(key, m->pair[middle].key);
 
     if (!order)
-      return m->pair[middle].force;
+      return &m->pair[middle];
     if (order < 0)
       high = middle;
     else
       low = middle + 1;
   }
-  return -1.;
+  return NULL;
 }
 
 /* The table of all ranks from entries that each rank counts. Collective. */
@@ -88,12 +92,16 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
   const MPI_Comm comm = b->surface->space->comm;
   Multipliers *m = &b->multipliers;
   const PetscReal exact = b->contact.base.effect->dynamic ? EXACT_STEPS : EXACT;
+  const PetscReal usual = is_exact(b) ? exact : SETTLED;
+  const PetscReal tolerance = b->options.settled > 0. ? b->options.settled : usual;
   PetscReal worst = 0.;
   PairForce *mine;
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(b->active.n, &mine));
+
+  /* normal forces */
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
     const SbPairLaw law = SbPairLawOf(b, a);
@@ -108,8 +116,30 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
     worst = PetscMax(worst, wrong);
     if (d[1] >= 0.)
       continue;
-    find_key(b, &a->pair, mine[n].key);
-    mine[n++].force = -d[1];
+    mine[n] = (PairForce){.force = -d[1]};
+    find_key(b, &a->pair, mine[n++].key);
+  }
+  qsort(mine, (size_t)n, sizeof(*mine), by_pair);
+
+  /* friction */
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    const FrictionPair *friction = &b->friction.pairs.pair[i];
+    const PetscReal scale = friction->stiffness * of_pair(b, b->widths.w, &friction->on.pair);
+    PetscReal q[3];
+    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, friction, q));
+    PairForce at, *with;
+
+    if (!counts(b, &friction->on.pair))
+      continue;
+    find_key(b, &friction->on.pair, at.key);
+    with = n ? (PairForce *)bsearch(&at, mine, (size_t)n, sizeof(*mine), by_pair) : NULL;
+    for (int k = 0; k < 3; k++) {
+      q[k] *= factor;
+      if (with)
+        with->tangent[k] = q[k];
+      q[k] -= friction->tangent[k];
+    }
+    worst = PetscMax(worst, PetscSqrtReal(SbDot3(q, q)) / scale);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, comm));
   PetscCall(
@@ -120,9 +150,11 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
     m->stuck = 0;
   } else
     m->stuck++;
-  if (worst > (is_exact(b) ? exact : SETTLED) && m->stuck < STUCK && m->updates < UPDATES) {
+  if (worst > tolerance && m->stuck < STUCK && m->updates < UPDATES) {
     m->updates++;
     PetscCall(share(b, n, mine));
+    PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
+    SbBarrierSwapFriction(b);
     *again = PETSC_TRUE;
   } else if (worst > LOOSE && !m->said) {
     m->said = PETSC_TRUE;

@@ -89,6 +89,10 @@ static const SbOption rows[] = {
    "height of the "
    "tet behind the surface; between bodies and in self-contact area / mean edge, where projected "
    "and multiplier take 10 times as much"},
+  {"multiplier_tolerance", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
+   "augmented, projected and multiplier between bodies: tolerance of gaps and of slips of what "
+   "sticks, over the barrier's width; 0: projected and multiplier 1e-10 in static runs and 1e-5 in "
+   "time steps, augmented 1e-3"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -114,8 +118,8 @@ static const char *const names_of_responses[] = {"auto",      "projected", "mult
                                                  "augmented", "penalty",   "barrier"};
 /* Options for which `auto` takes another response than `barrier`; those from NODES_ONLY on are for
    nodes against obstacles only. */
-static const char *const exact_only[] = {"restitution", "stiffness", "time_of_impact", "damping",
-                                         "friction_kinetic"};
+static const char *const barrier_lacks[] = {"restitution", "stiffness", "time_of_impact", "damping",
+                                            "friction_kinetic"};
 #define NODES_ONLY 2
 
 /* What contact effects ask for, one or several of them. */
@@ -149,10 +153,10 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
   }
   if (strncmp(text, "plane", 5) && strncmp(text, "bowl", 4))
     wishes->facets = PETSC_TRUE;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(barrier_lacks); k++) {
     PetscBool given;
 
-    PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
+    PetscCall(SbOptionGiven(&scope, barrier_lacks[k], &given));
     wishes->lacks = (PetscBool)(wishes->lacks || given);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,18 +239,24 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 
   /* the obstacle and its path; surfaces have none of the options of nodes */
   PetscCall(SbPartnerRead(e, scope, &c->partner));
-  for (size_t k = NODES_ONLY; surfaces && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
-    PetscCall(SbOptionGiven(scope, exact_only[k], &given));
+  for (size_t k = NODES_ONLY; surfaces && k < PETSC_STATIC_ARRAY_LENGTH(barrier_lacks); k++) {
+    PetscCall(SbOptionGiven(scope, barrier_lacks[k], &given));
     PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
                "-effect_%s_%s is for nodes against obstacles in scenes without contact between "
                "bodies, and not with barrier: leave it out",
-               e->name, exact_only[k]);
+               e->name, barrier_lacks[k]);
   }
   PetscCall(SbOptionGiven(scope, "stiffness", &given));
   PetscCheck(!given || c->response != BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_stiffness is of springs, which barrier has not: use "
              "-effect_%s_barrier_pressure, or another -effect_%s_response",
              e->name, e->name, e->name);
+  PetscCall(SbOptionGiven(scope, "multiplier_tolerance", &given));
+  PetscCheck(!given || (surfaces && c->response != BARRIER && c->response != PENALTY),
+             PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_multiplier_tolerance is of augmented, projected and multiplier in scenes "
+             "with contact between bodies: leave it out",
+             e->name);
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));

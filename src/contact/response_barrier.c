@@ -448,20 +448,20 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   }
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     const FrictionPair *pair = &b->friction.pairs.pair[i];
-    PetscReal u[3];
-    const PetscReal slip = SbBarrierSlip(b, pair, u);
-    const PetscReal force = pair->force * SbBarrierSlope(b, slip);
+    PetscReal u[3], q[3];
+    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, pair, q));
 
     if (!counts(b, &pair->on.pair))
       continue;
-    b->friction.loss += force * PetscSqr(slip);
+    (void)SbBarrierSlip(b, pair, u);
+    b->friction.loss += factor * SbDot3(q, u);
     for (int k = 0; k < 12; k++) {
       const PetscInt v = pair->on.pair.v[k / 3];
       const PetscInt c = 3 * v + k % 3;
 
       if (v < m->nbody_vertex)
         b->contact.base.work -=
-          force * u[k % 3] * pair->on.at.weight[k / 3] * (b->motion.x[c] - b->motion.start[c]);
+          factor * q[k % 3] * pair->on.at.weight[k / 3] * (b->motion.x[c] - b->motion.start[c]);
     }
   }
   for (PetscInt i = 0; i < b->springs.n; i++) {
@@ -526,6 +526,8 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
     for (int i = 0; i < PAIR_KEY; i++)
       record[i] = m->pair[k - 1].key[i];
     record[PAIR_KEY] = m->pair[k - 1].force;
+    for (int i = 0; i < 3; i++)
+      record[PAIR_KEY + 1 + i] = m->pair[k - 1].tangent[i];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -552,7 +554,10 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
     }
     for (int i = 0; i < PAIR_KEY; i++)
       m->pair[m->n].key[i] = (PetscInt)record[i];
-    m->pair[m->n++].force = record[PAIR_KEY];
+    m->pair[m->n].force = record[PAIR_KEY];
+    for (int i = 0; i < 3; i++)
+      m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
+    m->n++;
   }
   PetscCall(SbMultipliersKeep(m));
   b->sums.work = s->rank ? 0. : sum[0];
@@ -675,12 +680,13 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->options.friction_tolerance));
   e->ops = barrier_effect;
   PetscCall(SbOptionReal(scope, "stiffness", &b->options.stiffness));
+  PetscCall(SbOptionReal(scope, "multiplier_tolerance", &b->options.settled));
   b->contact.base.ops = is_barrier(b) ? &barrier_ops : &spring_ops;
   b->contact.base.exact = is_exact(b);
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->nstate = has_multipliers(b) ? PAIR_KEY + 1 : SUMS;
+  e->nstate = has_multipliers(b) ? PAIR_KEY + 4 : SUMS;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

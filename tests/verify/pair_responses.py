@@ -5,7 +5,6 @@ stress is uniform, exactly so for multiplier and projected. A cube flies into an
 through anything, and no pair pulls. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
-# cpu 80
 import csv
 import re
 import shutil

@@ -1,0 +1,102 @@
+"""Friction between bodies where constraints have multipliers: what sticks does not creep, what slides has Coulomb's acceleration.
+
+A block on a slope of 30 degrees, tan 0.577, in time and static: it rests with a coefficient of 0.7 and slides with 0.5. The barrier's smoothed
+friction creeps by 1e-4 m/s there. The same on 1, 2 and 3 ranks to 1e-8 of its path, and after restarts while it sticks and slides.
+"""
+import csv
+import subprocess
+import sys
+
+import numpy
+
+from output_common import MPI, OUT, SUPPLE
+
+BLOCKS = ("-bodies a,b -body_a_mesh box:0.4,0.2,0.05:6,3,1 -body_b_mesh box:0.1,0.1,0.05:3,3,2 -body_b_translate 0.05,0.05,0.05015 "
+          + "".join(f"-body_{k}_material neohookean -body_{k}_young 1e6 -body_{k}_poisson 0.3 -body_{k}_density 1000 " for k in "ab")
+          + "-effects g,hold,meet -effect_g_type gravity -effect_g_vector 4.905,0,-8.4957 -effect_hold_type fixed -effect_hold_on a.zmin "
+          "-effect_meet_type contact -effect_meet_verify yes -output_fields none -probes p -probe_p_on b -quiet -reproducible ")
+STEPS = "-time euler_implicit -ts_dt 0.005 "
+TIGHT = "-snes_rtol 1e-10 -snes_stol 0 -ksp_rtol 1e-10 -effect_meet_multiplier_tolerance 1e-9 "
+G = (4.905, 8.4957)  # along the slope and into it, m/s^2
+
+
+def run(name, response, friction, more, ranks=1, code=0):
+    command = [*MPI, str(ranks), SUPPLE, *(BLOCKS + more).split(), "-effect_meet_response", response,
+               "-effect_meet_friction", str(friction), "-output_dir", str(OUT / name)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode != code:
+        sys.exit(f"{name}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
+    with open(OUT / name / "history.csv", newline="") as f:
+        names, _, *rows = csv.reader(f)
+    found = {key: numpy.array([float(row[k]) for row in rows]) for k, key in enumerate(names)}
+    return found, result.stdout + result.stderr
+
+
+def speed(found, steps=20):
+    return (found["p_ux"][-1] - found["p_ux"][-1 - steps]) / (found["time"][-1] - found["time"][-1 - steps])
+
+
+def check(good, text):
+    if not good:
+        sys.exit(text)
+
+
+def check_time():
+    for response, creep in ("projected", 1e-7), ("multiplier", 5e-7), ("augmented", 5e-6):
+        found, _ = run(f"stick-{response}", response, 0.7, STEPS + "-ts_max_time 0.5")
+        v = speed(found)
+        print(f"  stick-{response}: {v:.1e} m/s, {sum(found['newton']):.0f} Newton iterations")
+        check(abs(v) < creep, f"stick-{response}: it creeps by {v:.3g} m/s")
+
+        found, _ = run(f"slide-{response}", response, 0.5, STEPS + "-ts_max_time 0.3")
+        # over 20 steps, by the backward differences of implicit Euler
+        exact = (G[0] - 0.5 * G[1]) * (found["time"][-1] - 0.0475)
+        v = speed(found)
+        print(f"  slide-{response}: {v:.5f} m/s, of a rigid block {exact:.5f}")
+        check(abs(v / exact - 1) < 0.02, f"slide-{response}: speed {v:.5f} m/s, not {exact:.5f}")
+        ratio = found["meet_friction_force"][-1] / found["meet_normal_force"][-1]
+        check(abs(ratio / 0.5 - 1) < 1e-3, f"slide-{response}: friction is {ratio:.5f} of the normal force, not 0.5")
+        check((numpy.diff(found["meet_friction_loss"]) >= 0).all(), f"slide-{response}: friction gives energy back")
+
+
+def check_static():
+    """Held by friction alone: the force into and along the slope is the weight; beyond Coulomb's limit nothing holds."""
+    for response in "projected", "multiplier", "augmented":
+        found, _ = run(f"static-{response}", response, 0.7, "-time static")
+        for axis, g in (("x", G[0]), ("z", -G[1])):
+            reaction = found[f"hold_reaction_{axis}"][-1]
+            weight = 1000 * (0.4 * 0.2 * 0.05 + 0.1 * 0.1 * 0.05) * g
+            check(abs(abs(reaction / weight) - 1) < 1e-6, f"static-{response}: reaction {reaction} N for {weight} N")
+    _, text = run("static-slides", "projected", 0.5, "-time static", code=1)
+    check("body b against moving along" in text, f"static-slides: not said what slides\n{text}")
+
+
+def compare(name, one, other, tolerance):
+    for column in "p_ux", "p_uz", "meet_normal_force", "meet_friction_loss":
+        size = max(abs(one[column]).max(), 1e-7)
+        off = abs(one[column] - other[column][-len(one[column]):]).max() / size
+        check(off < tolerance, f"{name}: {column} differs by {off:.3g} of its size")
+
+
+def check_ranks():
+    for friction in 0.7, 0.5:
+        options = STEPS + TIGHT + "-ts_max_time 0.1"
+        one, _ = run(f"ranks-{friction}-1", "projected", friction, options)
+        for ranks in 2, 3:
+            other, _ = run(f"ranks-{friction}-{ranks}", "projected", friction, options, ranks)
+            compare(f"ranks-{friction}-{ranks}", one, other, 1e-6 if friction > 0.6 else 1e-7)
+
+
+def check_restart():
+    for friction in 0.7, 0.5:
+        options = STEPS + TIGHT + "-checkpoint_every_steps 10 -ts_max_time "
+        whole, _ = run(f"whole-{friction}", "projected", friction, options + "0.1")
+        run(f"half-{friction}", "projected", friction, options + "0.05")
+        half, _ = run(f"half-{friction}", "projected", friction, options + "0.1 -restart latest", 2)
+        compare(f"restart-{friction}", whole, half, 1e-6 if friction > 0.6 else 1e-7)
+
+
+check_time()
+check_static()
+check_ranks()
+check_restart()
