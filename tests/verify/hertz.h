@@ -58,7 +58,7 @@ static inline void bend(const VerifyPlace *place, PetscReal x[3])
   x[2] = b->side * (depth + (1 - depth / SIZE) * cap);
 }
 
-/* Two bodies. The barrier width is d / 100. */
+/* Two bodies. The barrier width is d / 100; the gap of other responses, which is taken from d. */
 typedef struct {
   const char *name;
   PetscReal young[2];  /* below, above, Pa */
@@ -70,6 +70,7 @@ typedef struct {
   PetscReal a;      /* contact radius, m */
   PetscReal honest; /* tolerance of the force in the history, relative to the acting force */
   const char *element;
+  const char *response; /* between the bodies; NULL: barrier */
 } Case;
 
 static inline PetscErrorCode write_meshes(const Pair *p, PetscInt cells, char path[2][512])
@@ -113,7 +114,8 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
 
   PetscFunctionBeginUser;
   PetscCall(boussinesq(P, p->young[0], -1, 0, sizeof(far[0]), far[0]));
-  PetscCall(boussinesq(P, p->young[1], 1, -d, sizeof(far[1]), far[1]));
+  PetscCall(
+    boussinesq(P, p->young[1], 1, (c->response ? 0.01 * d : 0.) - d, sizeof(far[1]), far[1]));
   PetscCall(test_open(
     t,
     "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_a_element %s -body_b_element %s "
@@ -132,9 +134,9 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "bx,by,bz "
     "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet "
     "-effect_meet_barrier_width "
-    "%.9g ",
+    "%.9g -effect_meet_response %s ",
     path[0], path[1], c->element, c->element, p->young[0], p->young[1], POISSON, POISSON, 3 * d,
-    far[0], far[1], 0.01 * d));
+    far[0], far[1], 0.01 * d, c->response ? c->response : "barrier"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -324,7 +324,16 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_bounds(void)
+/* A block below the beam, all of which is fixed; the surface of `response` keeps the gap of 1
+   mm. */
+#define TABLE                                                                                   \
+  "-bodies a,table -body_table_mesh box:1.4,0.6,0.1:3,2,1 -body_table_translate "               \
+  "-0.213,-0.187,-0.121 -body_table_material linear -body_table_young 2e6 -body_table_poisson 0.3 " \
+  "-body_table_density "                                                                        \
+  "100 -effect_hold_type fixed -effect_hold_on table "
+
+/* response: of pairs, NULL: of nodes against a half-space. */
+static PetscErrorCode check_bounds(const char *response)
 {
   const PetscReal floor = -0.02;
   TestScene t, free;
@@ -333,15 +342,23 @@ static PetscErrorCode check_bounds(void)
   Vec U;
 
   PetscFunctionBeginUser;
-  verify_case("bounds");
-  PetscCall(
-    test_open(&t,
-              BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
-                   "projected -effect_floor_obstacle plane:0,0,1,%g",
-              floor));
+  verify_case(response ? response : "bounds");
+  if (response)
+    PetscCall(test_open(&t,
+                        BEAM TABLE "-effects gravity,clamp,hold,floor -effect_floor_type contact "
+                                   "-effect_floor_response %s -effect_floor_barrier_width 1e-3",
+                        response));
+  else
+    PetscCall(test_open(
+      &t,
+      BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
+           "projected -effect_floor_obstacle plane:0,0,1,%g",
+      floor));
   PetscCall(record_solve(&t, &r));
-  PetscCall(test_open(
-    &free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
+
+  /* scalar storage, which SNESVI needs */
+  PetscCall(test_open(&free, BEAM "%s -solver sor",
+                      response ? TABLE "-effects gravity,clamp,hold" : "-effects gravity,clamp"));
   free.model->load = 1;
   PetscCall(VecDuplicate(free.run->state.U, &U));
   PetscCall(solve_bounded(free.model, free.run->solve.J, floor, U));
@@ -435,7 +452,9 @@ int main(int argc, char **argv)
   PetscCall(check_incline("p1", "projected", 0.49));
   PetscCall(check_held("projected"));
   PetscCall(check_corner("projected"));
-  PetscCall(check_bounds());
+  PetscCall(check_bounds(NULL));
+  PetscCall(check_bounds("projected"));
+  PetscCall(check_bounds("multiplier"));
   PetscCall(check_hertz("p1", 8, 0.3));
   PetscCall(check_hertz("p2", 6, 0.02));
   PetscCall(check_incline("p2", "projected", 0.49));

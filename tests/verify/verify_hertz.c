@@ -14,7 +14,7 @@ static PetscErrorCode check_meshes(const Pair *p)
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++) {
-    const Case c = {cells[i], 0.12, 5e-3, "p1"};
+    const Case c = {cells[i], 0.12, 5e-3, "p1", NULL};
 
     PetscCall(hertz(p, &c, &force[i]));
   }
@@ -27,12 +27,27 @@ static PetscErrorCode check_meshes(const Pair *p)
 
 static PetscErrorCode check_case(const Pair *p, PetscReal a)
 {
-  const Case c = {CELLS, a, 5e-3, "p1"};
+  const Case c = {CELLS, a, 5e-3, "p1", NULL};
   PetscReal force;
 
   PetscFunctionBeginUser;
   PetscCall(hertz(p, &c, &force));
   SB_CHECK_NEAR(force, 1, 0.04, "force against that of Hertz");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Exact gaps and forces, and those of springs with multipliers, on a coarser mesh. */
+static PetscErrorCode check_response(const Pair *p, const char *response)
+{
+  const Case c = {CELLS / 2, 0.12, 5e-3, "p1", response};
+  const Case barrier = {CELLS / 2, 0.12, 5e-3, "p1", NULL};
+  PetscReal force, known;
+
+  PetscFunctionBeginUser;
+  PetscCall(hertz(p, &barrier, &known));
+  PetscCall(hertz(p, &c, &force));
+  SB_CHECK_NEAR(force, 1, 0.08, "force against that of Hertz");
+  SB_CHECK_NEAR(force, known, 0.02 * known, "force against that of the barrier");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -47,5 +62,8 @@ int main(int argc, char **argv)
   PetscCall(check_case(&sphere, 0.1));
   PetscCall(check_meshes(&spheres));
   PetscCall(check_case(&spheres, 0.1));
+  PetscCall(check_response(&sphere, "augmented"));
+  PetscCall(check_response(&sphere, "projected"));
+  PetscCall(check_response(&spheres, "multiplier"));
   SB_TEST_END();
 }

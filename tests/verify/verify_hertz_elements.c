@@ -11,7 +11,7 @@
 static PetscErrorCode check_element(const Pair *p, const char *element, PetscInt cells,
                                     PetscReal tolerance)
 {
-  const Case c = {cells, 0.12, 5e-3, element};
+  const Case c = {cells, 0.12, 5e-3, element, NULL};
   PetscReal force;
 
   PetscFunctionBeginUser;

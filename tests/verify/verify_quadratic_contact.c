@@ -114,7 +114,7 @@ int main(int argc, char **argv)
   VERIFY_NEAR(force[0] / force[1], 0.97, 0.02, "force of p2, of that of P1");
   PetscCall(patch());
   for (int i = 0; i < 2 && test_size == 1; i++) {
-    const Case c = {i ? 8 : 5, 0.12, 0.1, "p2"};
+    const Case c = {i ? 8 : 5, 0.12, 0.1, "p2", NULL};
 
     PetscCall(hertz(&pairs[i], &c, &force[0]));
     SB_CHECK_NEAR(force[0], 1, 0.02, "force against that of Hertz");
