@@ -27,8 +27,10 @@ typedef struct {
 typedef struct {
   PetscInt n, size;
   PairForce *pair; /* [n] in the order of pairs */
-  PetscInt nkept, kept_size;
-  PairForce *kept;  /* [nkept] those of the last accepted step, with which an attempt begins */
+} PairForces;
+typedef struct {
+  PairForces now;   /* of the next solve */
+  PairForces kept;  /* forces of the last accepted step, with which an attempt begins */
   PetscInt updates; /* in this step */
   PetscReal least;  /* smallest error of gaps of its solutions, over the width */
   PetscInt stuck;   /* updates since */
@@ -65,6 +67,7 @@ typedef struct {
 typedef struct {
   PetscReal width, pressure; /* m, Pa; 0: by body */
   PetscReal stiffness;       /* factor on that of springs */
+  PetscBool sticks;          /* friction has multipliers, so that pairs stick */
   PetscReal settled;         /* tolerance of multipliers, over the width; 0: by default */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
@@ -89,6 +92,7 @@ typedef struct {
 typedef struct {
   PetscReal *w, *k, *mass; /* width, m; stiffness (SbPairLaw), Pa or Pa/m; mass, kg */
   PetscReal *guard;        /* pressure of a barrier, Pa */
+  PetscReal *spring;       /* stiffness of springs, Pa/m */
   PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
@@ -193,6 +197,12 @@ static inline PetscBool has_multipliers(const Barrier *b)
   return (PetscBool)(is_exact(b) || b->contact.response == AUGMENTED);
 }
 
+/* Whether there is a table of multipliers: of forces, of friction, or of both. */
+static inline PetscBool has_table(const Barrier *b)
+{
+  return (PetscBool)(has_multipliers(b) || b->options.sticks);
+}
+
 /* How a pair resists. */
 #define STIFFER 10. /* springs of exact constraints, over those of `augmented` */
 static inline SbPairLaw SbPairLawOf(const Barrier *b, const Active *a)
@@ -253,16 +263,20 @@ static inline PetscReal SbBarrierSticking(const Barrier *b, const FrictionPair *
     q[i] = friction->tangent[i] + friction->stiffness * q[i];
   return PetscSqrtReal(SbDot3(q, q)) / friction->force;
 }
+/* A pair slides beyond this part of Coulomb's limit: below 1, as one that slid in the last step is
+   at the limit but for rounding. */
+#define SLIDES (1. - 1e-6)
+
 /* Whether the rest of its stiffness is in rows. */
 static inline PetscBool SbFrictionSticks(const Barrier *b, const FrictionPair *friction,
                                          PetscReal p)
 {
-  return (PetscBool)(is_exact(b) && (p < 1. || friction->sticks));
+  return (PetscBool)(is_exact(b) && b->options.sticks && (p < SLIDES || friction->sticks));
 }
 /* The friction force over q, of its length p over Coulomb's limit. */
 static inline PetscReal SbBarrierFactor(const Barrier *b, PetscReal p)
 {
-  return p >= 1. ? 1. / p : has_multipliers(b) ? 1. : 2. - p;
+  return p >= 1. ? 1. / p : b->options.sticks ? 1. : 2. - p;
 }
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
 PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,
@@ -330,7 +344,7 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
 const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
 PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
-PetscErrorCode SbMultipliersKeep(Multipliers *m);
+PetscErrorCode SbMultipliersKeep(Barrier *b);
 PetscErrorCode SbMultipliersRestore(Barrier *b);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],

@@ -40,7 +40,8 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PairForce *known = b->multipliers.n ? SbMultiplierFind(b, pair) : NULL;
+    const PairForce *known =
+      has_multipliers(b) && b->multipliers.now.n ? SbMultiplierFind(b, pair) : NULL;
     Active a = {.pair = *pair, .force = known ? known->force : 0.};
 
     if (!known &&
@@ -148,7 +149,7 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
 
       for (int c = 0; c < 12; c++)
         t->gradient[c] = SbBarrierFactor(b, p) * t->weight[c / 3] * q[c % 3];
-      if (has_multipliers(b))
+      if (b->options.sticks)
         t->energy = most * (p < 1. ? 0.5 * p * p : p - 0.5) -
                     0.5 * SbDot3(friction->tangent, friction->tangent) / friction->stiffness;
       else
@@ -290,11 +291,12 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
     PetscReal T[9], q[3];
     const PetscReal p = SbBarrierSticking(b, friction, q);
     PetscReal factor = SbBarrierFactor(b, p);
-    PetscReal curve = p >= 1. ? 0. : has_multipliers(b) ? 1. : 2. - 2. * p;
+    const PetscBool slides = (PetscBool)(p >= (b->options.sticks ? SLIDES : 1.));
+    PetscReal curve = slides ? 0. : b->options.sticks ? 1. : 2. - 2. * p;
 
     (void)SbBarrierSlip(b, friction, friction->slip);
     friction->sticks =
-      (PetscBool)(p > 1. && kind != SB_HESSIAN_MAJORIZED &&
+      (PetscBool)(slides && kind != SB_HESSIAN_MAJORIZED &&
                   (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
     friction->turns = PETSC_FALSE;
     if (friction->sticks) {

@@ -76,16 +76,17 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
   for (PetscInt i = 0; b->contact.friction.mu > 0. && i < b->active.n; i++) {
     PetscReal energy, gradient[12];
     FrictionPair friction = {.on = b->active.pair[i]};
-    const SbPairLaw law = SbPairLawOf(b, &friction.on);
 
     friction.force =
       b->contact.friction.mu * SbBarrierNormalForce(b, &friction.on, &energy, gradient);
     if (friction.force <= 0.)
       continue;
-    friction.stiffness = has_multipliers(b) ? law.stiffness * friction.on.pair.area
-                                            : friction.force / b->friction.slip;
-    if (has_multipliers(b))
+    friction.stiffness = friction.force / b->friction.slip;
+    if (b->options.sticks) {
+      friction.stiffness = (is_exact(b) ? STIFFER : 1.) *
+                           of_pair(b, b->widths.spring, &friction.on.pair) * friction.on.pair.area;
       find_tangent(b, &friction);
+    }
     if (b->contact.partner.obstacle)
       find_rotation(b, end, &friction);
     PetscCall(SbReserve(b->friction.next.n + 1, sizeof(*b->friction.next.pair),

@@ -47,7 +47,7 @@ static int by_pair(const void *p, const void *q)
 
 const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
 {
-  const Multipliers *m = &b->multipliers;
+  const PairForces *m = &b->multipliers.now;
   PetscInt key[PAIR_KEY];
   PetscInt low = 0;
   PetscInt high = m->n;
@@ -67,23 +67,122 @@ const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
   return NULL;
 }
 
-/* The table of all ranks from entries that each rank counts. Collective. */
-static PetscErrorCode share(Barrier *b, PetscInt n, const PairForce mine[])
+/* What multipliers are wrong by, over the width, and where. */
+typedef struct {
+  PetscReal by;
+  PetscInt body[2];
+  PetscReal x[3];
+} Wrong;
+
+static void find_worse(const Barrier *b, const SbContactPair *pair, PetscReal by, Wrong *worst)
 {
-  Multipliers *m = &b->multipliers;
+  if (by <= worst->by)
+    return;
+  worst->by = by;
+  worst->body[0] = b->surface->part[pair->v[0]];
+  worst->body[1] = b->surface->part[pair->v[SbContactPairSplit(pair)]];
+  for (int k = 0; k < 3; k++)
+    worst->x[k] = b->motion.x[3 * pair->v[0] + k];
+}
+
+/* mine[n], in order: the forces of a solution, of pairs that this rank counts; the caller frees. */
+static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **mine, Wrong *worst)
+{
+  PairForce *list;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(b->active.n, mine));
+  list = *mine;
+  *n = 0;
+  *worst = (Wrong){.by = 0.};
+
+  /* normal forces */
+  for (PetscInt i = 0; i < b->active.n; i++) {
+    const Active *a = &b->active.pair[i];
+    const SbPairLaw law = SbPairLawOf(b, a);
+    PetscReal d[3];
+
+    if (!counts(b, &a->pair))
+      continue;
+    SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
+    if (d[1] == 0. && a->force == 0.)
+      continue;
+    if (has_multipliers(b))
+      find_worse(b, &a->pair,
+                 PetscAbsReal(d[1] + a->force) / (law.stiffness * a->pair.area * law.width), worst);
+    if (d[1] >= 0.)
+      continue;
+    list[*n] = (PairForce){.force = -d[1]};
+    find_key(b, &a->pair, list[(*n)++].key);
+  }
+  if (*n)
+    qsort(list, (size_t)*n, sizeof(*list), by_pair);
+
+  /* friction */
+  for (PetscInt i = 0; i < b->friction.pairs.n && b->options.sticks; i++) {
+    const FrictionPair *friction = &b->friction.pairs.pair[i];
+    const PetscReal scale = friction->stiffness * of_pair(b, b->widths.w, &friction->on.pair);
+    PetscReal q[3];
+    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, friction, q));
+    PairForce at, *with;
+
+    if (!counts(b, &friction->on.pair))
+      continue;
+    find_key(b, &friction->on.pair, at.key);
+    with = *n ? (PairForce *)bsearch(&at, list, (size_t)*n, sizeof(*list), by_pair) : NULL;
+    for (int k = 0; k < 3; k++) {
+      q[k] *= factor;
+      if (with)
+        with->tangent[k] = q[k];
+      q[k] -= friction->tangent[k];
+    }
+    find_worse(b, &friction->on.pair, PetscSqrtReal(SbDot3(q, q)) / scale, worst);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The table of all ranks from entries that each rank counts. Collective. */
+static PetscErrorCode share(const Barrier *b, PetscInt n, const PairForce mine[], PairForces *table)
+{
   const PetscInt size = (PetscInt)sizeof(*mine);
   PairForce *all;
   PetscInt total;
 
   PetscFunctionBeginUser;
   PetscCall(SbAllgatherv(b->surface->space->comm, MPI_BYTE, n * size, mine, &total, &all, NULL));
-  m->n = total / size;
-  PetscCall(SbReserve(m->n, sizeof(*all), &m->size, &m->pair));
-  PetscCall(PetscArraycpy(m->pair, all, m->n));
+  table->n = total / size;
+  PetscCall(SbReserve(table->n, sizeof(*all), &table->size, &table->pair));
+  PetscCall(PetscArraycpy(table->pair, all, table->n));
   PetscCall(PetscFree(all));
-  if (m->n)
-    qsort(m->pair, (size_t)m->n, sizeof(*m->pair), by_pair);
-  b->motion.known = PETSC_FALSE;
+  if (table->n)
+    qsort(table->pair, (size_t)table->n, sizeof(*table->pair), by_pair);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode warn(const Barrier *b, const Wrong *worst)
+{
+  const SbSpace s = b->surface->space;
+  const SbEffect e = b->contact.base.effect;
+  struct {
+    double by;
+    int rank;
+  } most = {worst->by, s->rank};
+  Wrong at = *worst;
+  const char *name[2];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE_INT, MPI_MAXLOC, s->comm));
+  PetscCallMPI(MPI_Bcast(&at, (PetscMPIInt)sizeof(at), MPI_BYTE, most.rank, s->comm));
+  for (int k = 0; k < 2; k++)
+    name[k] = at.body[k] < s->mesh->nbody ? s->mesh->body[at.body[k]].name : "the obstacle";
+  PetscCall(SbWarning(s->comm,
+                      "effect %s: after %" PetscInt_FMT
+                      " updates of its multipliers gaps are wrong by %.2g of the width of %.3g m, "
+                      "most of %s with %s near (%g, %g, %g) m; said once: a larger "
+                      "-effect_%s_stiffness settles sooner, the response barrier needs none",
+                      e->name, b->multipliers.updates, (double)at.by, (double)b->widths.w[0],
+                      name[0], name[1], (double)at.x[0], (double)at.x[1], (double)at.x[2],
+                      e->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,87 +193,50 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
   const PetscReal exact = b->contact.base.effect->dynamic ? EXACT_STEPS : EXACT;
   const PetscReal usual = is_exact(b) ? exact : SETTLED;
   const PetscReal tolerance = b->options.settled > 0. ? b->options.settled : usual;
-  PetscReal worst = 0.;
+  PetscReal by;
   PairForce *mine;
-  PetscInt n = 0;
+  PetscInt n;
+  Wrong worst;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(b->active.n, &mine));
-
-  /* normal forces */
-  for (PetscInt i = 0; i < b->active.n; i++) {
-    const Active *a = &b->active.pair[i];
-    const SbPairLaw law = SbPairLawOf(b, a);
-    PetscReal d[3], wrong;
-
-    if (!counts(b, &a->pair))
-      continue;
-    SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
-    if (d[1] == 0. && a->force == 0.)
-      continue;
-    wrong = PetscAbsReal(d[1] + a->force) / (law.stiffness * a->pair.area * law.width);
-    worst = PetscMax(worst, wrong);
-    if (d[1] >= 0.)
-      continue;
-    mine[n] = (PairForce){.force = -d[1]};
-    find_key(b, &a->pair, mine[n++].key);
-  }
-  qsort(mine, (size_t)n, sizeof(*mine), by_pair);
-
-  /* friction */
-  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
-    const FrictionPair *friction = &b->friction.pairs.pair[i];
-    const PetscReal scale = friction->stiffness * of_pair(b, b->widths.w, &friction->on.pair);
-    PetscReal q[3];
-    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, friction, q));
-    PairForce at, *with;
-
-    if (!counts(b, &friction->on.pair))
-      continue;
-    find_key(b, &friction->on.pair, at.key);
-    with = n ? (PairForce *)bsearch(&at, mine, (size_t)n, sizeof(*mine), by_pair) : NULL;
-    for (int k = 0; k < 3; k++) {
-      q[k] *= factor;
-      if (with)
-        with->tangent[k] = q[k];
-      q[k] -= friction->tangent[k];
-    }
-    worst = PetscMax(worst, PetscSqrtReal(SbDot3(q, q)) / scale);
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, comm));
+  PetscCall(find_forces(b, &n, &mine, &worst));
+  by = worst.by;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &by, 1, MPIU_REAL, MPI_MAX, comm));
   PetscCall(
     PetscInfo(NULL, "multipliers, update %" PetscInt_FMT ": gaps are wrong by %g of their width\n",
-              m->updates, (double)worst));
-  if (!m->updates || worst < FALLS * m->least) {
-    m->least = worst;
+              m->updates, (double)by));
+  if (!m->updates || by < FALLS * m->least) {
+    m->least = by;
     m->stuck = 0;
   } else
     m->stuck++;
-  if (worst > tolerance && m->stuck < STUCK && m->updates < UPDATES) {
+  if (by > tolerance && m->stuck < STUCK && m->updates < UPDATES) {
     m->updates++;
-    PetscCall(share(b, n, mine));
+    PetscCall(share(b, n, mine, &m->now));
     PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
     SbBarrierSwapFriction(b);
+    b->motion.known = PETSC_FALSE;
     *again = PETSC_TRUE;
-  } else if (worst > LOOSE && !m->said) {
+  } else if (by > LOOSE && !m->said) {
     m->said = PETSC_TRUE;
-    PetscCall(SbWarning(comm,
-                        "effect %s: after %" PetscInt_FMT
-                        " updates of its multipliers gaps are wrong by %.2g of the width of %.3g "
-                        "m; said once: a larger -effect_%s_stiffness settles sooner",
-                        b->contact.base.effect->name, m->updates, (double)worst,
-                        (double)b->widths.w[0], b->contact.base.effect->name));
+    PetscCall(warn(b, &worst));
   }
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMultipliersKeep(Multipliers *m)
+PetscErrorCode SbMultipliersKeep(Barrier *b)
 {
+  PairForce *mine;
+  PetscInt n;
+  Wrong worst;
+
   PetscFunctionBeginUser;
-  m->nkept = m->n;
-  PetscCall(SbReserve(m->n, sizeof(*m->kept), &m->kept_size, &m->kept));
-  PetscCall(PetscArraycpy(m->kept, m->pair, m->n));
+  if (!has_table(b))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_forces(b, &n, &mine, &worst));
+  PetscCall(share(b, n, mine, &b->multipliers.kept));
+  PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -184,10 +246,10 @@ PetscErrorCode SbMultipliersRestore(Barrier *b)
 
   PetscFunctionBeginUser;
   m->updates = 0;
-  m->n = m->nkept;
-  PetscCall(SbReserve(m->n, sizeof(*m->pair), &m->size, &m->pair));
-  PetscCall(PetscArraycpy(m->pair, m->kept, m->n));
-  if (has_multipliers(b))
+  m->now.n = m->kept.n;
+  PetscCall(SbReserve(m->now.n, sizeof(*m->now.pair), &m->now.size, &m->now.pair));
+  PetscCall(PetscArraycpy(m->now.pair, m->kept.pair, m->now.n));
+  if (has_table(b))
     b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -72,6 +72,9 @@ static const SbOption rows[] = {
    "response barrier: after each step, search for edges that intersect triangles; an intersection "
    "ends the "
    "run"},
+  {"sticking", SB_OPTION_CHOICE, 1, "", "exact", "exact|smooth",
+   "friction between bodies, and of the barrier: exact: pairs below Coulomb's limit come to rest; "
+   "smooth: they creep, at a ten-thousandth of the speed of a step at most"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "response barrier: largest number of lagged-friction iterations of a step, each with the normal "
    "forces "
@@ -90,9 +93,12 @@ static const SbOption rows[] = {
    "tet behind the surface; between bodies and in self-contact area / mean edge, where projected "
    "and multiplier take 10 times as much"},
   {"multiplier_tolerance", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
-   "augmented, projected and multiplier between bodies: tolerance of gaps and of slips of what "
-   "sticks, over the barrier's width; 0: projected and multiplier 1e-10 in static runs and 1e-5 in "
-   "time steps, augmented 1e-3"},
+   "between bodies and of the barrier: tolerance of the gaps of augmented, projected and "
+   "multiplier, "
+   "and of slips of what sticks, over the barrier's width; 0: projected and multiplier 1e-10 in "
+   "static "
+   "runs and 1e-5 in time steps, augmented 1e-3, barrier and penalty 1e-3 in static runs, and no "
+   "further solves in time steps"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -252,11 +258,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_barrier_pressure, or another -effect_%s_response",
              e->name, e->name, e->name);
   PetscCall(SbOptionGiven(scope, "multiplier_tolerance", &given));
-  PetscCheck(!given || (surfaces && c->response != BARRIER && c->response != PENALTY),
-             PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_multiplier_tolerance is of augmented, projected and multiplier in scenes "
-             "with contact between bodies: leave it out",
-             e->name);
+  PetscCheck(
+    !given || surfaces, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_multiplier_tolerance is of contact between bodies and of barrier: leave it "
+    "out",
+    e->name);
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));

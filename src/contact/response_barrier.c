@@ -11,10 +11,10 @@
   Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the
   fraction that is completed. Newton's method raises it to one as fast as the surfaces allow.
 
-  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of
-  the step (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, section 4): the energy
-  mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt
-  times a small speed:
+  Friction, -effect_X_sticking exact: multipliers.c. Smooth: Coulomb's law with the normal forces N
+  and closest points of the pairs at the start of the step (Li et al., "Incremental potential
+  contact", ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of the slip u_t since then,
+  whose slope rises from 0 to 1 within the slip e = dt times a small speed:
 
     f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
 
@@ -76,13 +76,14 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.x));
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.start));
   PetscCall(SbContactSurfaceCreateArray(b->surface, &b->motion.other));
-  PetscCall(PetscMalloc4(4 * nbody + 4, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
+  PetscCall(PetscMalloc4(5 * nbody + 5, &b->widths.w, 3 * s->nnode_owned, &b->motion.u, nobstacle,
                          &b->motion.from, nobstacle, &b->motion.to));
   b->widths.k = b->widths.w + nbody + 1;
   b->widths.mass = b->widths.k + nbody + 1;
   b->widths.guard = b->widths.mass + nbody + 1;
+  b->widths.spring = b->widths.guard + nbody + 1;
   b->widths.w[nbody] = b->widths.k[nbody] = b->widths.mass[nbody] = b->widths.guard[nbody] =
-    b->contact.base.width = PETSC_MAX_REAL;
+    b->widths.spring[nbody] = b->contact.base.width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->widths.w[i] = b->options.width > 0.
                        ? b->options.width
@@ -93,7 +94,8 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     b->widths.guard[i] = b->options.pressure > 0.
                            ? b->options.pressure
                            : PRESSURE * SbMaterialYoungModulus(s->material[i]);
-    b->widths.k[i] = is_barrier(b) ? b->widths.guard[i] : spring_of(b, s->material[i]);
+    b->widths.spring[i] = spring_of(b, s->material[i]);
+    b->widths.k[i] = is_barrier(b) ? b->widths.guard[i] : b->widths.spring[i];
   }
   PetscCheck(
     b->widths.w[0] <= b->surface->shortest, s->comm, PETSC_ERR_USER_INPUT,
@@ -479,7 +481,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, progress, 2, MPIU_REAL, MPI_SUM, s->comm));
   b->sums.work += b->contact.base.work;
-  PetscCall(SbMultipliersKeep(&b->multipliers));
+  PetscCall(SbMultipliersKeep(b));
   b->separation.parted = PETSC_FALSE;
   if (progress[1] > 0.)
     b->separation.stiffer = progress[0] < HALF * progress[1]
@@ -510,7 +512,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-  const Multipliers *m = &b->multipliers;
+  const PairForces *m = &b->multipliers.kept;
   const PetscReal sum[SUMS] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
                                s->rank ? 0. : b->widths.scale};
 
@@ -518,7 +520,7 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
   *n = s->rank ? 1 : 1 + m->n;
   PetscCall(PetscCalloc1(e->nstate * *n, records));
   PetscCall(PetscArraycpy(*records, sum, SUMS));
-  if (has_multipliers(b))
+  if (has_table(b))
     (*records)[PAIR_KEY] = -1.;
   for (PetscInt k = 1; k < *n; k++) {
     PetscReal *record = *records + e->nstate * k;
@@ -536,7 +538,7 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
                                    PetscInt n, const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
-  Multipliers *m = &b->multipliers;
+  PairForces *m = &b->multipliers.kept;
   PetscReal sum[SUMS] = {0.};
 
   PetscFunctionBeginUser;
@@ -547,7 +549,7 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *record = records + e->nstate * k;
 
-    if (!has_multipliers(b) || record[PAIR_KEY] < 0.) {
+    if (!has_table(b) || record[PAIR_KEY] < 0.) {
       for (int i = 0; i < SUMS; i++)
         sum[i] += record[i];
       continue;
@@ -559,7 +561,6 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
       m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
     m->n++;
   }
-  PetscCall(SbMultipliersKeep(m));
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
   b->separation.stiffer = sum[2];
@@ -568,14 +569,16 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve: multipliers, then friction. */
+/* After a solve: multipliers, then friction. Where only friction has multipliers, a time step takes
+   those of the step before. */
 static PetscErrorCode update_barrier(SbContact contact, SbSpace s, const PetscReal u[],
                                      PetscBool solved, PetscBool *again)
 {
   Barrier *b = (Barrier *)contact;
+  const PetscBool settles = (PetscBool)(!contact->effect->dynamic || b->options.settled > 0.);
 
   PetscFunctionBeginUser;
-  if (solved && has_multipliers(b)) {
+  if (solved && (has_multipliers(b) || (b->options.sticks && settles))) {
     PetscCall(SbBarrierUpdate(b, u));
     PetscCall(SbMultipliersUpdate(b, again));
     if (*again)
@@ -596,8 +599,8 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->columns.slot));
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
-  PetscCall(PetscFree(b->multipliers.pair));
-  PetscCall(PetscFree(b->multipliers.kept));
+  PetscCall(PetscFree(b->multipliers.now.pair));
+  PetscCall(PetscFree(b->multipliers.kept.pair));
   PetscCall(PetscFree(b->friction.pairs.pair));
   PetscCall(PetscFree(b->friction.next.pair));
   PetscCall(PetscFree(b->blocks.block));
@@ -616,7 +619,7 @@ static const SbContactOps barrier_ops = {
   .gradient = SbContactGradient_Barrier,
   .hessian = SbContactHessian_Barrier,
   .max_step = max_step_barrier,
-  .update_friction = SbContactUpdateFriction_Barrier,
+  .update_friction = update_barrier,
   .impact_work = SbContactImpactWork_Barrier,
   .scale_restitution = SbContactScaleRestitution_Barrier,
   .gap = SbContactGap_Barrier,
@@ -662,7 +665,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Barrier *b = (Barrier *)e->data;
-  int search;
+  int search, sticking;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
@@ -681,12 +684,14 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   e->ops = barrier_effect;
   PetscCall(SbOptionReal(scope, "stiffness", &b->options.stiffness));
   PetscCall(SbOptionReal(scope, "multiplier_tolerance", &b->options.settled));
+  PetscCall(SbOptionChoice(scope, "sticking", &sticking));
+  b->options.sticks = (PetscBool)(b->contact.friction.mu > 0. && sticking == 0);
   b->contact.base.ops = is_barrier(b) ? &barrier_ops : &spring_ops;
   b->contact.base.exact = is_exact(b);
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->nstate = has_multipliers(b) ? PAIR_KEY + 4 : SUMS;
+  e->nstate = has_table(b) ? PAIR_KEY + 4 : SUMS;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

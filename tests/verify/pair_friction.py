@@ -1,7 +1,7 @@
-"""Friction between bodies where constraints have multipliers: what sticks does not creep, what slides has Coulomb's acceleration.
+"""Friction of all responses between bodies: what sticks does not creep, what slides has Coulomb's acceleration.
 
-A block on a slope of 30 degrees, tan 0.577, in time and static: it rests with a coefficient of 0.7 and slides with 0.5. The barrier's smoothed
-friction creeps by 1e-4 m/s there. The same on 1, 2 and 3 ranks to 1e-8 of its path, and after restarts while it sticks and slides.
+A block on a slope of 30 degrees, tan 0.577, in time and static: it rests with a coefficient of 0.7 and slides with 0.5. Smoothed
+friction creeps by 1e-4 m/s there. At rest a step takes one Newton iteration. The same on 1, 2 and 3 ranks to 1e-7 of its path, and after restarts while it sticks and slides.
 """
 import csv
 import subprocess
@@ -42,27 +42,35 @@ def check(good, text):
 
 
 def check_time():
-    for response, creep in ("projected", 1e-7), ("multiplier", 5e-7), ("augmented", 5e-6):
+    for response, creep in ("projected", 1e-8), ("multiplier", 1e-8), ("augmented", 5e-8), ("barrier", 1e-9), ("penalty", 1e-9):
         found, _ = run(f"stick-{response}", response, 0.7, STEPS + "-ts_max_time 0.5")
         v = speed(found)
         print(f"  stick-{response}: {v:.1e} m/s, {sum(found['newton']):.0f} Newton iterations")
         check(abs(v) < creep, f"stick-{response}: it creeps by {v:.3g} m/s")
+        if response in ("barrier", "penalty"):
+            check(sum(found["newton"][-50:]) <= 50, f"stick-{response}: {sum(found['newton'][-50:])} iterations in 50 steps at rest")
 
         found, _ = run(f"slide-{response}", response, 0.5, STEPS + "-ts_max_time 0.3")
         # over 20 steps, by the backward differences of implicit Euler
         exact = (G[0] - 0.5 * G[1]) * (found["time"][-1] - 0.0475)
         v = speed(found)
         print(f"  slide-{response}: {v:.5f} m/s, of a rigid block {exact:.5f}")
-        check(abs(v / exact - 1) < 0.02, f"slide-{response}: speed {v:.5f} m/s, not {exact:.5f}")
+        check(abs(v / exact - 1) < (0.01 if response in ("projected", "multiplier") else 0.03), f"slide-{response}: speed {v:.5f} m/s, not {exact:.5f}")
         ratio = found["meet_friction_force"][-1] / found["meet_normal_force"][-1]
         check(abs(ratio / 0.5 - 1) < 1e-3, f"slide-{response}: friction is {ratio:.5f} of the normal force, not 0.5")
         check((numpy.diff(found["meet_friction_loss"]) >= 0).all(), f"slide-{response}: friction gives energy back")
 
 
+def check_smooth():
+    """The smoothed friction that creeps is there as well."""
+    found, _ = run("smooth", "barrier", 0.7, STEPS + "-ts_max_time 0.2 -effect_meet_sticking smooth")
+    check(1e-6 < speed(found) < 1e-3, f"smooth: speed {speed(found):.3g} m/s")
+
+
 def check_static():
     """Held by friction alone: the force into and along the slope is the weight; beyond Coulomb's limit nothing holds."""
-    for response in "projected", "multiplier", "augmented":
-        found, _ = run(f"static-{response}", response, 0.7, "-time static")
+    for response in "projected", "multiplier", "augmented", "barrier", "penalty":
+        found, _ = run(f"static-{response}", response, 0.7, "-time static -body_b_translate 0.05,0.05,0.0501")
         for axis, g in (("x", G[0]), ("z", -G[1])):
             reaction = found[f"hold_reaction_{axis}"][-1]
             weight = 1000 * (0.4 * 0.2 * 0.05 + 0.1 * 0.1 * 0.05) * g
@@ -97,6 +105,7 @@ def check_restart():
 
 
 check_time()
+check_smooth()
 check_static()
 check_ranks()
 check_restart()
