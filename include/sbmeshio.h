@@ -164,6 +164,11 @@ struct _p_SbImport {
   SbCount nmember;
   SbGroupMember *member;        /* [nmember] sets that the file lists apart from their items */
   struct _p_SbScratch *scratch; /* arrays of the reader */
+  SbCount nskipped;
+  struct {
+    char name[SB_NAME_MAX];
+    PetscInt n;
+  } * skipped; /* [nskipped] what the file holds and a mesh does not need, and how often */
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
   PetscInt nreoriented; /* cells turned */

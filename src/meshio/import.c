@@ -143,8 +143,8 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
   PetscCall(SbImportMiddles(im, NULL, &largest));
   SbImportNoteMiddles(im, im->nmiddle.n, largest);
   if (given && !im->nmiddle.n && !body->name[0])
-    PetscCall(PetscStrncpy(im->note, "straight tets of second order, taken as those of first order",
-                           sizeof(im->note)));
+    SbImportRemark(im, "straight tets of second order, taken as those of first order");
+  SbImportNoteSkipped(im);
   PetscCall(SbImportForget(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
