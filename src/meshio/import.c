@@ -81,17 +81,18 @@ static const struct {
   const char *extension;
   SbReader read;
 } readers[] = {
-  {".msh", SbImportRead_Gmsh},     {".vtk", SbImportRead_VTK},
-  {".vtu", SbImportRead_VTU},      {".mesh", SbImportRead_Medit},
-  {".node", SbImportRead_TetGen},  {".ele", SbImportRead_TetGen},
-  {".face", SbImportRead_TetGen},  {".edge", SbImportRead_TetGen},
-  {".vol", SbImportRead_Netgen},   {".neu", SbImportRead_NetgenNeutral},
-  {".inp", SbImportRead_Abaqus},   {".unv", SbImportRead_UNV},
-  {".bdf", SbImportRead_Nastran},  {".nas", SbImportRead_Nastran},
-  {".stl", SbImportRead_Surface},  {".obj", SbImportRead_Surface},
-  {".off", SbImportRead_Surface},  {".ply", SbImportRead_Surface},
-  {".h5", SbImportRead_H5},        {".xmf", SbImportRead_Xdmf},
-  {".poly", SbImportRead_Surface}, {".smesh", SbImportRead_Surface},
+  {".msh", SbImportRead_Gmsh},      {".vtk", SbImportRead_VTK},
+  {".vtu", SbImportRead_VTU},       {".mesh", SbImportRead_Medit},
+  {".node", SbImportRead_TetGen},   {".ele", SbImportRead_TetGen},
+  {".face", SbImportRead_TetGen},   {".edge", SbImportRead_TetGen},
+  {".vol", SbImportRead_Netgen},    {".neu", SbImportRead_NetgenNeutral},
+  {".inp", SbImportRead_Abaqus},    {".unv", SbImportRead_UNV},
+  {".bdf", SbImportRead_Nastran},   {".nas", SbImportRead_Nastran},
+  {".fem", SbImportRead_Nastran},   {".stl", SbImportRead_Surface},
+  {".obj", SbImportRead_Surface},   {".off", SbImportRead_Surface},
+  {".ply", SbImportRead_Surface},   {".h5", SbImportRead_H5},
+  {".xmf", SbImportRead_Xdmf},      {".poly", SbImportRead_Surface},
+  {".smesh", SbImportRead_Surface},
 };
 
 /* Sets the inputs of a reader from the body. */
