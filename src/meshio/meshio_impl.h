@@ -28,12 +28,6 @@ PetscErrorCode SbImportJoinGroups(SbImport *import);
 /* Names the group (dim, tag), if it exists. */
 void SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 
-/* Adds to the note what the reader has done, or what a mesh does not need and is left out: each
-   kind once, with its count. SbImportNoteSkipped() writes these into the note. */
-void SbImportRemark(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
-PetscErrorCode SbImportSkip(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
-void SbImportNoteSkipped(SbImport *import);
-
 /* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error
    messages. */
 PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);

@@ -68,7 +68,7 @@ const char *SbScanPosition(const SbScan *s, char position[64])
   size_t n = 1;
 
   for (const char *p = s->data; p < s->token; p++)
-    n += s->bytes || *p == '\n';
+    n += s->bytes || *p == '\n' || *p == '\v'; /* a vertical tabulator joins two lines */
   (void)snprintf(position, 64, "%s %zu", s->bytes ? "byte" : "line", n);
   return position;
 }
