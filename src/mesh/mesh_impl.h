@@ -36,6 +36,19 @@ PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], 
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
+/* touching.c: boundary facets that lie on each other without being one face */
+typedef struct {
+  PetscInt n, ndoubled; /* pairs; those whose corners are at the same positions, as two vertices */
+  PetscInt npart;       /* parts of the body that hang together by faces, when n > 0 */
+  int64_t number[2];    /* tets of the first pair, in the file */
+  PetscReal at[3];      /* its place, m */
+} SbTouching;
+PetscErrorCode SbImportTouching(const SbImport *import, const SbFaces *faces, SbTouching *touching);
+/* What they are and, with the file, what to do. */
+void SbTouchingText(const SbTouching *touching, const char *file, size_t size, char text[]);
+/* Warns of them. Error: the body falls apart with an element whose unknowns are at faces. Its
+   number of parts is known. */
+PetscErrorCode SbImportCheckTouching(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Size and shape of the cells of all ranks of comm: sets those of the "found" fields.
    Collective. */
 PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *import, const SbFaces *faces,
