@@ -73,5 +73,8 @@ PetscErrorCode SbAbaqusReals(SbAbaqus *a, const char *what, int n, PetscReal x[]
 /* Finds or creates the set of this name, of the current part or instance. */
 PetscErrorCode SbAbaqusSet(SbAbaqus *a, PetscBool of_nodes, const char *name, PetscInt *set);
 
+/* abaqus_include.c: puts the files that the one in im->scan refers to into its text */
+PetscErrorCode SbAbaqusExpand(SbImport *import, const char *path);
+
 /* abaqus_generate.c: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY; known false: another keyword */
 PetscErrorCode SbAbaqusGenerate(SbAbaqus *a, PetscBool *known);

@@ -386,9 +386,7 @@ static PetscErrorCode check_keyword(SbAbaqus *a)
   static const struct {
     const char *keyword, *parameter, *why;
   } refused[] = {
-    {"*INCLUDE", NULL, "another file holds a part of the model; put all into one file"},
-    {"*NODE", "INPUT", "the nodes are in another file; put them behind the line"},
-    {"*ELEMENT", "INPUT", "the elements are in another file; put them behind the line"},
+    {"*INCLUDE", NULL, "it needs INPUT=FILE on the same line"},
     {"*ELEMENT", "FILE", "the elements are in another file; put them behind the line"},
     {"*ELEMENT", "OFFSET", "supple knows no offset of nodes; write the elements without"},
     {"*NMAP", NULL, "it moves nodes; let Abaqus write the mapped ones"},
@@ -683,6 +681,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
+  PetscCall(SbAbaqusExpand(im, path));
   a.instances = has_instances(s);
   PetscCall(begin_model(&a));
   do {

@@ -48,6 +48,7 @@ PetscErrorCode SbImportForget(SbImport *im)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree(im->scan.data));
+  im->scan.npiece = 0;
   PetscCall(SbNumbersDestroy(&im->nodes));
   PetscCall(SbNumbersDestroy(&im->elements));
   while (im->scratch) {

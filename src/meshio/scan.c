@@ -63,11 +63,29 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Piece of the last token; NULL: there are none. */
+static const SbScanPiece *piece_of(const SbScan *s)
+{
+  PetscInt k = s->npiece - 1;
+
+  while (k > 0 && s->data + s->piece[k].at > s->token)
+    k--;
+  return k < 0 ? NULL : &s->piece[k];
+}
+
+const char *SbScanWhere(const SbScan *s)
+{
+  const SbScanPiece *piece = piece_of(s);
+
+  return piece ? piece->where : s->where;
+}
+
 const char *SbScanPosition(const SbScan *s, char position[64])
 {
-  size_t n = 1;
+  const SbScanPiece *piece = piece_of(s);
+  size_t n = piece ? piece->line : 1;
 
-  for (const char *p = s->data; p < s->token; p++)
+  for (const char *p = s->data + (piece ? piece->at : 0); p < s->token; p++)
     n += s->bytes || *p == '\n' || *p == '\v'; /* a vertical tabulator joins two lines */
   (void)snprintf(position, 64, "%s %zu", s->bytes ? "byte" : "line", n);
   return position;

@@ -231,9 +231,6 @@ static PetscErrorCode test_refused(void)
 {
   static const char *const bad[][2] = {
     {"*NODE, SYSTEM=X\n1,0,0,0\n", "line 1|SYSTEM=X"},
-    {"*NODE, INPUT=more.txt\n", "line 1|*NODE with INPUT"},
-    {NODE "*ELEMENT, TYPE=C3D4, INPUT=more.txt\n", "line 6|*ELEMENT with INPUT"},
-    {NODE TET "*INCLUDE, INPUT=more.inp\n", "line 8|*INCLUDE"},
     {NODE "*NGEN, LINE=C\n1,2,1\n", "line 6|*NGEN with LINE"},
     {NODE "*NGEN\n1,9,1\n", "line 7|node 9"},
     {NODE "*NGEN\n1,2,0\n", "line 7|*NGEN"},
@@ -266,11 +263,55 @@ static PetscErrorCode test_refused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mesh in several files; messages name the one that is wrong, and its line. */
+static PetscErrorCode test_include(void)
+{
+  static const char *const files[][2] = {
+    {"main.inp", "*INCLUDE, INPUT=part.inc\n*ELSET, ELSET=s\n1\n"},
+    {"part.inc", "** nodes\n*NODE, input=nodes.txt, NSET=n\n4,0,0,1\n" TET},
+    {"nodes.txt", "1,0,0,0\n2,1,0,0\n3,0,1,0"},
+    {"wrong.inp", "**\n*INCLUDE, INPUT=wrong.inc\n" NODE "*ELEMENT, TYPE=C3D4\n1,1,2,3,9\n"},
+    {"wrong.inc", "*NODE\n9,1,one,1\n"},
+    {"after.inp", "**\n*INCLUDE, INPUT=empty.inc\n" NODE "*ELEMENT, TYPE=C3D4\n1,1,2,3,9\n"},
+    {"empty.inc", "** nothing\n**\n"},
+    {"loop.inp", "*INCLUDE, INPUT=loop.inc\n"},
+    {"loop.inc", "**\n*INCLUDE, INPUT=loop.inc\n"},
+    {"none.inp", NODE "*INCLUDE, INPUT=none.inc\n"},
+  };
+  static const struct {
+    const char *name, *words;
+    PetscErrorCode code;
+  } bad[] = {{"wrong.inp", "wrong.inc line 2|'one'", PETSC_ERR_FILE_UNEXPECTED},
+             {"after.inp", "after.inp line 9|node 9", PETSC_ERR_FILE_UNEXPECTED},
+             {"loop.inp", "loop.inc line 2|itself", PETSC_ERR_FILE_UNEXPECTED},
+             {"none.inp", "none.inc", PETSC_ERR_FILE_OPEN}};
+  char path[600];
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(files); k++) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, files[k][0]);
+    PetscCall(test_file_put(path, files[k][1]));
+  }
+  (void)snprintf(path, sizeof(path), "%s/main.inp", folder);
+  PetscCall(test_import(path, &im));
+  SB_CHECK(im.nvert == 4 && im.item[3].n == 1 && test_count(&im, 0, "n") == 4 &&
+             test_count(&im, 3, "s") == 1,
+           "%d nodes, %d tets", (int)im.nvert, (int)im.item[3].n);
+  PetscCall(SbImportDestroy(&im));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(bad); k++) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, bad[k].name);
+    SB_CHECK_ERROR(test_mesh_use(path), bad[k].code, bad[k].words);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(folder));
   PetscCall(test_read());
   PetscCall(test_refused());
+  PetscCall(test_include());
   SB_TEST_END();
 }
