@@ -118,6 +118,9 @@ PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
     PetscCall(PetscLogEventEnd(sb_e_->event, 0, 0, 0, 0));   \
   } while (0)
 
+/* Warns once of each support of effect[n] that prescribes another value, in its last evaluation, at
+   time t, than an earlier one has at the same node. Collective. */
+PetscErrorCode SbSupportsWarn(SbSpace space, PetscInt n, SbEffect effect[], PetscReal t);
 extern const SbOption SbEffectRows[]; /* of all types */
 /* Adds a type, which must live as long as the program, and its option rows. Not collective. */
 PetscErrorCode SbEffectRegister(const SbEffectType *type);

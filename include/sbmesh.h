@@ -337,6 +337,9 @@ typedef struct {
   PetscInt nduplicate; /* duplicate tets, removed; their groups are joined */
   PetscInt nturned;    /* inverted tets, reoriented */
   PetscInt nunused;    /* vertices that no tet uses, dropped */
+  PetscInt nfolded;    /* curved tets that folded over themselves: their edges are straight now */
+  int64_t folded;      /* the first of them, in the file */
+  PetscReal folded_at[3]; /* its place, m */
   PetscInt nitem; /* duplicate, collapsed or unused triangles, lines, points of groups, removed */
 } SbRepair;
 /*

@@ -23,6 +23,13 @@ PetscErrorCode SbNumbersAdd(SbNumbers *numbers, int64_t number);
 PetscInt SbNumbersFind(const SbNumbers *numbers, int64_t number);
 
 /* scan.c: a file in memory */
+
+/* Where bytes from `at` on come from, when a text is put together of several files. */
+typedef struct {
+  size_t at;
+  const char *where;
+  size_t line; /* number of the first line there */
+} SbScanPiece;
 typedef struct {
   const char *where; /* begins every message */
   char *data;        /* whole file and a terminating zero; PetscFree() */
@@ -33,9 +40,13 @@ typedef struct {
   PetscBool binary; /* the numbers that follow are binary */
   PetscBool bytes;  /* messages count bytes instead of lines */
   PetscBool swap;   /* from a machine with the other byte order */
+  PetscInt npiece;
+  const SbScanPiece *piece; /* [npiece] ascending; none: all is of one file */
 } SbScan;
 
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
+/* What begins a message about the last token: `where`, or that of its piece. */
+const char *SbScanWhere(const SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
 /* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for
@@ -65,12 +76,12 @@ PetscBool SbScanWord(SbScan *scan, size_t size, char word[]);
 void SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
 void SbScanNext(SbScan *scan);      /* to the next word, over blank lines and comments */
 PetscBool SbScanMore(SbScan *scan, char comment);
-#define SB_SCAN_ERROR(scan, ...)                                                    \
-  do {                                                                              \
-    char sb_position[64], sb_text[512];                                             \
-    (void)snprintf(sb_text, sizeof(sb_text), __VA_ARGS__);                          \
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
-            SbScanPosition(scan, sb_position), sb_text);                            \
+#define SB_SCAN_ERROR(scan, ...)                                                        \
+  do {                                                                                  \
+    char sb_position[64], sb_text[512];                                                 \
+    (void)snprintf(sb_text, sizeof(sb_text), __VA_ARGS__);                              \
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", SbScanWhere(scan), \
+            SbScanPosition(scan, sb_position), sb_text);                                \
   } while (0)
 #define SB_SCAN_ENDS(scan, what, ...)                                                          \
   SB_SCAN_ERROR(                                                                               \
@@ -164,6 +175,11 @@ struct _p_SbImport {
   SbCount nmember;
   SbGroupMember *member;        /* [nmember] sets that the file lists apart from their items */
   struct _p_SbScratch *scratch; /* arrays of the reader */
+  SbCount nskipped;
+  struct {
+    char name[SB_NAME_MAX];
+    PetscInt n;
+  } * skipped; /* [nskipped] what the file holds and a mesh does not need, and how often */
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
   PetscInt nreoriented; /* cells turned */
@@ -233,6 +249,11 @@ PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
 /* Allocates n vertices, numbered from 1 on. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
+/* Adds to the note what the reader has done, or what a mesh does not need and is left out: each
+   kind once, with its count. SbImportNoteSkipped() writes these into the note. */
+void SbImportRemark(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+PetscErrorCode SbImportSkip(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+void SbImportNoteSkipped(SbImport *import);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);

@@ -18,7 +18,7 @@
   prescribed in all directions has a node of its own, to which its cell is tied by a penalty
   (src/fem/layout.c; -body_X_dirichlet strong: the mean itself is prescribed). Single directions are
   constrained in the mean itself. Of several effects that prescribe one unknown, the first in the
-  scenario counts.
+  scenario counts; once the others have another value there, a warning names both.
 */
 #include "effect_impl.h"
 #include "sbgeometry.h"
@@ -31,6 +31,15 @@ typedef struct {
   PetscInt n, nowned; /* nodes with unknowns that it prescribes */
   PetscInt *node;     /* [n] local, ascending, owned ones first */
   uint8_t *bits;      /* [n] bit c: component c is prescribed by this effect */
+
+  /* owned nodes where an earlier effect prescribes what this one would */
+  PetscInt nlost;
+  PetscInt *lost;      /* [nlost] local, ascending */
+  uint8_t *lost_bits;  /* [nlost] */
+  PetscBool watched;   /* some rank has such nodes, and their values have been alike so far */
+  PetscInt conflict;   /* the first of lost[] whose value differs, -1: none so far */
+  int component;       /* there */
+  PetscReal differ[2]; /* what the earlier effect and this one say, m */
 } Support;
 
 static const SbOption fixed_rows[] = {
@@ -88,11 +97,17 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 {
   Support *d = (Support *)e->data;
-  PetscInt n, owned;
+  PetscInt n, owned[2];
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectItems(space, &e->on, SB_ON_NODES, &n, &d->node));
   PetscCall(PetscMalloc1(n, &d->bits));
+  for (PetscInt i = 0; i < n; i++)
+    d->nlost +=
+      d->node[i] < space->nnode_owned && (d->components & (int)space->fixed[d->node[i]]) != 0;
+  PetscCall(PetscMalloc2(d->nlost, &d->lost, d->nlost, &d->lost_bits));
+  d->nlost = 0;
+  d->conflict = -1;
 
   /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide
      alike */
@@ -100,6 +115,10 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
     const PetscInt node = d->node[i];
     const int free = d->components & ~(int)space->fixed[node];
 
+    if (node < space->nnode_owned && free != d->components) {
+      d->lost[d->nlost] = node;
+      d->lost_bits[d->nlost++] = (uint8_t)(d->components & ~free);
+    }
     if (!free)
       continue;
     PetscCall(SbSpacePrescribe(space, node, free));
@@ -108,44 +127,125 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
     if (node < space->nnode_owned)
       d->nowned = d->n;
   }
-  PetscCallMPI(MPI_Allreduce(&d->nowned, &owned, 1, MPIU_INT, MPI_SUM, space->comm));
-  PetscCheck(owned, space->comm, PETSC_ERR_USER_INPUT,
+  owned[0] = d->nowned;
+  owned[1] = d->nlost;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, owned, 2, MPIU_INT, MPI_SUM, space->comm));
+  d->watched = (PetscBool)(owned[1] > 0);
+  PetscCheck(owned[0], space->comm, PETSC_ERR_USER_INPUT,
              "%s: every displacement of %s is already prescribed by an earlier effect: remove one "
              "of the two",
              e->on.option, e->on.n == 1 ? e->on.name[0] : "these sets");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Displacement that the effect prescribes at a rest position, m; of the angle: sine, and sine of
+   half of it. */
+static PetscErrorCode displacement_at(const Support *d, PetscReal t, const PetscReal X[3],
+                                      const PetscReal sine[2], PetscReal u[3])
+{
+  PetscReal r[3], kr[3], kkr[3];
+
+  PetscFunctionBeginUser;
+  SbSubtract(X, d->path.point, r);
+  SbCross(d->path.axis, r, kr);
+  SbCross(d->path.axis, kr, kkr);
+  for (int c = 0; c < 3; c++) {
+    u[c] = 0;
+    if (!d->path.angle)
+      continue;
+    PetscCall(SbFormulaEval(d->path.displacement[c], t, X, &u[c]));
+    u[c] += sine[0] * kr[c] + 2 * sine[1] * sine[1] * kkr[c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
 {
-  const Support *d = (const Support *)e->data;
+  Support *d = (Support *)e->data;
   PetscReal theta = 0;
-  PetscReal half;
+  PetscReal sine[2], u[3];
 
   PetscFunctionBeginUser;
   if (d->path.angle)
     PetscCall(SbFormulaEval(d->path.angle, t, NULL, &theta));
   theta *= PETSC_PI / 180;
-  half = PetscSinReal(theta / 2);
+  sine[0] = PetscSinReal(theta);
+  sine[1] = PetscSinReal(theta / 2);
   for (PetscInt i = 0, row = 0; i < d->n; i++) {
-    const PetscReal *X = &space->node_x[3 * d->node[i]];
-    PetscReal r[3], kr[3], kkr[3];
-
     while (space->fixed_node[row] != d->node[i])
       row++; /* both ascend, and it is among them */
-    SbSubtract(X, d->path.point, r);
-    SbCross(d->path.axis, r, kr);
-    SbCross(d->path.axis, kr, kkr);
-    for (int c = 0; c < 3; c++) {
-      PetscReal u = 0;
-
-      if (d->path.angle) {
-        PetscCall(SbFormulaEval(d->path.displacement[c], t, X, &u));
-        u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] + u;
-      }
+    PetscCall(displacement_at(d, t, &space->node_x[3 * d->node[i]], sine, u));
+    for (int c = 0; c < 3; c++)
       if (d->bits[i] & (1 << c))
-        space->fixed_value[3 * row + c] = u;
+        space->fixed_value[3 * row + c] = u[c];
+  }
+
+  // what an earlier effect has there
+  for (PetscInt i = 0, row = 0; d->watched && d->conflict < 0 && i < d->nlost; i++) {
+    while (space->fixed_node[row] != d->lost[i])
+      row++;
+    PetscCall(displacement_at(d, t, &space->node_x[3 * d->lost[i]], sine, u));
+    for (int c = 0; c < 3 && d->conflict < 0; c++) {
+      const PetscReal its = space->fixed_value[3 * row + c];
+
+      if (!(d->lost_bits[i] & (1 << c)) ||
+          PetscAbsReal(its - u[c]) <= 1e-9 * PetscMax(PetscAbsReal(its), PetscAbsReal(u[c])))
+        continue;
+      d->conflict = i;
+      d->component = c;
+      d->differ[0] = its;
+      d->differ[1] = u[c];
     }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Name of the first effect that prescribes a component of a node. */
+static const char *owner(PetscInt n, SbEffect effect[], PetscInt node, int component)
+{
+  for (PetscInt k = 0; k < n; k++) {
+    const Support *d = (const Support *)effect[k]->data;
+
+    for (PetscInt i = 0; i < d->n && effect[k]->ops.prescribe == prescribe_support; i++)
+      if (d->node[i] == node && d->bits[i] & (1 << component))
+        return effect[k]->name;
+  }
+  return "";
+}
+
+PetscErrorCode SbSupportsWarn(SbSpace space, PetscInt n, SbEffect effect[], PetscReal t)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < n; k++) {
+    Support *d = (Support *)effect[k]->data;
+    PetscMPIInt rank, lowest;
+    char text[512] = "";
+
+    if (effect[k]->ops.prescribe != prescribe_support || !d->watched)
+      continue;
+
+    // the lowest rank that has found a node describes it
+    PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
+    lowest = d->conflict >= 0 ? rank : INT32_MAX;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &lowest, 1, MPI_INT, MPI_MIN, space->comm));
+    if (lowest == INT32_MAX)
+      continue;
+    d->watched = PETSC_FALSE;
+    if (rank == lowest) {
+      const PetscInt node = d->lost[d->conflict];
+      const PetscReal *x = space->node_x + 3 * node;
+      const char *first = owner(n, effect, node, d->component);
+
+      (void)snprintf(text, sizeof(text),
+                     "effects %s and %s prescribe different displacements of one node, at (%.6g, "
+                     "%.6g, %.6g) m: %g and %g m in direction %c at t = %g; %s counts, which "
+                     "comes first: take such nodes out of the sets of one of them",
+                     first, effect[k]->name, (double)x[0], (double)x[1], (double)x[2],
+                     (double)d->differ[0], (double)d->differ[1], "xyz"[d->component], (double)t,
+                     first);
+    }
+    PetscCallMPI(MPI_Bcast(text, (int)sizeof(text), MPI_CHAR, lowest, space->comm));
+    PetscCall(SbWarning(space->comm, "%s", text));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -220,6 +320,7 @@ static PetscErrorCode destroy_support(SbEffect e)
   PetscFunctionBeginUser;
   PetscCall(PetscFree(d->node));
   PetscCall(PetscFree(d->bits));
+  PetscCall(PetscFree2(d->lost, d->lost_bits));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,9 +3,11 @@
   midpoints.
 
   x(l) = sum_a phi_a(l) x_a with the P2 basis (src/base/quadratic_map.c). The Jacobian of the map
-  must be positive: it is checked at the quadrature points and at the ten nodes. The volume is the
+  must be positive: it is checked at the quadrature points and at the ten nodes; edges of a tet
+  where it is not are made straight, as gmsh leaves some at curved surfaces. The volume is the
   integral of the Jacobian, a cubic polynomial.
 */
+#include <stdlib.h>
 #include "mesh_impl.h"
 
 static int compare(const void *a, const void *b)
@@ -86,70 +88,145 @@ PetscBool SbImportOffsets(const SbImport *im, int dim, const PetscInt v[], Petsc
   return curved;
 }
 
-/* Error of the first tet whose Jacobian is not positive, by its number in the file. */
-static PetscErrorCode refuse(const SbImport *im, int64_t number, PetscReal least, PetscInt nfolded)
+static int compare_keys(const void *a, const void *b)
 {
-  PetscFunctionBeginUser;
-  SETERRQ(
-    PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: tetrahedron %lld of second order folds over itself (tets that do: %lld): its least "
-    "Jacobian is %.3g "
-    "times that of the straight tet, and must be above 0; mesh finer there or let gmsh untangle it "
-    "(Mesh.HighOrderOptimize = 2), or save straight tets (Mesh.ElementOrder = 1)",
-    im->where, (long long)number, (long long)nfolded, (double)least);
+  const PetscInt64 p = *(const PetscInt64 *)a;
+  const PetscInt64 q = *(const PetscInt64 *)b;
+
+  return (p > q) - (p < q);
 }
 
-PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, uint64_t cell[],
-                             PetscReal **edge_off)
+/* Key of an edge, alike on all ranks. */
+static PetscInt64 edge_key(const SbImport *im, PetscBool alone, PetscInt a, PetscInt b)
 {
-  SbCaughtError caught = {0, ""};
-  PetscInt mine[2] = {0, 0}, n[2],
-           room = 0; /* curved cells; those whose Jacobian is not positive */
-  PetscReal least = 0;
-  PetscReal volume = 0;
-  int64_t number = 0;
+  if (alone)
+    return (PetscInt64)SbKeyOfPair(a, b);
+  return (PetscInt64)SbKeyOfPair((PetscInt)im->vert_number[a], (PetscInt)im->vert_number[b]);
+}
+
+PetscErrorCode SbImportStraighten(MPI_Comm comm, SbImport *im, SbStraightened *done)
+{
+  PetscMPIInt size;
+  PetscInt nfolded = 1;
 
   PetscFunctionBeginUser;
+  *done = (SbStraightened){.nedge = 0};
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+
+  // a straight edge changes all tets around it, which may fold then: until none does
+  while (nfolded) {
+    const PetscBool alone = (PetscBool)(size == 1);
+    PetscInt64 *key = NULL;
+    PetscInt64 *all = NULL;
+    PetscInt room = 0;
+    PetscInt n = 0;
+    PetscInt total;
+    PetscInt kept = 0;
+    PetscInt here;
+
+    nfolded = 0;
+    for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
+      const PetscInt *v = im->item[3].vert + 4 * c;
+      PetscReal off[18];
+
+      if (!SbImportOffsets(im, 3, v, off) || SbTetCurvedLeast(im->x, v, off) > 0)
+        continue;
+      if (!nfolded++ && !done->ntet) {
+        done->number = im->item[3].number[c];
+        for (int i = 0; i < 3; i++)
+          done->at[i] = (im->x[3 * v[0] + i] + im->x[3 * v[1] + i] + im->x[3 * v[2] + i] +
+                         im->x[3 * v[3] + i]) /
+                        4;
+      }
+      for (int e = 0; e < 6; e++) {
+        PetscCall(SbReserve(n + 1, sizeof(*key), &room, &key));
+        key[n++] = edge_key(im, alone, v[SbTetEdge[e][0]], v[SbTetEdge[e][1]]);
+      }
+    }
+
+    // the edges of all ranks; each drops those that it knows
+    done->ntet += nfolded;
+    if (alone) {
+      all = key;
+      total = n;
+    } else {
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nfolded, 1, MPIU_INT, MPI_SUM, comm));
+      PetscCall(SbAllgatherv(comm, MPIU_INT64, n, key, &total, &all, NULL));
+      PetscCall(PetscFree(key));
+    }
+    if (total)
+      qsort(all, (size_t)total, sizeof(*all), compare_keys);
+    for (PetscInt i = 0; i < im->nmiddle.n && total; i++) {
+      const PetscInt64 its = edge_key(im, alone, im->middle[i].end[0], im->middle[i].end[1]);
+
+      if (!bsearch(&its, all, (size_t)total, sizeof(its), compare_keys))
+        im->middle[kept++] = im->middle[i];
+    }
+    here = total ? im->nmiddle.n - kept : 0;
+    done->nedge += here;
+    im->nmiddle.n -= here;
+    PetscCall(PetscFree(all));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The note about edges made straight; the first tet is that of the lowest rank that has one. */
+static PetscErrorCode note_straightened(MPI_Comm comm, SbStraightened *s, SbBody *body)
+{
+  PetscMPIInt rank, lowest;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  lowest = s->ntet ? rank : PETSC_MPI_INT_MAX;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &lowest, 1, MPI_INT, MPI_MIN, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &s->ntet, 1, MPIU_INT, MPI_SUM, comm));
+  if (!s->ntet)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Bcast(&s->number, 1, MPI_INT64_T, lowest, comm));
+  PetscCallMPI(MPI_Bcast(s->at, 3, MPIU_REAL, lowest, comm));
+  SbAppend(sizeof(body->note), body->note,
+           "%stets that folded over themselves, with their edges made straight: %" PetscInt_FMT
+           " (the first: tetrahedron %lld at (%.4g, %.4g, %.4g) m)",
+           body->note[0] ? ", " : "", s->ntet, (long long)s->number, (double)s->at[0],
+           (double)s->at[1], (double)s->at[2]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportCurve(MPI_Comm comm, SbImport *im, SbBody *body, uint64_t cell[],
+                             PetscReal **edge_off)
+{
+  SbStraightened straightened = {0};
+  PetscInt n = 0;
+  PetscInt room = 0;
+  PetscReal volume = 0;
+
+  PetscFunctionBeginUser;
+  if (body->edge_nodes) {
+    PetscCall(SbImportStraighten(comm, im, &straightened));
+    PetscCall(note_straightened(comm, &straightened, body));
+  }
   for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
     const PetscInt *v = im->item[3].vert + 4 * c;
-    PetscReal off[18], smallest;
+    PetscReal off[18];
 
     if (!SbImportOffsets(im, 3, v, off))
       continue;
-    mine[0]++;
+    n++;
     if (!body->edge_nodes)
       continue;
-
-    // smallest Jacobian at quadrature points and nodes, and the change of volume relative to the
-    // straight tet
-    smallest = SbTetCurvedLeast(im->x, v, off);
-    if (!(smallest > 0) && !mine[1]++) {
-      number = im->item[3].number[c];
-      least = smallest;
-    }
     volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
     if (!cell)
       continue;
     cell[c] |= SB_CURVED;
-    PetscCall(SbReserve(mine[0], 18 * sizeof(PetscReal), &room, edge_off));
-    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(mine[0] - 1), off, 18));
+    PetscCall(SbReserve(n, 18 * sizeof(PetscReal), &room, edge_off));
+    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(n - 1), off, 18));
   }
-  PetscCallMPI(MPI_Allreduce(mine, n, 2, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, comm));
-  if (!n[0])
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (cell && mine[1])
-    SB_CATCH(&caught, refuse(im, number, least, n[1]));
-  PetscCall(SbCaughtRaise(comm, &caught));
   body->volume += volume;
   SbNoteCount(
     sizeof(body->note), body->note,
-    body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n[0]);
-  if (n[1])
-    SbAppend(sizeof(body->note), body->note,
-             ", folded over themselves, which p2 refuses: %" PetscInt_FMT
-             " (the first: tetrahedron %lld)",
-             n[1], (long long)number);
+    body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

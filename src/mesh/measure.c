@@ -80,12 +80,21 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   PetscReal sum = 0;
   SbImportEdges edges;
   SbImport tets;
+  SbTouching touching;
+  char text[512];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(facts, sizeof(*facts)));
   ierr = SbImportCheck(im, &faces);
   if (!ierr)
     ierr = SbImportQuality(im, &faces, &facts->body);
+  if (!ierr)
+    ierr = SbImportTouching(im, &faces, &touching);
+  if (!ierr && touching.n) {
+    SbTouchingText(&touching, "FILE", sizeof(text), text);
+    SbAppend(sizeof(facts->body.note), facts->body.note, "%s%s", facts->body.note[0] ? ", " : "",
+             text);
+  }
   facts->body.edge_nodes = PETSC_TRUE;
   if (!ierr)
     ierr = SbImportCurve(PETSC_COMM_SELF, im, &facts->body, NULL, NULL);

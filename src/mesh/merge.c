@@ -26,6 +26,8 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
     PetscCall(SbImportReadCopy(&body[b], b ? &body[b - 1] : NULL, shared, im));
   PetscCall(SbImportCheck(im, &part->faces));
   PetscCall(SbImportQuality(im, &part->faces, &body[b]));
+  if (!body[b].in_memory && strncmp(body[b].mesh, "box:", 4) != 0)
+    PetscCall(SbImportCheckTouching(im, &part->faces, &body[b]));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
   PetscCall(SbImportCurve(PETSC_COMM_SELF, im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));

@@ -36,6 +36,19 @@ PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], 
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
+/* touching.c: boundary facets that lie on each other without being one face */
+typedef struct {
+  PetscInt n, ndoubled; /* pairs; those whose corners are at the same positions, as two vertices */
+  PetscInt npart;       /* parts of the body that hang together by faces, when n > 0 */
+  int64_t number[2];    /* tets of the first pair, in the file */
+  PetscReal at[3];      /* its place, m */
+} SbTouching;
+PetscErrorCode SbImportTouching(const SbImport *import, const SbFaces *faces, SbTouching *touching);
+/* What they are and, with the file, what to do. */
+void SbTouchingText(const SbTouching *touching, const char *file, size_t size, char text[]);
+/* Warns of them. Error: the body falls apart with an element whose unknowns are at faces. Its
+   number of parts is known. */
+PetscErrorCode SbImportCheckTouching(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Size and shape of the cells of all ranks of comm: sets those of the "found" fields.
    Collective. */
 PetscErrorCode SbImportMeasure(MPI_Comm comm, const SbImport *import, const SbFaces *faces,
@@ -69,14 +82,23 @@ void SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], Pet
    Collective. */
 PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks,
                            PetscInt nset, SbSet set[]);
+/* curve.c: edges made straight because a tet of them folds over itself, on this rank */
+typedef struct {
+  PetscInt ntet, nedge;
+  int64_t number;  /* of the first tet, in the file */
+  PetscReal at[3]; /* its place, m */
+} SbStraightened;
+/* Makes edges straight until the Jacobian of each curved tet is positive. Cells are those of all
+   ranks of comm. Collective. */
+PetscErrorCode SbImportStraighten(MPI_Comm comm, SbImport *import, SbStraightened *done);
 /*
-  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the
-  body's volume; other elements get a note. The cells are those of all ranks of comm. Collective.
+  Marks cells with curved edges if the body's element has edge nodes, and corrects the body's
+  volume; other elements get a note. The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian
-  is not positive; with cell NULL such cells are counted in the note of the body.
+  Output: edge_off[][6][3] of the marked cells, NULL if there are none; the note of the body counts
+  those whose edges are made straight, as their Jacobian is not positive.
 */
-PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
+PetscErrorCode SbImportCurve(MPI_Comm comm, SbImport *import, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off);
 /* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1
    vertices; zero for straight and missing edges. Returns whether one is curved. Not collective. */

@@ -80,6 +80,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   SbItems *tri = &im->item[2];
   const PetscReal largest = SbImportLargest(im);
   PetscReal det, off;
+  SbStraightened straightened;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(done, sizeof(*done)));
@@ -130,6 +131,10 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
   PetscCall(SbImportMiddles(im, NULL, &off)); /* curved edges of the remaining tets */
+  PetscCall(SbImportStraighten(PETSC_COMM_SELF, im, &straightened));
+  done->nfolded = straightened.ntet;
+  done->folded = straightened.number;
+  PetscCall(PetscArraycpy(done->folded_at, straightened.at, 3));
   for (PetscInt v = 0; v < im->nvert; v++)
     im->vert_number[v] = v + 1;
   done->nitem = nitem - im->item[0].n - im->item[1].n - im->item[2].n;

@@ -15,7 +15,7 @@ PetscErrorCode SbDeckAddNode(SbDeck *d, int64_t label, PetscReal **x)
   PetscCheck(im->nvert < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has more nodes than this build can number", im->where);
   if (SbNumbersFind(&im->nodes, label) >= 0)
-    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)label, d->cure);
+    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", SbDeckShown(d, label), d->cure);
   PetscCall(SbNumbersAdd(&im->nodes, label));
   PetscCall(SbReserve(im->nvert + 1, 3 * sizeof(*im->x), &d->capacity[0], &im->x));
   PetscCall(SbReserve(im->nvert + 1, sizeof(*im->vert_number), &d->capacity[1], &im->vert_number));
@@ -29,7 +29,7 @@ PetscErrorCode SbDeckAddElement(SbDeck *d, const SbDeckElement *element)
 {
   PetscFunctionBeginUser;
   if (d->unique && SbNumbersFind(&d->im->elements, element->label) >= 0)
-    SB_SCAN_ERROR(&d->im->scan, "element %lld is given twice; %s", (long long)element->label,
+    SB_SCAN_ERROR(&d->im->scan, "element %lld is given twice; %s", SbDeckShown(d, element->label),
                   d->cure);
   PetscCall(SbNumbersAdd(&d->im->elements, element->label));
   d->im->count[element->type]++;
@@ -86,7 +86,7 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
   /* nested sets could multiply the members of a damaged file: limit the number */
   im->scan.token = r->at;
   d->nlooked += n;
-  if (d->nlooked > 64 * (int64_t)(im->scan.end - im->scan.data))
+  if (d->nlooked > 64 * PetscSqr(PetscMax(d->nscope, 1)) * (int64_t)(im->scan.end - im->scan.data))
     SB_SCAN_ERROR(
       &im->scan,
       "the sets have more than %lld members, more than a file of this size can mean; it is damaged",
@@ -168,12 +168,12 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
       if (v < 0 &&
           (k < 4 || element->node[k] || d->strict)) // Nastran may omit nodes of straight edges
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there",
-                      (long long)element->label, (long long)element->node[k]);
+                      SbDeckShown(d, element->label), SbDeckShown(d, element->node[k]));
     }
     if (element->property >= 0)
       PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
     element->item = im->item[dim].n;
-    PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
+    PetscCall(SbImportAddItem(im, dim, vert, tags, SbDeckShown(d, element->label)));
     if (ten)
       PetscCall(SbImportAddMiddles(im, vert));
   }
@@ -194,7 +194,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
           continue;
       } else if (point[at] < 0) {
         point[at] = im->item[0].n;
-        PetscCall(SbImportAddItem(im, 0, &at, 0, im->vert_number[at]));
+        PetscCall(SbImportAddItem(im, 0, &at, 0, SbDeckShown(d, im->vert_number[at])));
       }
       PetscCall(SbImportGroup(im, dim, SB_DECK_TAG + s, d->set[s].name, &group));
       PetscCall(SbImportAddMember(im, dim, dim ? d->element[at].item : point[at], group));

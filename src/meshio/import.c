@@ -81,18 +81,79 @@ static const struct {
   const char *extension;
   SbReader read;
 } readers[] = {
-  {".msh", SbImportRead_Gmsh},     {".vtk", SbImportRead_VTK},
-  {".vtu", SbImportRead_VTU},      {".mesh", SbImportRead_Medit},
-  {".node", SbImportRead_TetGen},  {".ele", SbImportRead_TetGen},
-  {".face", SbImportRead_TetGen},  {".edge", SbImportRead_TetGen},
-  {".vol", SbImportRead_Netgen},   {".neu", SbImportRead_NetgenNeutral},
-  {".inp", SbImportRead_Abaqus},   {".unv", SbImportRead_UNV},
-  {".bdf", SbImportRead_Nastran},  {".nas", SbImportRead_Nastran},
-  {".stl", SbImportRead_Surface},  {".obj", SbImportRead_Surface},
-  {".off", SbImportRead_Surface},  {".ply", SbImportRead_Surface},
-  {".h5", SbImportRead_H5},        {".xmf", SbImportRead_Xdmf},
-  {".poly", SbImportRead_Surface}, {".smesh", SbImportRead_Surface},
+  {".msh", SbImportRead_Gmsh},      {".vtk", SbImportRead_VTK},
+  {".vtu", SbImportRead_VTU},       {".mesh", SbImportRead_Medit},
+  {".node", SbImportRead_TetGen},   {".ele", SbImportRead_TetGen},
+  {".face", SbImportRead_TetGen},   {".edge", SbImportRead_TetGen},
+  {".vol", SbImportRead_Netgen},    {".neu", SbImportRead_NetgenNeutral},
+  {".inp", SbImportRead_Abaqus},    {".unv", SbImportRead_UNV},
+  {".bdf", SbImportRead_Nastran},   {".nas", SbImportRead_Nastran},
+  {".fem", SbImportRead_Nastran},   {".stl", SbImportRead_Surface},
+  {".obj", SbImportRead_Surface},   {".off", SbImportRead_Surface},
+  {".ply", SbImportRead_Surface},   {".h5", SbImportRead_H5},
+  {".xmf", SbImportRead_Xdmf},      {".poly", SbImportRead_Surface},
+  {".smesh", SbImportRead_Surface},
 };
+
+/* What the first lines of a file say of its format, whatever its name: the reader, or none. */
+static const struct {
+  const char *text, *kind;
+  PetscBool anywhere; /* not only at the beginning */
+  SbReader read;
+} contents[] = {
+  {"$MeshFormat", "gmsh", PETSC_FALSE, SbImportRead_Gmsh},
+  {"$NOD", "gmsh", PETSC_FALSE, SbImportRead_Gmsh},
+  {"# vtk DataFile", "VTK (legacy)", PETSC_FALSE, SbImportRead_VTK},
+  {"type=\"UnstructuredGrid\"", "VTK (XML)", PETSC_TRUE, SbImportRead_VTU},
+  {"MeshVersionFormatted", "Medit", PETSC_FALSE, SbImportRead_Medit},
+  {"mesh3d", "Netgen", PETSC_FALSE, SbImportRead_Netgen},
+  {"\x89HDF\r\n", "HDF5", PETSC_FALSE, SbImportRead_H5},
+  {"<Xdmf", "XDMF", PETSC_TRUE, SbImportRead_Xdmf},
+  {"CONTROL INFO", "GAMBIT (neutral file)", PETSC_FALSE, NULL},
+  {"CDF\x01", "netCDF (Exodus)", PETSC_FALSE, NULL},
+  {"CDF\x02", "netCDF (Exodus)", PETSC_FALSE, NULL},
+  {"\x1f\x8b", "gzip (unpack it)", PETSC_FALSE, NULL},
+  {"PK\x03\x04", "zip (unpack it)", PETSC_FALSE, NULL},
+  {"<febio_spec", "FEBio", PETSC_TRUE, NULL},
+  {"ISO-10303-21", "STEP (geometry)", PETSC_FALSE, NULL},
+};
+
+/* Contents beat the ending of the name. */
+static PetscErrorCode check_contents(const SbBody *body, SbImport *im, SbReader *read)
+{
+  char text[1024];
+  const char *begin = text;
+  FILE *file;
+  size_t n;
+
+  PetscFunctionBeginUser;
+  if (SbFileOpen(body->mesh, 0, &file) || !file)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  n = fread(text, 1, sizeof(text) - 1, file);
+  (void)fclose(file);
+  text[n] = 0;
+  if (!strncmp(begin, "\xef\xbb\xbf", 3))
+    begin += 3;
+  begin += strspn(begin, " \t\r\n");
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(contents); i++) {
+    const char *found =
+      contents[i].anywhere && *begin == '<' ? strstr(begin, contents[i].text) : NULL;
+
+    if (!found &&
+        (contents[i].anywhere || strncmp(begin, contents[i].text, strlen(contents[i].text)) != 0))
+      continue;
+    PetscCheck(contents[i].read, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s: is a file of %s, which supple does not read; convert it to .msh, .vtu or .inp "
+               "(gmsh, meshio)",
+               im->where, contents[i].kind);
+    if (*read == contents[i].read)
+      break;
+    SbImportRemark(im, "read as a file of %s, which it is in spite of its name", contents[i].kind);
+    *read = contents[i].read;
+    break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Sets the inputs of a reader from the body. */
 static PetscErrorCode begin(const SbBody *body, SbImport *im)
@@ -138,13 +199,17 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
     "%s: '%s' is a mesh of no known kind; give a file that ends in %s (or the name of TetGen's "
     "files without an ending), or box:lx,ly,lz:n",
     im->where, body->mesh, known);
-  PetscCall((read ? read : SbImportRead_TetGen)(body->mesh, im));
+  if (!read)
+    read = SbImportRead_TetGen;
+  if (read != SbImportRead_Box && read != SbImportRead_TetGen)
+    PetscCall(check_contents(body, im, &read));
+  PetscCall((*read)(body->mesh, im));
   given = im->nmiddle.n;
   PetscCall(SbImportMiddles(im, NULL, &largest));
   SbImportNoteMiddles(im, im->nmiddle.n, largest);
   if (given && !im->nmiddle.n && !body->name[0])
-    PetscCall(PetscStrncpy(im->note, "straight tets of second order, taken as those of first order",
-                           sizeof(im->note)));
+    SbImportRemark(im, "straight tets of second order, taken as those of first order");
+  SbImportNoteSkipped(im);
   PetscCall(SbImportForget(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,8 +22,15 @@ typedef struct {
   SbImport *im;
   int version; /* file version: 1, 2, 40 or 41 */
   PetscBool binary;
+  PetscBool parametric;    /* section $ParametricNodes of version 2 */
+  PetscBool entities_read; /* $Entities is read */
   PetscInt nentity;
   Entity *entity; /* [nentity] */
+  SbCount nname;
+  struct {
+    int64_t tag;
+    char name[SB_GROUP_MAX];
+  } * name; /* [nname] names of version 2.0, which say no dimension */
 } Gmsh;
 
 static PetscErrorCode read_format(Gmsh *g)
@@ -79,6 +86,14 @@ static PetscErrorCode read_names(Gmsh *g)
   PetscCall(SbScanCount(s, "physical names", 6, 6, &n));
   for (int64_t i = 0; i < n; i++) {
     PetscCall(SbScanText(s, "dimension of a physical name", &dim));
+    SbScanNext(s);
+    if (s->at < s->end && *s->at == '"' && g->version == 2) {
+      PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(name), name));
+      PetscCall(SbImportGrow(g->im, &g->nname, sizeof(*g->name), &g->name));
+      g->name[g->nname.n - 1].tag = dim;
+      (void)snprintf(g->name[g->nname.n - 1].name, sizeof(name), "%s", name);
+      continue;
+    }
     if (dim < 0 || dim > 3)
       SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
     PetscCall(SbScanText(s, "number of a physical name", &tag));
@@ -99,8 +114,9 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscReal box;
 
   PetscFunctionBeginUser;
-  if (g->entity)
+  if (g->entities_read)
     SB_SCAN_ERROR(s, "second section $Entities");
+  g->entities_read = PETSC_TRUE;
   for (int d = 0; d < 4; d++) {
     PetscCall(SbScanCount(s, "entities", 10, 28, &count[d]));
     total += count[d];
@@ -180,7 +196,7 @@ static PetscErrorCode read_nodes(Gmsh *g)
   SbScan *s = &im->scan;
   int64_t nblock, n;
   int64_t dim = 0;
-  int64_t tag;
+  int64_t tag = 0;
   int64_t parametric = 0;
   PetscInt v = 0;
   PetscReal parameter;
@@ -209,7 +225,17 @@ static PetscErrorCode read_nodes(Gmsh *g)
                       (long long)im->vert_number[v]);
       PetscCall(SbNumbersAdd(&im->nodes, im->vert_number[v]));
       PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
-      for (int k = 0; parametric && k < dim; k++)
+      for (int k = 0; g->parametric && k < 2; k++) // the entity of the node
+        PetscCall(SbScanInt(s, 4, "entity of a node", k ? &tag : &dim));
+      if (g->parametric) {
+        parametric = dim < 3;
+        if (dim < 0 || dim > 3)
+          SB_SCAN_ERROR(s, "dimension %lld of the entity of a node; expected 0 to 3",
+                        (long long)dim);
+      }
+      if (g->parametric && !s->binary)
+        SbScanEndOfLine(s);
+      for (int k = 0; parametric && k < dim && !(g->parametric && !s->binary); k++)
         PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
     }
   }
@@ -343,7 +369,8 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   else if (strcmp(name, "$MeshFormat"))
     SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
   while (name[0]) {
-    const PetscBool nodes = (PetscBool)!strcmp(name, g.version == 1 ? "$NOD" : "$Nodes");
+    const PetscBool old = (PetscBool)(g.version == 2 && !strcmp(name, "$ParametricNodes"));
+    const PetscBool nodes = (PetscBool)(old || !strcmp(name, g.version == 1 ? "$NOD" : "$Nodes"));
     const PetscBool elements = (PetscBool)!strcmp(name, g.version == 1 ? "$ELM" : "$Elements");
 
     // a section, read or skipped, then its end marker
@@ -354,7 +381,21 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
       PetscCall(read_format(&g));
     else if (!strcmp(name, "$PhysicalNames"))
       PetscCall(read_names(&g));
-    else if (nodes || elements || !strcmp(name, "$Entities")) {
+    else if (nodes || elements || (!strcmp(name, "$Entities") && !g.entities_read)) {
+      g.parametric = old;
+      if (elements && g.version > 2 && !g.entities_read) {
+        // the groups of the elements, where that section stands behind them
+        const char *at = s->at;
+
+        if (SbScanFind(s, "\n$Entities")) {
+          s->at += sizeof("\n$Entities") - 1;
+          SbScanEndOfLine(s);
+          s->binary = g.binary;
+          PetscCall(read_entities(&g));
+          s->binary = PETSC_FALSE;
+        }
+        s->at = at;
+      }
       SbScanEndOfLine(s);
       s->binary = g.binary;
       if (elements && !im->x)
@@ -383,6 +424,9 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", im->where);
   PetscCall(SbImportCheckTypes(im));
+  for (PetscInt k = 0; k < g.nname.n; k++)
+    for (PetscInt dim = 0; dim < 4; dim++)
+      SbImportNameGroup(im, dim, g.name[k].tag, g.name[k].name);
 
   // merge repeated elements of several groups; duplicates in one group are left for check.c
   if (g.version <= 2 && im->ngroup > 1)

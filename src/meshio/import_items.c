@@ -5,6 +5,7 @@
   An entity of a file may belong to several physical groups. Each distinct set of groups is stored
   once (a "tag set"), and items refer to it by number; set 0 is the empty set.
 */
+#include <stdarg.h>
 #include "meshio_impl.h"
 
 #define STRAIGHT 1e-6 /* offset of the node of a straight edge over its length, at most */
@@ -47,6 +48,7 @@ PetscErrorCode SbImportForget(SbImport *im)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree(im->scan.data));
+  im->scan.npiece = 0;
   PetscCall(SbNumbersDestroy(&im->nodes));
   PetscCall(SbNumbersDestroy(&im->elements));
   while (im->scratch) {
@@ -57,6 +59,8 @@ PetscErrorCode SbImportForget(SbImport *im)
   }
   im->member = NULL;
   im->nmember = (SbCount){0, 0};
+  im->skipped = NULL;
+  im->nskipped = (SbCount){0, 0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -350,9 +354,55 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *large
 void SbImportNoteMiddles(SbImport *im, PetscInt n, PetscReal largest)
 {
   if (n)
-    (void)snprintf(im->note, sizeof(im->note),
+    SbImportRemark(im,
                    "edges with their node off the middle: %lld, by %.2g of their length at most",
                    (long long)n, (double)largest);
+}
+
+void SbImportRemark(SbImport *im, const char *format, ...)
+{
+  char text[sizeof(im->note)];
+  va_list arguments;
+
+  va_start(arguments, format);
+  (void)vsnprintf(text, sizeof(text), format, arguments);
+  va_end(arguments);
+  SbAppend(sizeof(im->note), im->note, "%s%s", im->note[0] ? ", " : "", text);
+}
+
+PetscErrorCode SbImportSkip(SbImport *im, const char *format, ...)
+{
+  char name[SB_NAME_MAX];
+  va_list arguments;
+  PetscInt k = 0;
+
+  PetscFunctionBeginUser;
+  va_start(arguments, format);
+  (void)vsnprintf(name, sizeof(name), format, arguments);
+  va_end(arguments);
+  SbCleanName(name, '?');
+  while (k < im->nskipped.n && strcmp(im->skipped[k].name, name) != 0)
+    k++;
+
+  // a note names few kinds, what is left counts together
+  if (k == im->nskipped.n && k < 8) {
+    PetscCall(SbImportGrow(im, &im->nskipped, sizeof(*im->skipped), &im->skipped));
+    (void)snprintf(im->skipped[k].name, sizeof(name), "%s", name);
+    im->skipped[k].n = 0;
+  } else if (k == im->nskipped.n) {
+    (void)snprintf(im->skipped[--k].name, sizeof(name), "others");
+  }
+  im->skipped[k].n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbImportNoteSkipped(SbImport *im)
+{
+  if (im->nskipped.n)
+    SbImportRemark(im, "not needed and left out: ");
+  for (PetscInt k = 0; k < im->nskipped.n; k++)
+    SbAppend(sizeof(im->note), im->note, "%s%s (%lld)", k ? ", " : "", im->skipped[k].name,
+             (long long)im->skipped[k].n);
 }
 
 /* Number of a group among those of all dimensions. */

@@ -49,6 +49,9 @@ static PetscErrorCode read_elements(SbImport *im, int type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sections of volume elements of other kinds or orders begin with these words. */
+static const char *const solids[] = {"Tetrahedra", "Hexahedra", "Prism", "Pyramid", "Polyhedra"};
+
 PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -72,12 +75,18 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit",
                   word);
   for (;;) {
+    PetscBool known = PETSC_FALSE;
+
     // skip other sections: go to the next word that is not a number
     for (SbScanNext(s); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s))
       while (s->at < s->end && !isspace((unsigned char)*s->at))
         s->at++;
-    if (!SbScanWord(s, sizeof(word), word))
-      SB_SCAN_ENDS(s, "a section, or '%s',", "End");
+    if (!SbScanWord(s, sizeof(word), word)) {
+      if (!im->x)
+        SB_SCAN_ENDS(s, "the section '%s'", "Vertices");
+      SbImportRemark(im, "the file has no End, and may be truncated");
+      break;
+    }
     if (!strcmp(word, "End"))
       break;
 
@@ -97,9 +106,15 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       if (dimension != 3)
         SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
     }
-    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++)
-      if (!strcmp(word, elements[i].word))
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements) && !known; i++) {
+      known = (PetscBool)!strcmp(word, elements[i].word);
+      if (known)
         PetscCall(read_elements(im, elements[i].type));
+    }
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solids) && !known; i++)
+      if (!strncmp(word, solids[i], strlen(solids[i])))
+        SB_SCAN_ERROR(s, "section %s; supple reads Tetrahedra, and TetrahedraP2 in Medit's order",
+                      word);
   }
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -57,6 +57,13 @@ static PetscErrorCode read_element(SbDeck *d)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++)
     if (types[i].id == head[1])
       e.type = types[i].type;
+  if (e.type && SbGmshTypes[e.type].dim == 1 && (n == 2 || n == 3))
+    e.type = n == 2 ? SB_GMSH_LINE : SB_GMSH_LINE3; // Salome writes quadratic beams as kind 22
+  if (!e.type && head[1] > 100 && head[1] < 120)
+    SB_SCAN_ERROR(s, "element %lld of kind %lld; supple simulates tetrahedra of kind 111 and 118",
+                  (long long)e.label, (long long)head[1]);
+  if (!e.type)
+    PetscCall(SbImportSkip(d->im, "elements of kind %lld", (long long)head[1]));
   if (e.type && SbGmshTypes[e.type].nnode != n)
     SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)e.label,
                   (long long)head[1], (long long)n, SbGmshTypes[e.type].nnode);
@@ -114,25 +121,71 @@ static PetscErrorCode read_group(SbDeck *d, int nvalue)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
+/* Data set 2420: systems of coordinates. One that is not the global one is refused once a node
+   uses it. */
+static PetscErrorCode read_systems(SbDeck *d, SbNumbers *local)
 {
-  SbScan *s = &im->scan;
-  SbDeck d = {.im = im, .cure = "renumber the nodes", .compare = strcmp, .strict = PETSC_TRUE};
+  SbScan *s = &d->im->scan;
+  int64_t label, kind, other;
+  PetscReal x;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(im->where, path, s));
+  SbScanEndOfLine(s); /* part */
+  SbScanEndOfLine(s); /* its name */
+  while (s->at < s->end && !is_mark(s)) {
+    PetscBool global;
+
+    PetscCall(SbScanText(s, "number of a coordinate system", &label));
+    PetscCall(SbScanText(s, "kind of a coordinate system", &kind));
+    PetscCall(SbScanText(s, "colour of a coordinate system", &other));
+    SbScanEndOfLine(s);
+    SbScanEndOfLine(s); /* its name */
+    global = (PetscBool)!kind;
+    for (int i = 0; i < 12; i++) {
+      PetscCall(SbScanReal(s, "number of a coordinate system", 0, &x));
+      global = (PetscBool)(global && PetscAbsReal(x - (i < 9 && i % 4 == 0)) < 1e-12);
+    }
+    SbScanEndOfLine(s);
+    if (!global)
+      PetscCall(SbNumbersAdd(local, label));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the data sets; the numbers of `local` are the caller's to free. */
+static PetscErrorCode read_sets(SbDeck *d, SbNumbers *local)
+{
+  static const int64_t refused[] = {71, 780};
+  SbImport *im = d->im;
+  SbScan *s = &im->scan;
+  int nset = 0;
+
+  PetscFunctionBeginUser;
   for (SbScanNext(s); s->at < s->end; SbScanNext(s)) {
     int64_t id;
 
     while (s->at > s->data && s->at[-1] != '\n')
       s->at--; /* back to the beginning of the line */
-    if (!is_mark(s))
+    if (!is_mark(s) && !nset)
       SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
+    if (!is_mark(s)) {
+      SbScanEndOfLine(s); /* text between data sets */
+      continue;
+    }
+    nset++;
     SbScanEndOfLine(s);
 
     // a data set: its number, then its records
     PetscCall(SbScanText(s, "number of a data set", &id));
     SbScanEndOfLine(s);
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(refused); i++)
+      if (id == refused[i])
+        SB_SCAN_ERROR(s, "data set %lld, of old files, holds elements; write them as data set 2412",
+                      (long long)id);
+    if (id == 752 || id == 2417)
+      PetscCall(SbImportSkip(im, "groups of data set %lld", (long long)id));
+    if (id == 2420)
+      PetscCall(read_systems(d, local));
     if (id == 2412 && !im->nvert)
       SB_SCAN_ERROR(s, "elements before the nodes");
     for (;;) {
@@ -151,21 +204,42 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
         PetscReal *x;
 
         PetscCall(SbScanText(s, "label of a node", &label));
-        PetscCall(SbDeckAddNode(&d, label, &x));
-        for (int i = 0; i < 3; i++)
+        PetscCall(SbDeckAddNode(d, label, &x));
+        for (int i = 0; i < 3; i++) {
           PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
+          if (!i && SbNumbersFind(local, other) >= 0)
+            SB_SCAN_ERROR(s,
+                          "node %lld is given in coordinate system %lld, which is not the global "
+                          "one; write all nodes in that",
+                          (long long)label, (long long)other);
+        }
         PetscCall(SbScanPoint(s, "coordinate", label, x));
       }
       if (id == 2412)
-        PetscCall(read_element(&d));
+        PetscCall(read_element(d));
       if (id == 2429 || id == 2430 || id == 2432)
-        PetscCall(read_group(&d, 2));
+        PetscCall(read_group(d, 2));
       if (id == 2435 || id == 2452 || id == 2467 || id == 2477)
-        PetscCall(read_group(&d, 4));
+        PetscCall(read_group(d, 4));
       SbScanEndOfLine(s); /* other data sets are skipped */
     }
     SbScanEndOfLine(s);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
+{
+  SbScan *s = &im->scan;
+  SbDeck d = {.im = im, .cure = "renumber the nodes", .compare = strcmp, .strict = PETSC_TRUE};
+  SbNumbers local = {0};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(im->where, path, s));
+  ierr = read_sets(&d, &local);
+  PetscCall(SbNumbersDestroy(&local));
+  PetscCall(ierr);
   if (!im->nvert)
     SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
   PetscCall(SbDeckBuild(&d));

@@ -108,6 +108,85 @@ static PetscErrorCode read_cells(Vtk *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Skips n values of a kind that a mesh does not need: bits, or text (a line each; in binary with
+   its length before it). */
+static PetscErrorCode skip_values(Vtk *v, const char *kind, int64_t n)
+{
+  SbScan *s = v->scan;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanRoom(s, "values of an array", n, 1, 1));
+  SbScanEndOfLine(s);
+  if (!strcasecmp(kind, "bit") && s->bytes) {
+    if (s->end - s->at < (n + 7) / 8)
+      SB_SCAN_ENDS(s, "the %s", "bits");
+    s->at += (n + 7) / 8;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (int64_t i = 0; i < n; i++) {
+    const unsigned char *p = (const unsigned char *)s->at;
+    int more;
+    uint64_t length;
+
+    s->token = s->at;
+    if (s->at >= s->end)
+      SB_SCAN_ENDS(s, "a value of type %s", kind);
+    if (!strcasecmp(kind, "bit")) {
+      PetscReal bit;
+
+      PetscCall(SbScanReal(s, "bit", 0, &bit));
+      continue;
+    }
+    if (!s->bytes) {
+      SbScanEndOfLine(s);
+      continue;
+    }
+
+    // the two highest bits say in how many bytes the length stands
+    more = 3 - (p[0] >> 6);
+    if (more > 1)
+      more = more == 3 ? 7 : 3;
+    if (s->end - s->at < 1 + more)
+      SB_SCAN_ENDS(s, "the %s", "length of a text");
+    length = p[0] & 0x3f;
+    for (int k = 1; k <= more; k++)
+      length = length << 8 | p[k];
+    s->at += 1 + more;
+    if (length > (uint64_t)(s->end - s->at))
+      SB_SCAN_ENDS(s, "the %s", "text");
+    s->at += length;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the type of an array; one of bits or text is skipped, with its values, and type.size is
+   0. */
+static PetscErrorCode take_type(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple,
+                                SbNumberType *type)
+{
+  static const char *const others[] = {"bit", "string", "utf8_string", "variant"};
+  SbScan *s = v->scan;
+  const char *at = s->at;
+  char word[32];
+
+  PetscFunctionBeginUser;
+  type->size = 0;
+  (void)SbScanWord(s, sizeof(word), word);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
+    if (strcasecmp(word, others[i]) != 0)
+      continue;
+    if (ncomponent < 0 || ncomponent > 1024 || ntuple < 0 || ntuple > PETSC_MAX_INT)
+      SB_SCAN_ERROR(s, "array '%s' of %lld components and %lld tuples", name, (long long)ncomponent,
+                    (long long)ntuple);
+    PetscCall(SbImportSkip(v->im, "array %.32s of type %s", name, others[i]));
+    PetscCall(skip_values(v, word, ncomponent * ntuple));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  s->at = at;
+  PetscCall(SbScanType(s, type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Reads an array of `ncomponent` numbers per tuple; kept if it has one number per cell. */
 static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple,
                                 SbNumberType type)
@@ -138,7 +217,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   SbScan *s = v->scan;
   const PetscBool on_cells = (PetscBool)!strcasecmp(section, "CELL_DATA");
   SbNumberType type;
-  char name[SB_NAME_MAX], word[32];
+  const PetscBool kept = v->on_cells;
+  char name[SB_NAME_MAX], word[32], kind[32];
   double *x = NULL;
   int64_t n;
   int64_t ncomponent = 1;
@@ -175,10 +255,11 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     v->on_cells = on_cells;
   } else if (!strcasecmp(section, "SCALARS")) {
     // SCALARS name type [components] / LOOKUP_TABLE name / numbers
-    const char *at;
+    const char *at, *type_at, *values_at;
 
     (void)SbScanWord(s, sizeof(name), name);
-    PetscCall(SbScanType(s, &type));
+    type_at = s->at;
+    (void)SbScanWord(s, sizeof(kind), kind);
     if (SbScanMore(s, '\n'))
       PetscCall(SbScanText(s, "number of components", &ncomponent));
     at = s->at;
@@ -187,6 +268,15 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       s->at = at;
     else
       (void)SbScanWord(s, sizeof(word), word);
+    values_at = s->at;
+    if (!strcasecmp(kind, "bit")) {
+      PetscCall(SbImportSkip(v->im, "array %.32s of type %s", name, "bit"));
+      PetscCall(skip_values(v, kind, PetscMin(PetscMax(ncomponent, 0), 1024) * v->ntuple));
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    s->at = type_at;
+    PetscCall(SbScanType(s, &type));
+    s->at = values_at;
     PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
   } else if (!strcasecmp(section, "FIELD")) {
     // FIELD name n, then n times: name components tuples type / numbers
@@ -202,9 +292,35 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       }
       PetscCall(SbScanText(s, "number of components", &ncomponent));
       PetscCall(SbScanText(s, "number of tuples", &ntuple));
-      PetscCall(SbScanType(s, &type));
-      PetscCall(read_data(v, name, ncomponent, ntuple, type));
+      PetscCall(take_type(v, name, ncomponent, ntuple, &type));
+      if (type.size)
+        PetscCall(read_data(v, name, ncomponent, ntuple, type));
     }
+  } else if (!strcasecmp(section, "COLOR_SCALARS")) {
+    // numbers from 0 to 1, in binary a byte each
+    (void)SbScanWord(s, sizeof(name), name);
+    PetscCall(SbScanText(s, "number of components", &ncomponent));
+    PetscCall(SbImportSkip(v->im, "%s %.32s", "COLOR_SCALARS", name));
+    v->on_cells = PETSC_FALSE;
+    PetscCall(read_data(v, name, ncomponent, v->ntuple, (SbNumberType){'u', 1}));
+    v->on_cells = kept;
+  } else if (!strcasecmp(section, "TEXTURE_COORDINATES")) {
+    (void)SbScanWord(s, sizeof(name), name);
+    PetscCall(SbScanText(s, "number of components", &ncomponent));
+    PetscCall(SbScanType(s, &type));
+    PetscCall(SbImportSkip(v->im, "%s %.32s", section, name));
+    v->on_cells = PETSC_FALSE;
+    PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
+    v->on_cells = kept;
+  } else if (!strcasecmp(section, "GLOBAL_IDS") || !strcasecmp(section, "PEDIGREE_IDS") ||
+             !strcasecmp(section, "EDGE_FLAGS")) {
+    (void)SbScanWord(s, sizeof(name), name);
+    PetscCall(SbImportSkip(v->im, "%s %.32s", section, name));
+    v->on_cells = PETSC_FALSE;
+    PetscCall(take_type(v, name, 1, v->ntuple, &type));
+    if (type.size)
+      PetscCall(read_data(v, name, 1, v->ntuple, type));
+    v->on_cells = kept;
   } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
     // 4 bytes or 4 numbers per entry
     (void)SbScanWord(s, sizeof(name), name);

@@ -79,8 +79,9 @@ static void attribute(Tag tag, const char *name, size_t size, char value[])
     if (q >= tag.close || (*q != '"' && *q != '\''))
       continue;
     for (quote = q++; q < tag.close && *q != *quote && length + 1 < size; q++)
-      value[length++] = isprint((unsigned char)*q) ? *q : '?';
+      value[length++] = *q;
     value[length] = 0;
+    SbCleanName(value, '?');
     return;
   }
 }
@@ -331,7 +332,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   double *x = NULL;
   double last;
   SbVtkGrid *grid = &v->grid;
-  char value[64];
+  char value[64], found[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -413,6 +414,12 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
       attribute(tag, "NumberOfComponents", sizeof(value), value);
       if (value[0] && strcmp(value, "1") != 0)
         continue;
+      attribute(tag, "type", sizeof(value), value);
+      if (!strcmp(value, "String") || !strcmp(value, "Bit")) {
+        attribute(tag, "Name", sizeof(found), found);
+        PetscCall(SbImportSkip(im, "array %.32s of type %.8s", found, value));
+        continue;
+      }
       grid->narray++;
       attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
       PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));

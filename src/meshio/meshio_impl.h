@@ -115,6 +115,8 @@ typedef struct {
   const char *cure;             /* advice in the message about a duplicate label */
   PetscBool unique;             /* duplicate element labels are an error too */
   PetscBool strict;             /* undefined nodes of sets and tets are an error */
+  int64_t mask;   /* bits of a label that the file gives, 0: all; above is what it counts in */
+  int64_t nscope; /* parts of the file in which labels count */
   SbCount nelement, nset, nfound;
   PetscInt capacity[2];   /* of im->x, im->vert_number */
   SbDeckElement *element; /* [nelement] */
@@ -127,6 +129,11 @@ typedef struct {
 #define SB_DECK_TAG \
   ((int64_t)1 << 40) /* number of the group of set 0, larger than any property number */
 
+/* A label as the file gives it, for messages. */
+static inline long long SbDeckShown(const SbDeck *deck, int64_t label)
+{
+  return (long long)(deck->mask ? label & deck->mask : label);
+}
 /* Adds a node to `im`; the caller sets its coordinates, which are 0. */
 PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);
 PetscErrorCode SbDeckAddElement(SbDeck *deck, const SbDeckElement *element);
@@ -186,6 +193,8 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 
 /* Opens a regular file and returns its size; an error describes the problem. */
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);
+/* Replaces each byte of a name that belongs to no printable letter of UTF-8. */
+void SbCleanName(char name[], char instead);
 /* Moves to the beginning of a text; false if it does not occur. */
 PetscBool SbScanFind(SbScan *scan, const char *text);
 

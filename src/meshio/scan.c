@@ -51,6 +51,11 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   }
   s->at = s->token = s->data;
   s->end = s->data + got;
+
+  /* lines of old Macintosh programs end with a carriage return alone */
+  if (!memchr(s->data, '\n', got) && !memchr(s->data, 0, got))
+    for (char *p = s->data; p < s->end; p++)
+      *p = *p == '\r' ? '\n' : *p;
   PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ,
              "%s: only %zu of %zu bytes could be read", where, got, size);
   PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
@@ -58,14 +63,53 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Piece of the last token; NULL: there are none. */
+static const SbScanPiece *piece_of(const SbScan *s)
+{
+  PetscInt k = s->npiece - 1;
+
+  while (k > 0 && s->data + s->piece[k].at > s->token)
+    k--;
+  return k < 0 ? NULL : &s->piece[k];
+}
+
+const char *SbScanWhere(const SbScan *s)
+{
+  const SbScanPiece *piece = piece_of(s);
+
+  return piece ? piece->where : s->where;
+}
+
 const char *SbScanPosition(const SbScan *s, char position[64])
 {
-  size_t n = 1;
+  const SbScanPiece *piece = piece_of(s);
+  size_t n = piece ? piece->line : 1;
 
-  for (const char *p = s->data; p < s->token; p++)
-    n += s->bytes || *p == '\n';
+  for (const char *p = s->data + (piece ? piece->at : 0); p < s->token; p++)
+    n += s->bytes || *p == '\n' || *p == '\v'; /* a vertical tabulator joins two lines */
   (void)snprintf(position, 64, "%s %zu", s->bytes ? "byte" : "line", n);
   return position;
+}
+
+void SbCleanName(char name[], char instead)
+{
+  for (unsigned char *p = (unsigned char *)name; *p;) {
+    int more = -1; /* bytes of a letter of UTF-8 behind its first one; -1: no letter */
+    int k = 0;
+
+    if (*p < 0x80 && isprint(*p))
+      more = 0;
+    else if (*p >= 0xc2 && *p < 0xf5)
+      more = *p < 0xe0 ? 1 : 2 + (*p >= 0xf0);
+    while (k < more && p[1 + k] >= 0x80 && p[1 + k] < 0xc0)
+      k++;
+
+    // the second byte of 0xc2 is a control character below 0xa0
+    if (more < 0 || k < more || (*p == 0xc2 && p[1] < 0xa0))
+      *p++ = (unsigned char)instead;
+    else
+      p += 1 + more;
+  }
 }
 
 void SbScanNext(SbScan *s)
@@ -242,6 +286,7 @@ PetscErrorCode SbScanQuoted(SbScan *s, const char *what, size_t size, char value
     SB_SCAN_ERROR(s, "the %s is longer than %zu characters", what, size - 1);
   memcpy(value, s->at + 1, n);
   value[n] = 0;
+  SbCleanName(value, ' ');
   s->at += n + 2;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -255,11 +300,12 @@ PetscErrorCode SbScanRestOfLine(SbScan *s, size_t size, char name[])
   for (; s->at < s->end && *s->at != '\n'; s->at++) {
     if (n + 1 >= size)
       SB_SCAN_ERROR(s, "the name is longer than %zu characters", size - 1);
-    name[n++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
+    name[n++] = *s->at;
   }
-  while (n && name[n - 1] == ' ')
+  while (n && isspace((unsigned char)name[n - 1]))
     n--;
   name[n] = 0;
+  SbCleanName(name, ' ');
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,8 +315,9 @@ PetscBool SbScanWord(SbScan *s, size_t size, char word[])
 
   SbScanNext(s);
   for (; n + 1 < size && !ends_token(s, s->at + n); n++)
-    word[n] = isprint((unsigned char)s->at[n]) ? s->at[n] : '?';
+    word[n] = s->at[n];
   word[n] = 0;
+  SbCleanName(word, '?');
   s->at += n;
   return (PetscBool)(n > 0);
 }

@@ -373,6 +373,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   for (PetscInt e = 0; e < m->nprescribe; e++)
     if (!m->prescribe[e]->steady)
       SbEffectCall(m->prescribe[e], prescribe, s, t);
+  PetscCall(SbSupportsWarn(s, m->nprescribe, m->prescribe, t));
   PetscCall(VecGetArray(U, &u));
   SbSpaceSetPrescribed(s, u);
   PetscCall(VecRestoreArray(U, &u));

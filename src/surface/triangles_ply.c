@@ -135,10 +135,57 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads all items of an element; `add` false: passes over them. */
+static PetscErrorCode read_items(Ply *p, const Element *e, PetscBool add, SbTriangleFile *f)
+{
+  SbScan *s = p->s;
+
+  PetscFunctionBeginUser;
+  for (int64_t i = 0; i < e->n; i++) {
+    PetscReal x[3] = {0, 0, 0};
+
+    for (const Property *q = e->property; q < e->property + e->nproperty; q++) {
+      const char *what = q->axis == 3 ? "vertex of a face" : "value of a property";
+      int64_t n = 1;
+      double value = 0;
+
+      if (q->count.size) {
+        PetscCall(read_value(p, q->count, "length of a list", &value));
+        if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
+          SB_SCAN_ERROR(s, "a list has %g entries; the file is damaged", value);
+        n = (int64_t)value;
+        PetscCall(SbScanRoom(s, "entries of a list", n, 2, q->type.size));
+      }
+      for (int64_t c = 0; c < n; c++) {
+        PetscCall(read_value(p, q->type, what, &value));
+        if (q->axis != 3 || !add)
+          continue;
+        if (!(value >= 0 && value < (double)f->t->nvert))
+          SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
+                        (long long)i + 1, value, (long long)f->t->nvert);
+        PetscCall(SbTrianglesAddCorner(s, i + 1, (int64_t)value, f));
+      }
+      if (q->axis == 3 && add)
+        PetscCall(SbTrianglesAddFace(s, i + 1, f));
+      if (q->axis < 0 || q->axis == 3)
+        continue;
+      if (!isfinite(value))
+        SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
+      x[q->axis] = value;
+    }
+    if (!strcmp(e->name, "vertex"))
+      PetscCall(SbTrianglesAddVertex(f, x));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
   Ply ply = {.s = s};
   Ply *p = &ply;
+  const Element *early = NULL;
+  const char *begin = NULL;
+  const char *first;
 
   PetscFunctionBeginUser;
   PetscCall(read_header(p));
@@ -159,42 +206,17 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
       SB_SCAN_ERROR(s, "the element '%s' has no properties", e->name);
     PetscCall(SbScanRoom(s, e->name, e->n, PetscMax(1, 2 * e->nproperty), PetscMax(1, bytes)));
 
-    // all properties of one vertex, face or other item
-    for (int64_t i = 0; i < e->n; i++) {
-      PetscReal x[3] = {0, 0, 0};
-
-      for (const Property *q = e->property; q < e->property + e->nproperty; q++) {
-        const char *what = q->axis == 3 ? "vertex of a face" : "value of a property";
-        int64_t n = 1;
-        double value = 0;
-
-        if (q->count.size) {
-          PetscCall(read_value(p, q->count, "length of a list", &value));
-          if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
-            SB_SCAN_ERROR(s, "a list has %g entries; the file is damaged", value);
-          n = (int64_t)value;
-          PetscCall(SbScanRoom(s, "entries of a list", n, 2, q->type.size));
-        }
-        for (int64_t c = 0; c < n; c++) {
-          PetscCall(read_value(p, q->type, what, &value));
-          if (q->axis != 3)
-            continue;
-          if (!(value >= 0 && value < (double)f->t->nvert))
-            SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
-                          (long long)i + 1, value, (long long)f->t->nvert);
-          PetscCall(SbTrianglesAddCorner(s, i + 1, (int64_t)value, f));
-        }
-        if (q->axis == 3)
-          PetscCall(SbTrianglesAddFace(s, i + 1, f));
-        if (q->axis < 0 || q->axis == 3)
-          continue;
-        if (!isfinite(value))
-          SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
-        x[q->axis] = value;
-      }
-      if (!strcmp(e->name, "vertex"))
-        PetscCall(SbTrianglesAddVertex(f, x));
-    }
+    // faces that precede the vertices are read behind them
+    first = !strcmp(e->name, "face") && !f->t->nvert ? s->at : NULL;
+    if (first && early)
+      SB_SCAN_ERROR(s, "two elements 'face' before the vertices; write the vertices first");
+    early = first ? e : early;
+    begin = first ? first : begin;
+    PetscCall(read_items(p, e, (PetscBool)!first, f));
+  }
+  if (early) {
+    s->at = begin;
+    PetscCall(read_items(p, early, PETSC_TRUE, f));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

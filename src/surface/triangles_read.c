@@ -9,8 +9,8 @@
   matches its number of triangles (80 bytes, the count, 50 bytes per triangle), whatever its first
   word is, or if it is larger and has a zero byte near its beginning; bytes after the triangles are
   then ignored with a warning. Keywords in text may be upper case, and `end solid` may be two words.
-  OBJ: the lines v, f, o and g. OFF: the basic format. Faces with more than three corners are
-  triangulated, see triangles_add.c.
+  OBJ: the lines v, f, o and g. OFF: text, also with colours, normals or texture coordinates (COFF,
+  NOFF, STOFF). Faces with more than three corners are triangulated, see triangles_add.c.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -90,6 +90,9 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       }
       PetscCall(
         SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
+    } else if (open && (!strcasecmp(word, "color") || !strcasecmp(word, "attribute"))) {
+      PetscCall(SbImportSkip(f->im, "lines %s", word));
+      SbScanEndOfLine(s);
     } else
       SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
   }
@@ -135,6 +138,34 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Curved surfaces of an OBJ file, whose shape no line of vertices gives, and a file within it. */
+static PetscErrorCode obj_other(SbScan *s, const char *word, SbTriangleFile *f)
+{
+  static const char *const curved[] = {"curv", "curv2", "surf", "bsp", "bzp", "cdc", "cdp"};
+
+  PetscFunctionBeginUser;
+  if (!strcmp(word, "call") || !strcmp(word, "csh"))
+    SB_SCAN_ERROR(s, "the line '%s' calls another file; put all into one", word);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(curved); i++)
+    if (!strcmp(word, curved[i]))
+      PetscCall(SbImportSkip(f->im, "curved lines and surfaces (%s)", word));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Joins lines that end with a backslash to the next ones: a tabulator that positions count as the
+   end of a line. */
+static void join_lines(SbScan *s)
+{
+  for (char *p = s->data; p < s->end; p++) {
+    const size_t n = p + 1 < s->end && p[1] == '\r' ? 2 : 1;
+
+    if (*p != '\\' || p + n >= s->end || p[n] != '\n')
+      continue;
+    memset(p, ' ', n);
+    p[n] = '\v';
+  }
+}
+
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
@@ -144,21 +175,23 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
   char word[16];
 
   PetscFunctionBeginUser;
+  join_lines(s);
   while (SbScanWord(s, sizeof(word), word)) {
     if (!strcmp(word, "v"))
       PetscCall(add_vertex(s, f));
+    PetscCall(obj_other(s, word, f));
 
     /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last
        vertex; indices after a slash are ignored */
-    if (!strcmp(word, "f")) {
+    if (!strcmp(word, "f") || !strcmp(word, "fo")) {
       nface++;
       while (SbScanMore(s, '#')) {
         char *after;
         const long long v = strtoll(s->at, &after, 10);
 
-        if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
+        if (after == s->at || v == 0 || (*after && !strchr("/ \t\v\r\n", *after)))
           SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
-        for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);)
+        for (s->at = after; s->at < s->end && !strchr(" \t\v\r\n", *s->at);)
           s->at++;
         PetscCall(SbTrianglesAddCorner(s, nface, v > 0 ? v - 1 : f->t->nvert + v, f));
       }
@@ -190,13 +223,30 @@ PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
 {
   int64_t nvert, nface, nedge;
   char word[16];
+  const char *type = word;
+  const char *at;
 
   PetscFunctionBeginUser;
   s->comment = '#';
+
+  // OFF; before it ST, C, N where vertices have more values, which stand behind the coordinates;
+  // the word may be missing
+  at = s->at;
   (void)SbScanWord(s, sizeof(word), word);
-  if (strcmp(word, "OFF"))
-    SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read",
+  type += strncmp(type, "ST", 2) ? 0 : 2;
+  type += *type == 'C';
+  type += *type == 'N';
+  if (isdigit((unsigned char)word[0]) && !strchr(word, 'O'))
+    s->at = at;
+  else if (strcmp(type, "OFF"))
+    SB_SCAN_ERROR(s,
+                  "expected 'OFF' (or COFF, NOFF, STOFF), found '%s'; it is no OFF file of points "
+                  "with three coordinates",
                   word);
+  at = s->at;
+  if (SbScanWord(s, sizeof(word), word) && !strcasecmp(word, "BINARY"))
+    SB_SCAN_ERROR(s, "a binary OFF file; write it as text");
+  s->at = at;
   PetscCall(SbScanCount(s, "vertices", 6, 6, &nvert));
   PetscCall(SbScanCount(s, "faces", 8, 8, &nface));
   PetscCall(SbScanText(s, "number of edges", &nedge));

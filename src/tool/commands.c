@@ -38,7 +38,7 @@ static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
 static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 {
   SbRepair r;
-  char welded[96], number[32];
+  char welded[96], folded[192], number[32];
   PetscBool any = PETSC_FALSE;
   const struct {
     const PetscInt *n;
@@ -50,11 +50,17 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
     {&r.nflat, "flat tets dropped"},
     {&r.nslit, "  of these inside the body, each left a slit without width there"},
     {&r.nturned, "inverted tets turned"},
+    {&r.nfolded, folded},
     {&r.nunused, "unused vertices dropped"},
     {&r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"}};
 
   PetscFunctionBeginUser;
   SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->body.tet.merge_tolerance, &r));
+  (void)snprintf(folded, sizeof(folded),
+                 "tets that folded over themselves, with their edges made straight, the first "
+                 "tetrahedron %lld at (%.4g, %.4g, %.4g) m",
+                 (long long)r.folded, (double)r.folded_at[0], (double)r.folded_at[1],
+                 (double)r.folded_at[2]);
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(done) && !tool->quiet; i++) {

@@ -279,7 +279,7 @@ static PetscErrorCode check_files(void)
   PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3|face 1|2 corners"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nf 1 x 2\n", "line 2"));
   PetscCall(refuse_text(".obj", "v 0 0\nf 1 2 3\n", "line 2|'f'"));
-  PetscCall(refuse_text(".off", "COFF\n1 1 1\n", "line 1|'OFF'|'COFF'"));
+  PetscCall(refuse_text(".off", "4OFF\n1 1 1\n", "line 1|'OFF'|'4OFF'"));
   PetscCall(refuse_text(".off", "OFF\n9999999 3 0\n", "9999999 vertices"));
   PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
                         "-effect_tool_obstacle|line 7"));

@@ -71,7 +71,7 @@ for end in ("msh", "h5"):
 report = tool("info", OUT / "again.msh")
 check("curved tets" in report, report)
 
-# a damaged one is refused by all commands; one that folds is told by info
+# a damaged one is refused by all commands; edges of one that folds are made straight, and that is said
 for name, edge in (("lost.h5", [1, 6]), ("folded.h5", [0, 1])):
     tool("convert", "box:1,0.5,0.5:1", OUT / name)
     with h5py.File(OUT / name, "r+") as f:
@@ -82,9 +82,12 @@ for command in ("info", "convert", "repair", "refine"):
     check(done.returncode and "/mesh/curved_edges" in done.stderr and "row 1" in done.stderr and not (OUT / "not.h5").exists(), f"{command}: {done.stdout}{done.stderr}")
 run(3, "lost", "lost.h5", "-mesh_reading", "slabs", fails="row 1")
 report = tool("info", OUT / "folded.h5")
-check("p2 refuses: 2" in report, report)
+check("made straight: 2" in report, report)
+report = tool("repair", OUT / "folded.h5", OUT / "unfolded.h5")
+check("made straight" in report and "made straight" not in tool("info", OUT / "unfolded.h5"), report)
 for reading in ("rank0", "slabs"):
-    run(3, "folded", "folded.h5", "-mesh_reading", reading, fails="that do: 2)")
+    run(3, f"folded_{reading}", "folded.h5", "-mesh_reading", reading)
+same("a folded one in slabs", "folded_rank0/checkpoint_000008.h5", "folded_slabs/checkpoint_000008.h5")
 
 # the mesh, by any way and on any number of ranks
 run(1, "whole", "curved.h5")

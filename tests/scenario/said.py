@@ -1,0 +1,66 @@
+"""What a run says of a scene that it computes, but hardly as it was meant: two supports that differ at one node, parts of
+a mesh that touch but do not join; and a group whose name has letters beyond ASCII."""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+OUT, SUPPLE, MPI = Path(os.environ["SB_OUT"]), os.environ["SB_SUPPLE"], os.environ["SB_MPI"].split()
+BODY = "-bodies b -body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -output_overwrite yes".split()
+BOX = ["-body_b_mesh", "box:0.1,0.1,0.1:2", "-time", "static"]
+# two pyramids on one square, whose diagonals cross; one of the nodes is in a group
+MESH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+0 5 "Spitze_Körper"
+$EndPhysicalNames
+$Nodes
+6
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+5 .5 .5 1
+6 .5 .5 -1
+$EndNodes
+$Elements
+5
+1 4 2 1 1 1 2 3 5
+2 4 2 1 1 1 3 4 5
+3 4 2 1 1 1 2 4 6
+4 4 2 1 1 2 3 4 6
+5 15 2 5 1 5
+$EndElements
+"""
+failed = 0
+
+
+def case(name, words, ranks=1, said=(), error=False):
+    global failed
+    done = subprocess.run([*MPI, str(ranks), SUPPLE, *BODY, *words, "-output_dir", str(OUT / "run")], capture_output=True, text=True, cwd=OUT)
+    lines = [line for line in done.stderr.split("\n") if line.startswith("supple: ")]
+    good = bool(done.returncode) == error and len(lines) == bool(said) and all(word in lines[0] for word in said)
+    failed += not good
+    if not good:
+        print(f"{name}: exit code {done.returncode}, {lines}, not {said}\n{done.stderr[-500:]}")
+
+
+def supports(first, second, moved, **more):
+    case(moved, [*BOX, "-effects", f"{first},{second}", "-effect_f1_type", "fixed", "-effect_f1_on", "zmin", "-effect_f2_type", "prescribed_displacement",
+                 "-effect_f2_on", "xmin", "-effect_f2_displacement", moved], **more)
+
+
+for n in (1, 2):
+    supports("f1", "f2", "0.001;0;0", ranks=n, said=("f1 and f2", "(0, ", "0 and 0.001 m", "direction x", "f1 counts"))
+supports("f2", "f1", "0.001;0;0", said=("f2 and f1", "0.001 and 0 m", "f2 counts"))
+supports("f1", "f2", "0;z*t;0")  # nothing where they meet
+supports("f1", "f2", "0;0;0.001*t", said=("f1 and f2", "direction z"))
+
+(OUT / "crossed.msh").write_text(MESH)
+SUPPORT = ["-body_b_scale", "0.1", "-effects", "f", "-effect_f_type", "fixed", "-effect_f_on", "Spitze_Körper", "-ts_dt", "0.001", "-ts_max_time", "0.001"]
+case("p1", ["-body_b_mesh", "crossed.msh", *SUPPORT], said=("warning", "crossed.msh", ": 4 ", "0) m"))
+case("cr", ["-body_b_mesh", "crossed.msh", "-body_b_element", "cr", *SUPPORT], said=("error", "crossed.msh", "2 parts", ": 4 "), error=True)
+print(f"{7 - failed} passed, {failed} failed")
+sys.exit(failed > 0)

@@ -1,0 +1,132 @@
+// Nastran bulk data: continuations by their mark, coordinate systems of points, entries that change
+// nodes or elements.
+// @ranks 1
+#include "mesh_test.h"
+#include "../file.h"
+
+static char folder[512];
+
+#define GRIDS "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
+#define EDGES                                                                \
+  "GRID,5,,.5,0.,0.\nGRID,6,,.5,.5,0.\nGRID,7,,0.,.5,0.\nGRID,8,,0.,0.,.5\n" \
+  "GRID,9,,.5,0.,.5\nGRID,10,,0.,.5,.5\n"
+#define FIRST "CTETRA         1       1       1       2       3       4       5       6"
+#define SECOND "CTETRA         2       1       1       2       3       4       5       6"
+
+/* A tet of volume 1/6 (corners in any order) with its largest coordinates. */
+static const struct {
+  const char *text;
+  PetscReal volume; /* in sixths */
+  PetscReal most[3];
+  const char *note;
+} cases[] = {
+  /* by the mark, behind other entries, before its entry, in a large field, beside another one */
+  {GRIDS EDGES FIRST "+E0     \nMAT1,1,1.\n+E0            7       8       9      10\n",
+   1,
+   {1, 1, 1},
+   ""},
+  {"+E0            7       8       9      10\n" GRIDS EDGES FIRST "+E0\n", 1, {1, 1, 1}, ""},
+  {"GRID*                  1                              0.              0.*N1\n"
+   "GRID*                  2                              1.              0.*N2\n"
+   "*N2                   0.\n*N1                   0.\n"
+   "GRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nCTETRA,1,1,1,2,3,4\n",
+   1,
+   {1, 1, 1},
+   ""},
+  {GRIDS EDGES FIRST "+A\nCTETRA,3,1,1,2,3,4\n+B             7       8       9      10\n"
+                     "+A             7       8       9      10\n" SECOND "+B\n",
+   3,
+   {1, 1, 1},
+   ""},
+  /* something in the tenth field that is no mark */
+  {GRIDS "CTETRA         1       1       1       2       3       4                0001\n",
+   1,
+   {1, 1, 1},
+   ""},
+  /* systems: shifted and turned (z along x), cylindrical, spherical, by nodes, one in another */
+  {"CORD2R,5,,5.,0.,0.,6.,0.,0.,\n,5.,1.,0.\nGRID,1,5,0.,0.,0.\nGRID,2,5,1.,0.,0.\n"
+   "GRID,3,5,0.,1.,0.\nGRID,4,5,0.,0.,2.\nCTETRA,1,1,1,2,3,4\n",
+   2,
+   {7, 1, 1},
+   ""},
+  {"GRDSET,,5\nCORD2C,5,,0.,0.,0.,0.,0.,1.,\n,1.,0.,0.\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n"
+   "GRID,3,,1.,90.,0.\nGRID,4,0,0.,0.,1.\nCTETRA,1,1,1,2,3,4\n",
+   1,
+   {1, 1, 1},
+   ""},
+  {"CORD2S,5,,0.,0.,0.,0.,0.,1.,\n,1.,0.,0.\nGRID,1,5,0.,0.,0.\nGRID,2,5,1.,90.,0.\n"
+   "GRID,3,5,1.,90.,90.\nGRID,4,5,1.,0.,33.\nCTETRA,1,1,1,2,3,4\n",
+   1,
+   {1, 1, 1},
+   ""},
+  {"GRID,1,,1.,0.,0.\nGRID,2,,1.,0.,1.\nGRID,3,,2.,0.,0.\nCORD1R,6,1,2,3\n"
+   "CORD2R,7,6,0.,0.,3.,0.,0.,4.,\n,1.,0.,3.\nGRID,4,7,0.,1.,0.\nCTETRA,1,1,1,2,3,4\n",
+   1,
+   {2, 1, 3},
+   ""},
+  /* elements that a mesh does not need */
+  {GRIDS "CTETRA,1,1,1,2,3,4\nCELAS1,7,1,1,1,2,1\nCONM2,8,1,,1.\n", 1, {1, 1, 1}, "CELAS1 (1)"},
+};
+
+static PetscErrorCode test_read(void)
+{
+  char path[600];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/a.bdf", folder);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
+    PetscReal most[3] = {-1e9, -1e9, -1e9};
+    PetscReal volume = 0;
+    SbImport im;
+
+    PetscCall(test_file_put(path, cases[k].text));
+    PetscCall(test_import(path, &im));
+    for (PetscInt i = 0; i < 3 * im.nvert; i++)
+      most[i % 3] = PetscMax(most[i % 3], im.x[i]);
+    for (PetscInt i = 0; i < im.item[3].n; i++)
+      volume += PetscAbsReal(SbTetDeterminant(im.x, im.item[3].vert + 4 * i));
+    SB_CHECK(PetscAbsReal(volume - cases[k].volume) < 1e-12, "case %d: volume %g", (int)k, volume);
+    for (int i = 0; i < 3; i++)
+      SB_CHECK(PetscAbsReal(most[i] - cases[k].most[i]) < 1e-12,
+               "case %d: largest coordinate %d is %g", (int)k, i, most[i]);
+    SB_CHECK(!im.nmiddle.n, "case %d: %d edges are off their middle", (int)k, (int)im.nmiddle.n);
+    SB_CHECK(!cases[k].note[0] || strstr(im.note, cases[k].note), "case %d: '%s'", (int)k, im.note);
+    PetscCall(SbImportDestroy(&im));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_refused(void)
+{
+  static const char *const bad[][2] = {
+    {GRIDS EDGES FIRST "+E0\nENDDATA\n", "line 11|'+E0'"},
+    {GRIDS EDGES FIRST "+E0\n" SECOND "+E0\nMAT1,1,1.\n+E0            7       8       9      10\n",
+     "line 12|'+E0'"},
+    {GRIDS EDGES FIRST "\n+E0            7       8       9      10\n", "line 12|'+E0'"},
+    {GRIDS "=,*(1),=,*(1.),==\n", "line 5|replication"},
+    {GRIDS "GRIDG,9,,1.,1.,1.\n", "line 5|GRIDG"},
+    {GRIDS "CHEX20,1,1,1,2,3,4\n", "line 5|CHEX20"},
+    {GRIDS "BEGIN SUPER=1\n", "line 5|BEGIN"},
+    {"CORD2R,5,5,5.,0.,0.,6.,0.,0.,\n,5.,1.,0.\nGRID,1,5,0.,0.,0.\n", "line 1|system 5"},
+    {"CORD2R,5,,5.,0.,0.,6.,0.,0.,\n,7.,0.,0.\nGRID,1,5,0.,0.,0.\n", "line 1|system 5|on a line"},
+    {"GRID,1,7,0.,0.,0.\n", "line 1|system 7"},
+  };
+  char path[600];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/bad.nas", folder);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(bad); k++) {
+    PetscCall(test_file_put(path, bad[k][0]));
+    SB_CHECK_ERROR(test_mesh_use(path), PETSC_ERR_FILE_UNEXPECTED, bad[k][1]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_file_folder(folder));
+  PetscCall(test_read());
+  PetscCall(test_refused());
+  SB_TEST_END();
+}
