@@ -67,22 +67,35 @@ static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], 
       4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
 }
 
+PetscErrorCode SbOldTetFind(SbLocator locator, const PetscReal p[3], PetscInt *cell, PetscReal w[4])
+{
+  PetscFunctionBeginUser;
+  (void)SbLocatorFind(locator, p, cell, w);
+  PetscCheck(*cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "no old tetrahedron with a volume is near the place (%g, %g, %g)", (double)p[0],
+             (double)p[1], (double)p[2]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Current position of a vertex from its rest position, by the old mesh. */
-static void follow(const Material *at, SbNewMesh *m, PetscInt v)
+static PetscErrorCode follow(const Material *at, SbNewMesh *m, PetscInt v)
 {
   PetscInt cell;
   PetscReal w[4];
 
-  (void)SbLocatorFind(at->old->rest, m->X + 3 * v, &cell, w);
+  PetscFunctionBeginUser;
+  PetscCall(SbOldTetFind(at->old->rest, m->X + 3 * v, &cell, w));
   mix(at->old, at->old->x, cell, w, m->x + 3 * v);
   if (m->flat)
     mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets the edge nodes of a new tet, or only those at edges of one of its vertices, unless that is
    -1. */
-static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
+static PetscErrorCode bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
 {
+  PetscFunctionBeginUser;
   for (int e = 0; m->edge_off && e < 6; e++) {
     const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]];
     const PetscInt b = m->cell[4 * c + SbTetEdge[e][1]];
@@ -102,13 +115,14 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
     }
     for (int k = 0; k < 3; k++)
       middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
-    (void)SbLocatorFind(at->flat, middle, &cell, w);
+    PetscCall(SbOldTetFind(at->flat, middle, &cell, w));
     mix_rest(at->old, cell, w, X);
     for (int k = 0; k < 3; k++)
       off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
     if (SbDot3(off, off) <= PetscSqr(STRAIGHT) * SbDistance2(m->X + 3 * a, m->X + 3 * b))
       memset(off, 0, 3 * sizeof(*off));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rest positions of vertices created in the current configuration; their current ones by the old
@@ -138,9 +152,7 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
     PetscInt cell;
     PetscReal w[4];
 
-    (void)SbLocatorFind(filled, y + 3 * v, &cell, w);
-    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume %s",
-               how->rest ? "at rest" : "now");
+    PetscCall(SbOldTetFind(filled, y + 3 * v, &cell, w));
     if (now || at->flat)
       mix_rest(old, cell, w, m->X + 3 * v);
     else
@@ -195,9 +207,9 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
   return worst;
 }
 
-/* Tries positions on the way to the mean of the neighbours at rest; returns whether one was
-   better. */
-static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
+/* Tries positions on the way to the mean of the neighbours at rest; `better`: whether one was. */
+static PetscErrorCode move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m,
+                                  PetscBool *better)
 {
   PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
   const int nplace = m->flat ? 3 : 2;
@@ -206,8 +218,9 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
   PetscReal best = worst_around(m, s, v);
   PetscReal part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
-  PetscBool better = PETSC_FALSE;
 
+  PetscFunctionBeginUser;
+  *better = PETSC_FALSE;
   for (int k = 0; k < nplace; k++)
     memcpy(kept[k], place[k], sizeof(kept[k]));
   for (int k = 0; k < 3; k++) {
@@ -221,22 +234,22 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
 
     for (int k = 0; k < 3; k++)
       m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
-    follow(at, m, v);
+    PetscCall(follow(at, m, v));
     for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
-      bend(at, m, s->cells[j], v);
+      PetscCall(bend(at, m, s->cells[j], v));
     now = worst_around(m, s, v);
     if (!(now > best))
       continue;
     best = now;
-    better = PETSC_TRUE;
+    *better = PETSC_TRUE;
     for (int k = 0; k < nplace; k++)
       memcpy(kept[k], place[k], sizeof(kept[k]));
   }
   for (int k = 0; k < nplace; k++)
     memcpy(place[k], kept[k], sizeof(kept[k]));
   for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
-    bend(at, m, s->cells[j], v);
-  return better;
+    PetscCall(bend(at, m, s->cells[j], v));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The longest edge of a tet, in the current configuration, that is not on the hull; false: there is
@@ -305,7 +318,7 @@ static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbN
   // the new vertex
   for (int k = 0; k < 3; k++)
     m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
-  follow(at, m, middle);
+  PetscCall(follow(at, m, middle));
   m->nvert++;
 
   // each tet around keeps one end of the edge, its copy the other
@@ -318,8 +331,8 @@ static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbN
     m->cell[4 * c + corner[1]] = middle;
     m->cell[4 * half + corner[0]] = middle;
     m->ncell++;
-    bend(at, m, c, middle);
-    bend(at, m, half, -1);
+    PetscCall(bend(at, m, c, middle));
+    PetscCall(bend(at, m, half, -1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -358,10 +371,12 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
           continue;
         for (int a = 0; a < 4; a++) {
           const PetscInt v = m->cell[4 * c + a];
+          PetscBool done = PETSC_FALSE;
 
-          if (v < m->nkept || !move_vertex(at, &stars, v, m))
-            continue;
-          moved[v] = better = PETSC_TRUE;
+          if (v >= m->nkept)
+            PetscCall(move_vertex(at, &stars, v, m, &done));
+          moved[v] = (PetscBool)(moved[v] || done);
+          better = (PetscBool)(better || done);
         }
       }
     }
@@ -509,7 +524,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   if (m->flat)
     PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
   for (PetscInt c = 0; c < m->ncell; c++)
-    bend(at, m, c, -1);
+    PetscCall(bend(at, m, c, -1));
   PetscCall(repair_tets(at, how, hull, m));
   PetscCall(check_quality(old, how, m));
 
@@ -523,7 +538,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
       for (int a = 0; a < 4; a++)
         middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
     }
-    (void)SbLocatorFind(at->old->rest, middle, &m->within[c], w);
+    PetscCall(SbOldTetFind(at->old->rest, middle, &m->within[c], w));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -93,6 +93,9 @@ typedef struct {
   PetscInt nmoved;   /* vertices moved for inverted or flat tets */
   PetscReal quality; /* quality of the worst tet, now */
 } SbNewMesh;
+/* SbLocatorFind(); error (PETSC_ERR_USER_INPUT) if it finds none. Not collective. */
+PetscErrorCode SbOldTetFind(SbLocator locator, const PetscReal point[3], PetscInt *cell,
+                            PetscReal weight[4]);
 /* Errors (PETSC_ERR_USER_INPUT): those of the mesher; tets that stay inverted at rest or now. */
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how,
                             SbNewMesh *mesh);
