@@ -147,7 +147,7 @@ int main(int argc, char *argv[])
   // Open MPI would create an unused lock file for each HDF5 file, and abort above 255 characters of
   // path
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
-  if (MPI_Init(&argc, &argv))
+  if (!SbMemoryIsEnough("supple") || MPI_Init(&argc, &argv))
     return 1;
   return SbErrorFinish(supple(argc, argv));
 }
