@@ -230,8 +230,8 @@ PetscErrorCode SbSpaceCouple(SbSpace space, PetscInt n, const PetscInt gnode[], 
 PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 PetscErrorCode SbSpaceAddCoupling(SbSpace space, Mat A, PetscInt number, const PetscReal K[]);
 
-/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with f
-   NULL, A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
+/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with A,
+   A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
 PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                                 PetscReal f[], Mat A);
 
