@@ -137,6 +137,9 @@ extern const SbOption SbSpaceRows[];
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
 /* -displacement_view: shows displacements U[nnode][3], m, with a viewer of PETSc. Collective. */
 PetscErrorCode SbSpaceViewDisplacement(SbSpace space, Vec U);
+/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells.
+   Collective. */
+PetscErrorCode SbSpaceVertexPositions(SbSpace space, Vec U, PetscReal x[]);
 /* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the
    same function. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);

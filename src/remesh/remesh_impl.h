@@ -125,9 +125,6 @@ PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBoo
                               PetscInt step, const SbRemeshing *how, SbRemeshResult *result);
 
 /* check.c: qualities and momenta */
-/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells.
-   Collective. */
-PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each named body, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
 /* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */
