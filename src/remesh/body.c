@@ -30,6 +30,11 @@
 #define PLACES 6      /* trial positions of a vertex, each half as far as the one before */
 #define STRAIGHT 1e-6 /* offset of an edge node over the edge length that counts as zero */
 
+/* Tets around each vertex: cells[start[v]] to cells[start[v + 1]]. */
+typedef struct {
+  PetscInt *start, *cells;
+} Stars;
+
 /* The old mesh, with what a new one is made of. */
 typedef struct {
   const SbOldMesh *old;
@@ -37,6 +42,10 @@ typedef struct {
   PetscInt ncurved;
   SbKey *
     curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
+  SbLocator now;    /* of current places; what follows is here to be freed after an error, too */
+  SbKey *hull_edge; /* edges of the hull, sorted: they are never split */
+  Stars stars;      /* of the new mesh, of a round of repairs */
+  PetscBool *moved; /* vertices that were, in this round */
 } Material;
 
 /* Whether face f of tet c belongs to the hull; each triangle once. */
@@ -127,10 +136,9 @@ static PetscErrorCode bend(const Material *at, SbNewMesh *m, PetscInt c, PetscIn
 
 /* Rest positions of vertices created in the current configuration; their current ones by the old
    mesh. */
-static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
+static PetscErrorCode find_material(Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
-  SbLocator now = NULL;
   SbLocator filled = at->flat ? at->flat : old->rest; /* tets of the volume that has been filled */
   PetscReal *y = m->x;
 
@@ -145,15 +153,15 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
       PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
   if (!how->rest) {
-    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
-    filled = now;
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &at->now));
+    filled = at->now;
   }
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
     PetscReal w[4];
 
     PetscCall(SbOldTetFind(filled, y + 3 * v, &cell, w));
-    if (now || at->flat)
+    if (at->now || at->flat)
       mix_rest(old, cell, w, m->X + 3 * v);
     else
       PetscCall(PetscArraycpy(m->X + 3 * v, y + 3 * v, 3));
@@ -161,7 +169,6 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
       mix(old, old->X, cell, w, m->flat + 3 * v);
     mix(old, old->x, cell, w, m->x + 3 * v);
   }
-  PetscCall(SbLocatorDestroy(&now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -190,11 +197,6 @@ static PetscReal worse(const SbNewMesh *m, PetscInt cell)
   return PetscMin(rest, now);
 }
 
-/* Tets around each vertex: cells[start[v]] to cells[start[v + 1]]. */
-typedef struct {
-  PetscInt *start, *cells;
-} Stars;
-
 static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 {
   PetscReal worst = 1;
@@ -208,9 +210,9 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 }
 
 /* Tries positions on the way to the mean of the neighbours at rest; `better`: whether one was. */
-static PetscErrorCode move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m,
-                                  PetscBool *better)
+static PetscErrorCode move_vertex(const Material *at, PetscInt v, SbNewMesh *m, PetscBool *better)
 {
+  const Stars *s = &at->stars;
   PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
   const int nplace = m->flat ? 3 : 2;
   PetscReal middle[3] = {0, 0, 0};
@@ -339,31 +341,28 @@ static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbN
 
 /* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing
    helps. */
-static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
+static PetscErrorCode repair_tets(Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
   const PetscInt most = GROWTH * m->ncell;
   PetscBool split = PETSC_TRUE;
-  SbKey *edge;
 
   PetscFunctionBeginUser;
 
   // edges of the hull, sorted: they are never split
-  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &edge));
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &at->hull_edge));
   for (PetscInt i = 0; i < 3 * hull->ntri; i++)
-    edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
-  SbKeysSort(3 * hull->ntri, edge);
+    at->hull_edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
+  SbKeysSort(3 * hull->ntri, at->hull_edge);
   for (int round = 0; round < ROUNDS && split && m->ncell <= most; round++) {
     const PetscInt ncell = m->ncell;
-    PetscBool *moved;
     PetscBool better = PETSC_TRUE;
-    Stars stars;
 
     // move inner vertices until all tets are good enough, or nothing helps
-    PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
+    PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &at->stars.start, &at->stars.cells));
     for (PetscInt i = 0; i < 4 * m->ncell; i++)
-      stars.cells[i] /= 4;
-    PetscCall(PetscCalloc1(m->nvert, &moved));
+      at->stars.cells[i] /= 4;
+    PetscCall(PetscCalloc1(m->nvert, &at->moved));
     for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
       better = PETSC_FALSE;
       for (PetscInt c = 0; c < m->ncell; c++) {
@@ -374,30 +373,29 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
           PetscBool done = PETSC_FALSE;
 
           if (v >= m->nkept)
-            PetscCall(move_vertex(at, &stars, v, m, &done));
-          moved[v] = (PetscBool)(moved[v] || done);
+            PetscCall(move_vertex(at, v, m, &done));
+          at->moved[v] = (PetscBool)(at->moved[v] || done);
           better = (PetscBool)(better || done);
         }
       }
     }
     for (PetscInt v = 0; v < m->nvert; v++)
-      m->nmoved += moved[v];
-    PetscCall(PetscFree(moved));
-    PetscCall(PetscFree(stars.start));
-    PetscCall(PetscFree(stars.cells));
+      m->nmoved += at->moved[v];
+    PetscCall(PetscFree(at->moved));
+    PetscCall(PetscFree(at->stars.start));
+    PetscCall(PetscFree(at->stars.cells));
 
     // split an inner edge of each tet that is still bad
     split = PETSC_FALSE;
     for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS && m->ncell <= most; c++) {
       PetscInt ends[2] = {-1, -1};
 
-      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends))
+      if (worse(m, c) >= how->quality || !inner_edge(hull, at->hull_edge, m, c, ends))
         continue;
       PetscCall(split_edge(at, ends, m));
       split = PETSC_TRUE;
     }
   }
-  PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -555,6 +553,11 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
   ierr = remesh(where, old, how, &hull, &at, m);
   PetscCall(SbSurfaceDestroy(&hull));
   PetscCall(SbLocatorDestroy(&at.flat));
+  PetscCall(SbLocatorDestroy(&at.now));
+  PetscCall(PetscFree(at.hull_edge));
+  PetscCall(PetscFree(at.stars.start));
+  PetscCall(PetscFree(at.stars.cells));
+  PetscCall(PetscFree(at.moved));
   PetscCall(PetscFree(at.curved));
   if (ierr)
     PetscCall(SbNewMeshDestroy(m));
