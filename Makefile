@@ -145,9 +145,10 @@ lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syn
 	@COMPILE_FLAGS='-std=c11 $(INCLUDES)' scripts/lint
 
 SANITIZE = -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined -Wno-format-truncation
-sanitize: deps ## unit tests under the address and undefined-behaviour sanitizers
-	$(AGAIN) BUILD=build-sanitize OPT='$(SANITIZE)' build-sanitize/unit
+sanitize: deps ## unit tests and damaged inputs under the address and undefined-behaviour sanitizers
+	$(AGAIN) BUILD=build-sanitize OPT='$(SANITIZE)' build-sanitize/unit build-sanitize/supple
 	@tests/run --build build-sanitize --group unit --sanitize $(if $(T),--match '$(T)')
+	@$(if $(T),,tests/run --build build-sanitize --supple build-sanitize/supple --group scenario --sanitize --match mutations.py)
 
 # The readers need nothing above layers 0 and 1. MPI's compiler is told to call clang.
 FUZZ    := -O1 -g -fno-omit-frame-pointer -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined

@@ -269,6 +269,10 @@ PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const 
 
 /* memory */
 
+/* Whether limits of memory (ulimit -v, -d) leave room for a run; if not, says so in one line on
+   stderr. Before MPI_Init(). program: begins the line. */
+PetscBool SbMemoryIsEnough(const char *program);
+
 /* Freed arrays of 32 MiB and more go back to the system from here on. After PetscInitialize(). */
 void SbMemoryReturnLarge(void);
 

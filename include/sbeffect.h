@@ -92,11 +92,12 @@ struct _p_SbEffect {
   PetscBool steady; /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscReal from,
     until; /* s (or load factor): it acts at times t with from < t <= until; all by default */
-  PetscBool dynamic;    /* the run has inertia; known from set-up on */
-  PetscBool prescribed; /* it prescribes the nodes of its sets in all directions */
-  PetscInt nstate;      /* numbers in a record of save() */
-  PetscBool by_node;    /* the first of them is a node's original number. Default PETSC_FALSE */
-  PetscInt ncolumn;     /* history columns, known after set-up */
+  PetscBool dynamic;      /* the run has inertia; known from set-up on */
+  PetscBool no_potential; /* its force depends on the path: its work on a closed one is not zero */
+  PetscBool prescribed;   /* it prescribes the nodes of its sets in all directions */
+  PetscInt nstate;        /* numbers in a record of save() */
+  PetscBool by_node;      /* the first of them is a node's original number. Default PETSC_FALSE */
+  PetscInt ncolumn;       /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...: <name>_<column>; of the type or of `data` */
   char note[256]; /* note of the set-up for the run's header; "": none */
@@ -108,6 +109,9 @@ struct _p_SbEffect {
    collective. */
 PetscBool SbEffectActs(SbEffect e, PetscReal t);
 PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
+/* The effects, of n, whose forces have no potential, in words for a message; "": there are none.
+   Not collective. */
+void SbEffectsWithoutPotential(PetscInt n, const SbEffect effect[], size_t size, char text[]);
 /* Calls an operation that the effect has, within its log event: SbEffectCall(e, force, space,
    stage, f). */
 #define SbEffectCall(e, op, ...)                             \

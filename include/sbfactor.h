@@ -41,6 +41,10 @@ PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
    (KSP_DIVERGED_PC_FAILED). After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCCheckPivots(PC pc);
 
+/* Block Jacobi and additive Schwarz: blocks without rows, of ranks without unknowns, get no
+   preconditioner. Other types: nothing. Before the set-up. Not collective. */
+PetscErrorCode SbPCAllowEmptyBlocks(PC pc);
+
 /* ---- a sparse Cholesky factor on one rank (factor.c): of a matrix of 3x3 blocks, in 16-bit
    integers for preconditioners, or exact, in double precision. The last `nkeep` nodes are not
    eliminated: their Schur complement is returned, which couples the factors of several ranks. */

@@ -137,6 +137,9 @@ extern const SbOption SbSpaceRows[];
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
 /* -displacement_view: shows displacements U[nnode][3], m, with a viewer of PETSc. Collective. */
 PetscErrorCode SbSpaceViewDisplacement(SbSpace space, Vec U);
+/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells.
+   Collective. */
+PetscErrorCode SbSpaceVertexPositions(SbSpace space, Vec U, PetscReal x[]);
 /* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the
    same function. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);
@@ -230,8 +233,8 @@ PetscErrorCode SbSpaceCouple(SbSpace space, PetscInt n, const PetscInt gnode[], 
 PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 PetscErrorCode SbSpaceAddCoupling(SbSpace space, Mat A, PetscInt number, const PetscReal K[]);
 
-/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with f
-   NULL, A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
+/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u, right on owned nodes; or, with A,
+   A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
 PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                                 PetscReal f[], Mat A);
 

@@ -365,7 +365,8 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 
   SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold
   the point the one in which it lies deepest, or the first of equal ones; of a point in none the
-  nearest place. Returns the distance from there, m.
+  nearest place. Returns the distance from there, m. No tet with a volume, or a point that is not
+  finite: PETSC_MAX_REAL, the tet -1, weights 0; a caller that cannot rule this out looks for it.
 */
 typedef struct _p_SbLocator *SbLocator;
 PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],

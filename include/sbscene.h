@@ -62,3 +62,8 @@ PetscErrorCode SbSceneCheck(SbModel model);
 
 /* Warns of bodies so large that their files may be in mm. Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneCheckSizes(SbModel model);
+
+/* Warns of bodies that overlap and have no contact with each other; `when`: begins the sentence. It
+   looks at boxes first, and further only at bodies whose boxes overlap. found: whether it warned.
+   Collective. */
+PetscErrorCode SbSceneWarnOverlap(SbRun run, const char *when, PetscBool *found);

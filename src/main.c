@@ -28,7 +28,7 @@ static void report_failure(const char *message, void *scene)
 static PetscErrorCode simulate(Scene *s)
 {
   char file[PETSC_MAX_PATH_LEN];
-  PetscBool quiet;
+  PetscBool quiet, overlap;
 
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
@@ -41,6 +41,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbSceneCheckSizes(s->model));
   PetscCall(SbRunSetUp(s->run));
   PetscCall(SbOutputLoadState(s->run));
+  PetscCall(SbSceneWarnOverlap(s->run, "at the start", &overlap));
   PetscCall(SbLedgerAttach(s->ledger));
   PetscCall(SbRemeshAttach(s->remesh, s->run));
   PetscCall(SbRunCatchSignals(s->run));
@@ -51,6 +52,8 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbReportHeader(s->run));
   PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
   PetscCall(SbReportSummary(s->run));
+  if (!overlap)
+    PetscCall(SbSceneWarnOverlap(s->run, "at the end", &overlap));
   SbOutputFile(s->run, "ledger.csv", file, &quiet);
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
@@ -147,7 +150,7 @@ int main(int argc, char *argv[])
   // Open MPI would create an unused lock file for each HDF5 file, and abort above 255 characters of
   // path
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
-  if (MPI_Init(&argc, &argv))
+  if (!SbMemoryIsEnough("supple") || MPI_Init(&argc, &argv))
     return 1;
   return SbErrorFinish(supple(argc, argv));
 }

@@ -36,7 +36,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
 
 int main(int argc, char *argv[])
 {
-  if (MPI_Init(&argc, &argv))
+  if (!SbMemoryIsEnough("supple-mesh") || MPI_Init(&argc, &argv))
     return 1;
   return SbErrorFinish(supple_mesh(argc, argv));
 }

@@ -41,7 +41,8 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                              PETSC_ERR_FILE_WRITE,
                              PETSC_ERR_FILE_UNEXPECTED,
                              PETSC_ERR_ARG_UNKNOWN_TYPE,
-                             PETSC_ERR_MISSING_FACTOR};
+                             PETSC_ERR_MISSING_FACTOR,
+                             PETSC_ERR_MEM};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
     if ((int)n == ours[i])
@@ -125,14 +126,40 @@ static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const c
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
 }
 
+/* Whether memory is used up. PETSc 3.18 gives a line number as the code. */
+static PetscBool is_memory(PetscErrorCode n, const char *function)
+{
+  return (PetscBool)(n == PETSC_ERR_MEM ||
+                     (function && SbHasPrefix(function, "PetscMallocAlign PetscReallocAlign")));
+}
+
+/* The message of an error: PETSc's, or our own where it says nothing. */
+static const char *words(PetscErrorCode n, const char *function, const char *message, size_t size,
+                         char own[])
+{
+  if (is_memory(n, function) && !(message && strstr(message, "out of memory"))) {
+    SbFormat(size, own,
+             "out of memory (%s): make the scene smaller, or raise the limits of memory (ulimit "
+             "-v, -d, those of the batch system)",
+             message && message[0] ? message : "PETSc");
+    return own;
+  }
+  if (message && message[strspn(message, " \n")])
+    return message;
+  SbFormat(size, own, "error %d of PETSc in %s()", (int)n, function ? function : "?");
+  return own;
+}
+
 static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file,
                               PetscErrorCode n, PetscErrorType p, const char *mess, void *ctx)
 {
   (void)comm;
   (void)ctx;
+  if (is_memory(n, function))
+    n = PETSC_ERR_MEM;
   if (p == PETSC_ERROR_INITIAL) {
     const PetscBool yaml = (PetscBool)(function && strstr(function, "YAML"));
-    char given[256];
+    char given[256], own[256];
     const PetscBool choice =
       (PetscBool)(is_wrong_viewer(function, file, mess, sizeof(given), given) ||
                   is_wrong_choice(n, function, file, sizeof(given), given));
@@ -140,7 +167,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
     state.code = 1;
     state.pending = (PetscBool)(choice || is_user_error(n, function));
     (void)snprintf(state.message, sizeof(state.message), "%s%s%s%s", yaml ? state.file : "",
-                   yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error",
+                   yaml && state.file[0] ? ": " : "", words(n, function, mess, sizeof(own), own),
                    mess && !strncmp(mess, "Unknown first token", 19)
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
@@ -312,10 +339,14 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
 {
   SbCaughtError *caught = (SbCaughtError *)ctx;
+  char own[256];
 
+  if (is_memory(code, function))
+    code = PETSC_ERR_MEM;
   if (kind == PETSC_ERROR_INITIAL) {
     caught->code = (int)code;
-    (void)snprintf(caught->text, sizeof(caught->text), "%s", text ? text : "");
+    (void)snprintf(caught->text, sizeof(caught->text), "%s",
+                   words(code, function, text, sizeof(own), own));
   }
   if (!is_user_error(code, NULL))
     (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);

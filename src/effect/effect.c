@@ -174,3 +174,11 @@ PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, 
              "-effect_%s_axis: 0,0,0 is no direction", e->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+void SbEffectsWithoutPotential(PetscInt n, const SbEffect effect[], size_t size, char text[])
+{
+  text[0] = 0;
+  for (PetscInt e = 0; e < n; e++)
+    if (effect[e]->no_potential)
+      SbAppend(size, text, "%s%s", text[0] ? ", " : "", effect[e]->name);
+}

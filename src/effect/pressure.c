@@ -38,6 +38,9 @@
   linear solver applies the derivative exactly, facet by facet, and the matrix, without it, is the
   preconditioner.
 
+  The header of a run says of each pressure whether its surface is closed, and the volume inside, or
+  where its rim is. Of a closed one the current volume is a column of the history.
+
   With follower = no the pressure acts on the rest area and normal, as small strains have it: no
   tangent.
 */
@@ -57,7 +60,9 @@ typedef struct {
   SbFormula value;
   PetscBool follower;
   PetscInt nfacet, nedge;
-  SbFacet *facet; /* [nfacet] of owned and ghost cells */
+  PetscReal sign; /* of a closed surface: -1 around a cavity, else 1 */
+  PetscInt nall;  /* with those of whole bodies, which follow the others */
+  SbFacet *facet; /* [nall] of owned and ghost cells */
   RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
   PetscBool
     *whole; /* [nbody] pressure on the whole body, by its volume: its facets are not in the list */
@@ -178,6 +183,56 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, the
+   middle of the first one by original numbers, m. */
+static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt *nrim, PetscReal at[3])
+{
+  SbKey *edge;                /* slot 3 facet + side */
+  uint64_t mine = UINT64_MAX; /* the first edge here: its original vertices */
+  uint64_t first;
+
+  PetscFunctionBeginUser;
+  *nrim = 0;
+  at[0] = at[1] = at[2] = 0;
+  PetscCall(PetscMalloc1(3 * p->nall, &edge));
+  for (PetscInt i = 0; i < 3 * p->nall; i++) {
+    const PetscInt *v = p->facet[i / 3].vertex;
+
+    edge[i] = (SbKey){SbKeyOfPair(mesh->gvert[v[i % 3]], mesh->gvert[v[(i + 1) % 3]]), i};
+  }
+  SbKeysSort(3 * p->nall, edge);
+  for (PetscInt i = 0, m; i < 3 * p->nall; i += m) {
+    PetscInt ways = 0; /* from the lower vertex to the higher one, less those back */
+    PetscInt v[2];
+    uint64_t original;
+
+    m = SbKeysAlike(3 * p->nall, edge, i);
+    for (PetscInt k = i; k < i + m; k++) {
+      for (int a = 0; a < 2; a++)
+        v[a] = p->facet[edge[k].slot / 3].vertex[(edge[k].slot + a) % 3];
+      ways += mesh->gvert[v[0]] < mesh->gvert[v[1]] ? 1 : -1;
+    }
+
+    // all facets at an owned vertex are here; the rank of the lower one counts the edge
+    if (!ways || v[mesh->gvert[v[0]] > mesh->gvert[v[1]]] >= mesh->nvert_owned)
+      continue;
+    (*nrim)++;
+    original = SbKeyOfPair(mesh->vert_orig[v[0]], mesh->vert_orig[v[1]]);
+    if (original >= mine)
+      continue;
+    mine = original;
+    for (int k = 0; k < 3; k++)
+      at[k] = 0.5 * (mesh->x[3 * v[0] + k] + mesh->x[3 * v[1] + k]);
+  }
+  PetscCall(PetscFree(edge));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, nrim, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_UINT64_T, MPI_MIN, mesh->comm));
+  for (int k = 0; k < 3 && mine != first; k++)
+    at[k] = 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, at, 3, MPIU_REAL, MPI_SUM, mesh->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The pressure at time t, Pa. */
 static PetscErrorCode pressure_at(SbEffect e, PetscReal t, PetscReal *p)
 {
@@ -187,48 +242,6 @@ static PetscErrorCode pressure_at(SbEffect e, PetscReal t, PetscReal *p)
   PetscCall(SbFormulaEval(((const Pressure *)e->data)->value, t, NULL, p));
   PetscCall(SbFormulaEval(e->time, t, NULL, &factor));
   *p *= factor;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
-{
-  Pressure *p = (Pressure *)e->data;
-  const SbMesh mesh = space->mesh;
-  PetscInt *count;
-  PetscInt n = 0;
-  PetscReal value = 1.;
-  PetscBool some;
-
-  PetscFunctionBeginUser;
-  if (e->steady)
-    PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
-  PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
-  PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
-  PetscCall(PetscCalloc1(mesh->nbody, &count));
-
-  /* bodies with nodes at faces whose every boundary facet is in the list: their facets leave it */
-  for (PetscInt k = 0; k < p->nfacet; k++)
-    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    p->whole[b] = (PetscBool)(p->follower && !space->element[b]->nodes_per[0] &&
-                              count[b] == mesh->body[b].nfacet);
-  for (PetscInt k = 0; k < p->nfacet; k++)
-    if (!p->whole[mesh->cell_body[p->facet[k].cell]])
-      p->facet[n++] = p->facet[k];
-  p->nfacet = n;
-  PetscCall(PetscFree(count));
-  if (p->follower && value != 0)
-    PetscCall(find_rim(p, space));
-
-  /* the remainder of bodies with nodes at faces, and free rims */
-  some = (PetscBool)(p->nedge > 0);
-  for (PetscInt k = 0; k < p->nfacet && !some; k++)
-    some = apart(space, &p->facet[k]);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  if (!some)
-    e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -289,6 +302,122 @@ static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3]
   for (int a = 0; a < p->n; a++)
     for (int i = 0; i < 3; i++)
       f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
+}
+
+/* This rank's part of the volume inside the surface at the displacements u, m^3; negative in a
+   cavity. */
+static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const PetscReal u[],
+                                    PetscReal *inside)
+{
+  PetscFunctionBeginUser;
+  *inside = 0;
+  for (PetscInt k = 0; k < load->nall; k++) {
+    if (load->facet[k].cell >= space->mesh->ncell_owned)
+      continue;
+    for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
+      PetscReal side[2][3] = {{0}};
+      PetscReal x[3] = {0, 0, 0};
+      PetscReal N[3];
+      FacetPoint at;
+
+      facet_point(space, &load->facet[k], q, &at);
+      add_sides(&at, space->node_x, side);
+      add_sides(&at, u, side);
+      for (int a = 0; a < at.n; a++)
+        for (int i = 0; i < 3; i++)
+          x[i] += at.phi[a] * (space->node_x[3 * at.node[a] + i] + (u ? u[3 * at.node[a] + i] : 0));
+      SbCross(side[0], side[1], N);
+      *inside += at.weight * SbDot3(x, N) / 3;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode history_pressure(SbEffect e, SbSpace space, const SbStage *stage,
+                                       const PetscReal residual[], PetscReal values[])
+{
+  const Pressure *load = (const Pressure *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)residual;
+  PetscCall(volume_inside(load, space, stage->u, values));
+  values[0] *= load->sign;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
+{
+  Pressure *p = (Pressure *)e->data;
+  const SbMesh mesh = space->mesh;
+  PetscInt *count, nrim;
+  PetscInt n = 0;
+  PetscReal value = 1.;
+  PetscReal at[3], inside;
+  PetscBool some, free;
+  SbFacet *whole;
+
+  PetscFunctionBeginUser;
+  if (e->steady)
+    PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
+  PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
+  PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
+  PetscCall(PetscCalloc1(mesh->nbody, &count));
+
+  /* bodies with nodes at faces whose every boundary facet is in the list: their facets leave it */
+  for (PetscInt k = 0; k < p->nfacet; k++)
+    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    p->whole[b] = (PetscBool)(p->follower && !space->element[b]->nodes_per[0] &&
+                              count[b] == mesh->body[b].nfacet);
+  PetscCall(PetscMalloc1(p->nfacet, &whole));
+  p->nall = p->nfacet;
+  for (PetscInt k = 0; k < p->nall; k++)
+    if (p->whole[mesh->cell_body[p->facet[k].cell]])
+      whole[k - n] = p->facet[k];
+    else
+      p->facet[n++] = p->facet[k];
+  PetscCall(PetscArraycpy(p->facet + n, whole, p->nall - n));
+  p->nfacet = n;
+  PetscCall(PetscFree(whole));
+  PetscCall(PetscFree(count));
+  if (p->follower && value != 0)
+    PetscCall(find_rim(p, space));
+
+  /* the remainder of bodies with nodes at faces, and free rims */
+  some = (PetscBool)(p->nedge > 0);
+  for (PetscInt k = 0; k < p->nfacet && !some; k++)
+    some = apart(space, &p->facet[k]);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  if (!some)
+    e->ops.nonsymmetric = NULL;
+
+  /* what the surface is, in words; a free rim is known of nodes at vertices only */
+  PetscCall(measure_rim(p, mesh, &nrim, at));
+  if (nrim) {
+    free = (PetscBool)(p->nedge > 0);
+    for (PetscInt k = 0; k < p->nfacet && p->follower && !free; k++)
+      free = apart(space, &p->facet[k]);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &free, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+    e->no_potential = free;
+    e->ops.history = NULL;
+    e->ncolumn = 0;
+    SbFormat(sizeof(e->note), e->note,
+             "on an open surface: its rim has %" PetscInt_FMT
+             " edges, the first at (%.4g, %.4g, %.4g)%s",
+             nrim, (double)at[0], (double)at[1], (double)at[2],
+             !p->follower ? ""
+             : free       ? "; it has no potential"
+                          : "; supports hold the rim, or symmetry");
+  } else {
+    PetscCall(volume_inside(p, space, NULL, &inside));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &inside, 1, MPIU_REAL, MPI_SUM, space->comm));
+    p->sign = inside < 0 ? -1 : 1;
+    SbFormat(sizeof(e->note), e->note, "on a closed surface, %s %.6g m^3",
+             inside < 0 ? "a cavity of" : "around", (double)PetscAbsReal(inside));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
@@ -445,15 +574,20 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static const char *const columns[] = {"volume"};
+
 const SbEffectType SbEffectPressure = {
   .name = "pressure",
   .size = sizeof(Pressure),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
+  .ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns),
+  .column = columns,
   .ops = {.setfromoptions = options_pressure,
           .setup = setup_pressure,
           .force = force_pressure,
           .tangent = tangent_pressure,
           .nonsymmetric = unsymmetric_pressure,
+          .history = history_pressure,
           .destroy = destroy_pressure},
 };

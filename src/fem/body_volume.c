@@ -18,7 +18,7 @@ PetscErrorCode SbSpaceAddVolume(SbSpace s, PetscInt body, const PetscReal x[], P
   SbMatBlocks values;
 
   PetscFunctionBeginUser;
-  if (!f)
+  if (A)
     PetscCall(SbMatGetBlocks(A, PETSC_TRUE, &values));
   for (PetscInt b = 0; b < s->nbatch; b++) {
     SbPack U[30], F[SB_POINTS][9], P[9], fe[30], C[81], scale,
@@ -27,7 +27,7 @@ PetscErrorCode SbSpaceAddVolume(SbSpace s, PetscInt body, const PetscReal x[], P
     if (s->batch_region[b]->body != body)
       continue;
     SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
-    if (!f) {
+    if (A) {
       memset(C, 0, sizeof(C));
       for (int l = 0; l < SB_BATCH; l++)
         scale[l] = s->block_scale * factor;
@@ -47,7 +47,7 @@ PetscErrorCode SbSpaceAddVolume(SbSpace s, PetscInt body, const PetscReal x[], P
     SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
     sb_scatter_strain(s, b, fe, f);
   }
-  if (!f)
+  if (A)
     PetscCall(SbMatRestoreBlocks(&values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -110,3 +110,40 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpaceVertexPositions(SbSpace s, Vec U, PetscReal x[])
+{
+  const SbMesh mesh = s->mesh;
+  PetscReal *weight;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(mesh->nvert, &weight));
+  PetscCall(PetscArrayzero(x, 3 * mesh->nvert));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt c = s->batch_cell[b] + l;
+      const PetscInt *node = s->cell_node + 4 * c;
+      const SbElement e = SbSpaceCellElement(s, c);
+
+      for (int v = 0; v < 4; v++) {
+        const PetscInt vertex = mesh->cell[4 * c + v];
+
+        // the displacement of a node at the vertex, else the volume-weighted mean of the cells
+        // around
+        weight[vertex] = e->nodes_per[0] ? 1. : weight[vertex] + s->batch_V[b][l];
+        for (int k = 0; e->nodes_per[0] && k < 3; k++)
+          x[3 * vertex + k] = u[3 * node[v] + k];
+        for (int i = 0; !e->nodes_per[0] && i < 12; i++)
+          x[3 * vertex + i % 3] +=
+            s->batch_V[b][l] * e->ops.vertex[v][i / 3] * u[3 * node[i / 3] + i % 3];
+      }
+    }
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  for (PetscInt i = 0; i < 3 * mesh->nvert; i++)
+    x[i] = mesh->x[i] + (weight[i / 3] > 0. ? x[i] / weight[i / 3] : 0.);
+  PetscCall(PetscFree(weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -197,7 +197,7 @@ PetscReal SbLocatorFind(SbLocator l, const PetscReal p[3], PetscInt *cell, Petsc
       }
       d2 = SbDot3(r, r);
     }
-    if (d2 > nearest.limit2)
+    if (!(d2 <= nearest.limit2))
       continue;
 
     // of equally near ones the deepest, of equally deep ones the first

@@ -167,14 +167,15 @@ static PetscInt old_edge(const Work *w, uint64_t key)
 }
 
 /* The old fields at a rest position X, from the tet that contains `near`. */
-static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3],
-                            PetscReal value[])
+static PetscErrorCode interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3],
+                                      PetscReal value[])
 {
   PetscReal weight[4];
   PetscReal psi[SB_CELL_NODES] = {0.};
   PetscInt cell;
 
-  (void)SbLocatorFind(w->old.rest, near, &cell, weight);
+  PetscFunctionBeginUser;
+  PetscCall(SbOldTetFind(w->old.rest, near, &cell, weight));
   if (near != X)
     SbTetBarycentric(w->g->X + 3 * w->vert0, w->old.cell + 4 * cell, X, weight);
   if (w->edge)
@@ -189,10 +190,12 @@ static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal
     for (PetscInt k = 0; k < w->each; k++)
       value[k] += psi[a] * from[k];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void new_values(const Work *w, PetscInt c, PetscReal value[])
+static PetscErrorCode new_values(const Work *w, PetscInt c, PetscReal value[])
 {
+  PetscFunctionBeginUser;
   for (PetscInt a = 0; a < 4; a++) {
     const PetscInt v = w->mesh.cell[4 * c + a];
     const PetscInt slot = old_slot(w, 4 * c + a);
@@ -223,7 +226,7 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
       }
     }
     if (!from)
-      interpolate_old(w, X, w->element->nodes_per[3] ? inside : X, to);
+      PetscCall(interpolate_old(w, X, w->element->nodes_per[3] ? inside : X, to));
     for (PetscInt k = 0; k < w->each && from; k++)
       to[k] = from[k];
     for (PetscInt k = 0; k < w->each && w->g->width >= 8; k++)
@@ -241,8 +244,9 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
     for (PetscInt k = 0; k < w->each; k++)
       to[k] = at < 0 ? PETSC_MAX_REAL : old_value(w, at / 6, SB_EDGES + at % 6)[k];
     if (w->edge && at < 0)
-      interpolate_old(w, X, X, to);
+      PetscCall(interpolate_old(w, X, X, to));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Adds a renumbered node; the arrays hold two nodes per corner of the surfaces of all bodies. */
@@ -321,7 +325,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   }
   if (w->done) {
     for (PetscInt c = 0; c < m->ncell; c++)
-      new_values(w, c, value + each * (size_t)c);
+      PetscCall(new_values(w, c, value + each * (size_t)c));
     p->step = step;
     p->mass = g->mass[w->body];
     p->bound =

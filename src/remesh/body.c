@@ -30,6 +30,11 @@
 #define PLACES 6      /* trial positions of a vertex, each half as far as the one before */
 #define STRAIGHT 1e-6 /* offset of an edge node over the edge length that counts as zero */
 
+/* Tets around each vertex: cells[start[v]] to cells[start[v + 1]]. */
+typedef struct {
+  PetscInt *start, *cells;
+} Stars;
+
 /* The old mesh, with what a new one is made of. */
 typedef struct {
   const SbOldMesh *old;
@@ -37,6 +42,10 @@ typedef struct {
   PetscInt ncurved;
   SbKey *
     curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
+  SbLocator now;    /* of current places; what follows is here to be freed after an error, too */
+  SbKey *hull_edge; /* edges of the hull, sorted: they are never split */
+  Stars stars;      /* of the new mesh, of a round of repairs */
+  PetscBool *moved; /* vertices that were, in this round */
 } Material;
 
 /* Whether face f of tet c belongs to the hull; each triangle once. */
@@ -67,22 +76,35 @@ static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], 
       4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
 }
 
+PetscErrorCode SbOldTetFind(SbLocator locator, const PetscReal p[3], PetscInt *cell, PetscReal w[4])
+{
+  PetscFunctionBeginUser;
+  (void)SbLocatorFind(locator, p, cell, w);
+  PetscCheck(*cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "no old tetrahedron with a volume is near the place (%g, %g, %g)", (double)p[0],
+             (double)p[1], (double)p[2]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Current position of a vertex from its rest position, by the old mesh. */
-static void follow(const Material *at, SbNewMesh *m, PetscInt v)
+static PetscErrorCode follow(const Material *at, SbNewMesh *m, PetscInt v)
 {
   PetscInt cell;
   PetscReal w[4];
 
-  (void)SbLocatorFind(at->old->rest, m->X + 3 * v, &cell, w);
+  PetscFunctionBeginUser;
+  PetscCall(SbOldTetFind(at->old->rest, m->X + 3 * v, &cell, w));
   mix(at->old, at->old->x, cell, w, m->x + 3 * v);
   if (m->flat)
     mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets the edge nodes of a new tet, or only those at edges of one of its vertices, unless that is
    -1. */
-static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
+static PetscErrorCode bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
 {
+  PetscFunctionBeginUser;
   for (int e = 0; m->edge_off && e < 6; e++) {
     const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]];
     const PetscInt b = m->cell[4 * c + SbTetEdge[e][1]];
@@ -102,21 +124,21 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
     }
     for (int k = 0; k < 3; k++)
       middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
-    (void)SbLocatorFind(at->flat, middle, &cell, w);
+    PetscCall(SbOldTetFind(at->flat, middle, &cell, w));
     mix_rest(at->old, cell, w, X);
     for (int k = 0; k < 3; k++)
       off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
     if (SbDot3(off, off) <= PetscSqr(STRAIGHT) * SbDistance2(m->X + 3 * a, m->X + 3 * b))
       memset(off, 0, 3 * sizeof(*off));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rest positions of vertices created in the current configuration; their current ones by the old
    mesh. */
-static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
+static PetscErrorCode find_material(Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
-  SbLocator now = NULL;
   SbLocator filled = at->flat ? at->flat : old->rest; /* tets of the volume that has been filled */
   PetscReal *y = m->x;
 
@@ -131,17 +153,15 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
       PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
   if (!how->rest) {
-    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
-    filled = now;
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &at->now));
+    filled = at->now;
   }
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
     PetscReal w[4];
 
-    (void)SbLocatorFind(filled, y + 3 * v, &cell, w);
-    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume %s",
-               how->rest ? "at rest" : "now");
-    if (now || at->flat)
+    PetscCall(SbOldTetFind(filled, y + 3 * v, &cell, w));
+    if (at->now || at->flat)
       mix_rest(old, cell, w, m->X + 3 * v);
     else
       PetscCall(PetscArraycpy(m->X + 3 * v, y + 3 * v, 3));
@@ -149,7 +169,6 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
       mix(old, old->X, cell, w, m->flat + 3 * v);
     mix(old, old->x, cell, w, m->x + 3 * v);
   }
-  PetscCall(SbLocatorDestroy(&now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -178,11 +197,6 @@ static PetscReal worse(const SbNewMesh *m, PetscInt cell)
   return PetscMin(rest, now);
 }
 
-/* Tets around each vertex: cells[start[v]] to cells[start[v + 1]]. */
-typedef struct {
-  PetscInt *start, *cells;
-} Stars;
-
 static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 {
   PetscReal worst = 1;
@@ -195,10 +209,10 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
   return worst;
 }
 
-/* Tries positions on the way to the mean of the neighbours at rest; returns whether one was
-   better. */
-static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
+/* Tries positions on the way to the mean of the neighbours at rest; `better`: whether one was. */
+static PetscErrorCode move_vertex(const Material *at, PetscInt v, SbNewMesh *m, PetscBool *better)
 {
+  const Stars *s = &at->stars;
   PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
   const int nplace = m->flat ? 3 : 2;
   PetscReal middle[3] = {0, 0, 0};
@@ -206,8 +220,9 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
   PetscReal best = worst_around(m, s, v);
   PetscReal part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
-  PetscBool better = PETSC_FALSE;
 
+  PetscFunctionBeginUser;
+  *better = PETSC_FALSE;
   for (int k = 0; k < nplace; k++)
     memcpy(kept[k], place[k], sizeof(kept[k]));
   for (int k = 0; k < 3; k++) {
@@ -221,22 +236,22 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
 
     for (int k = 0; k < 3; k++)
       m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
-    follow(at, m, v);
+    PetscCall(follow(at, m, v));
     for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
-      bend(at, m, s->cells[j], v);
+      PetscCall(bend(at, m, s->cells[j], v));
     now = worst_around(m, s, v);
     if (!(now > best))
       continue;
     best = now;
-    better = PETSC_TRUE;
+    *better = PETSC_TRUE;
     for (int k = 0; k < nplace; k++)
       memcpy(kept[k], place[k], sizeof(kept[k]));
   }
   for (int k = 0; k < nplace; k++)
     memcpy(place[k], kept[k], sizeof(kept[k]));
   for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++)
-    bend(at, m, s->cells[j], v);
-  return better;
+    PetscCall(bend(at, m, s->cells[j], v));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The longest edge of a tet, in the current configuration, that is not on the hull; false: there is
@@ -305,7 +320,7 @@ static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbN
   // the new vertex
   for (int k = 0; k < 3; k++)
     m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
-  follow(at, m, middle);
+  PetscCall(follow(at, m, middle));
   m->nvert++;
 
   // each tet around keeps one end of the edge, its copy the other
@@ -318,39 +333,36 @@ static PetscErrorCode split_edge(const Material *at, const PetscInt ends[2], SbN
     m->cell[4 * c + corner[1]] = middle;
     m->cell[4 * half + corner[0]] = middle;
     m->ncell++;
-    bend(at, m, c, middle);
-    bend(at, m, half, -1);
+    PetscCall(bend(at, m, c, middle));
+    PetscCall(bend(at, m, half, -1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing
    helps. */
-static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
+static PetscErrorCode repair_tets(Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
   const PetscInt most = GROWTH * m->ncell;
   PetscBool split = PETSC_TRUE;
-  SbKey *edge;
 
   PetscFunctionBeginUser;
 
   // edges of the hull, sorted: they are never split
-  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &edge));
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &at->hull_edge));
   for (PetscInt i = 0; i < 3 * hull->ntri; i++)
-    edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
-  SbKeysSort(3 * hull->ntri, edge);
+    at->hull_edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
+  SbKeysSort(3 * hull->ntri, at->hull_edge);
   for (int round = 0; round < ROUNDS && split && m->ncell <= most; round++) {
     const PetscInt ncell = m->ncell;
-    PetscBool *moved;
     PetscBool better = PETSC_TRUE;
-    Stars stars;
 
     // move inner vertices until all tets are good enough, or nothing helps
-    PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
+    PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &at->stars.start, &at->stars.cells));
     for (PetscInt i = 0; i < 4 * m->ncell; i++)
-      stars.cells[i] /= 4;
-    PetscCall(PetscCalloc1(m->nvert, &moved));
+      at->stars.cells[i] /= 4;
+    PetscCall(PetscCalloc1(m->nvert, &at->moved));
     for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
       better = PETSC_FALSE;
       for (PetscInt c = 0; c < m->ncell; c++) {
@@ -358,31 +370,32 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
           continue;
         for (int a = 0; a < 4; a++) {
           const PetscInt v = m->cell[4 * c + a];
+          PetscBool done = PETSC_FALSE;
 
-          if (v < m->nkept || !move_vertex(at, &stars, v, m))
-            continue;
-          moved[v] = better = PETSC_TRUE;
+          if (v >= m->nkept)
+            PetscCall(move_vertex(at, v, m, &done));
+          at->moved[v] = (PetscBool)(at->moved[v] || done);
+          better = (PetscBool)(better || done);
         }
       }
     }
     for (PetscInt v = 0; v < m->nvert; v++)
-      m->nmoved += moved[v];
-    PetscCall(PetscFree(moved));
-    PetscCall(PetscFree(stars.start));
-    PetscCall(PetscFree(stars.cells));
+      m->nmoved += at->moved[v];
+    PetscCall(PetscFree(at->moved));
+    PetscCall(PetscFree(at->stars.start));
+    PetscCall(PetscFree(at->stars.cells));
 
     // split an inner edge of each tet that is still bad
     split = PETSC_FALSE;
     for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS && m->ncell <= most; c++) {
       PetscInt ends[2] = {-1, -1};
 
-      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends))
+      if (worse(m, c) >= how->quality || !inner_edge(hull, at->hull_edge, m, c, ends))
         continue;
       PetscCall(split_edge(at, ends, m));
       split = PETSC_TRUE;
     }
   }
-  PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -509,7 +522,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   if (m->flat)
     PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
   for (PetscInt c = 0; c < m->ncell; c++)
-    bend(at, m, c, -1);
+    PetscCall(bend(at, m, c, -1));
   PetscCall(repair_tets(at, how, hull, m));
   PetscCall(check_quality(old, how, m));
 
@@ -523,7 +536,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
       for (int a = 0; a < 4; a++)
         middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
     }
-    (void)SbLocatorFind(at->old->rest, middle, &m->within[c], w);
+    PetscCall(SbOldTetFind(at->old->rest, middle, &m->within[c], w));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -540,6 +553,11 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
   ierr = remesh(where, old, how, &hull, &at, m);
   PetscCall(SbSurfaceDestroy(&hull));
   PetscCall(SbLocatorDestroy(&at.flat));
+  PetscCall(SbLocatorDestroy(&at.now));
+  PetscCall(PetscFree(at.hull_edge));
+  PetscCall(PetscFree(at.stars.start));
+  PetscCall(PetscFree(at.stars.cells));
+  PetscCall(PetscFree(at.moved));
   PetscCall(PetscFree(at.curved));
   if (ierr)
     PetscCall(SbNewMeshDestroy(m));

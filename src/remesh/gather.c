@@ -81,7 +81,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(
     SbForestCreate(mesh->comm, rank ? 0 : mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
-  PetscCall(SbCornerPositions(s, run->state.U, now));
+  PetscCall(SbSpaceVertexPositions(s, run->state.U, now));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, now, g->x));
   PetscCall(PetscFree(now));

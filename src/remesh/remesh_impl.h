@@ -93,6 +93,9 @@ typedef struct {
   PetscInt nmoved;   /* vertices moved for inverted or flat tets */
   PetscReal quality; /* quality of the worst tet, now */
 } SbNewMesh;
+/* SbLocatorFind(); error (PETSC_ERR_USER_INPUT) if it finds none. Not collective. */
+PetscErrorCode SbOldTetFind(SbLocator locator, const PetscReal point[3], PetscInt *cell,
+                            PetscReal weight[4]);
 /* Errors (PETSC_ERR_USER_INPUT): those of the mesher; tets that stay inverted at rest or now. */
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how,
                             SbNewMesh *mesh);
@@ -122,9 +125,6 @@ PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBoo
                               PetscInt step, const SbRemeshing *how, SbRemeshResult *result);
 
 /* check.c: qualities and momenta */
-/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells.
-   Collective. */
-PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each named body, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
 /* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */

@@ -86,28 +86,40 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Warns of Poisson's ratios with which results are seldom what was meant; copies have that of the
-   first one. */
-static PetscErrorCode check_poisson(SbModel model, PetscInt i)
+/* Warns of a Poisson's ratio with which results are seldom what was meant: of a body or an
+   inclusion, named, on tets of a body. */
+static PetscErrorCode check_poisson(SbModel model, const SbMaterial material, const char *klass,
+                                    const char *name, const SbBody *body)
+{
+  const PetscReal nu = SbMaterialPoisson(material);
+
+  PetscFunctionBeginUser;
+  if (nu >= LOCKS && !strcmp(body->element, "p1"))
+    PetscCall(SbWarning(model->comm,
+                        "-%s_%s_poisson %g with -body_%s_element p1: linear tets lock, the body "
+                        "is too stiff; take p2, cr or dg",
+                        klass, name, (double)nu, body->copy_of[0] ? body->copy_of : body->name));
+  if (nu < AUXETIC)
+    PetscCall(SbWarning(model->comm,
+                        "-%s_%s_poisson %g is near -1, where the shear modulus E/(2(1+nu)) has no "
+                        "limit: it is %g times that of nu = 0",
+                        klass, name, (double)nu, (double)(1. / (1. + nu))));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The materials of a body and its inclusions; copies have those of the first one. */
+static PetscErrorCode check_materials(SbModel model, PetscInt i)
 {
   const SbBody *body = &model->body[i];
-  const PetscReal nu = SbMaterialPoisson(model->material[i]);
-  const char *name = body->copy_of[0] ? body->copy_of : body->name;
 
   PetscFunctionBeginUser;
   if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of))
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (nu >= LOCKS && !strcmp(body->element, "p1"))
-    PetscCall(SbWarning(model->comm,
-                        "-body_%s_poisson %g with -body_%s_element p1: linear tets lock, the body "
-                        "is too stiff; take p2, cr or dg",
-                        name, (double)nu, name));
-  if (nu < AUXETIC)
-    PetscCall(
-      SbWarning(model->comm,
-                "-body_%s_poisson %g is near -1, where the shear modulus E/(2(1+nu)) has no "
-                "limit: it is %g times that of nu = 0",
-                name, (double)nu, (double)(1. / (1. + nu))));
+  PetscCall(check_poisson(model, model->material[i], "body",
+                          body->copy_of[0] ? body->copy_of : body->name, body));
+  for (PetscInt k = 0; k < body->ninclusion; k++)
+    PetscCall(check_poisson(model, model->material[body->inclusion[k].material], "inclusion",
+                            model->set[body->inclusion[k].set].name, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,7 +129,7 @@ PetscErrorCode SbSceneCheck(SbModel model)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < model->nbody; i++)
-    PetscCall(check_poisson(model, i));
+    PetscCall(check_materials(model, i));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained =
       (PetscBool)(model->effect[e]->ops.prescribe ||

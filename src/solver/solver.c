@@ -272,6 +272,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
     PetscCall(PCSetFromOptions(pc));
   }
   PetscCall(SbPCCheckPivots(pc));
+  PetscCall(SbPCAllowEmptyBlocks(pc));
 
   /* unsupported combinations are errors before anything is computed */
   PetscCall(check_factor(s, pc, P));

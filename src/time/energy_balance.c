@@ -91,12 +91,25 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&
       -e->integrator_loss > GIVEN * run->state.energy_most) {
+    char names[256];
+
     run->monitors.warned_gain = PETSC_TRUE;
-    PetscCall(SbWarning(
-      m->comm,
-      "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
-      "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
-      (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
+    SbEffectsWithoutPotential(m->neffect, m->effect, sizeof(names), names);
+    if (names[0])
+      PetscCall(SbWarning(
+        m->comm,
+        "t = %g s: the energy balance is off by %.3g of the %.3g J that bodies have: the force of "
+        "%s "
+        "has no potential (a pressure on an open surface), and its work in a step of %g s is known "
+        "from the two ends only; a shorter -ts_dt tells whether the integrator gives energy, too",
+        (double)t, (double)-e->integrator_loss, (double)(e->kinetic + e->strain), names,
+        (double)dt));
+    else
+      PetscCall(SbWarning(
+        m->comm,
+        "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
+        "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
+        (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
   }
   run->state.damping_power = power;
   PetscCall(VecDestroy(&run->state.loads));

@@ -306,6 +306,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else
       PetscCall(SbContactSetNearest(&run->model->contacts, sizeof(why), why));
+    SbRunSuspects(run, sizeof(why), why);
     PetscCall(SbRunFail(run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)h,
                         reason > 0 ? "the solution is not finite, or beyond 1e15 m"

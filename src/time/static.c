@@ -152,11 +152,12 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
 
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_FALSE, &found));
     if (!found) {
-      char near[256];
+      char near[512];
 
       if (reason == SNES_DIVERGED_LINEAR_SOLVE)
         PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
       PetscCall(SbContactSetNearest(&l->run->model->contacts, sizeof(near), near));
+      SbRunSuspects(l->run, sizeof(near), near);
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
                           SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
     }
@@ -175,25 +176,29 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
 static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal length,
                                       PetscBool contact)
 {
-  char why[sizeof(run->clock.stop_reason)];
+  char why[sizeof(run->clock.stop_reason)], suspects[512];
   PetscBool unstable;
 
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+  suspects[0] = 0;
+  SbRunSuspects(run, sizeof(suspects), suspects);
   PetscCall(SbNewtonUnstable(run->solve.snes, &unstable));
   if (run->solve.softening > LIMIT)
     PetscCall(SbRunFail(run,
                         "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
                         "further on: a limit load is likely, as displacements grow %.0f times as "
-                        "fast with the load as before; -static_control arc_length goes past it",
-                        (double)factor, (double)length, (double)run->solve.softening));
+                        "fast with the load as before; -static_control arc_length goes past it%s%s",
+                        (double)factor, (double)length, (double)run->solve.softening,
+                        suspects[0] ? "; " : "", suspects));
   else if (factor > 0. && unstable && !contact)
     PetscCall(SbRunFail(run,
                         "the load factor reached %.7g of 1, and no equilibrium was found %.1e "
                         "further on, where the tangent is not positive definite: a limit load is "
-                        "likely, or a bifurcation; -static_control arc_length goes past it%s%s",
+                        "likely, or a bifurcation; -static_control arc_length goes past it%s%s%s%s",
                         (double)factor, (double)length, run->solve.rejected_inverted ? "; " : "",
-                        run->solve.rejected_inverted ? why : ""));
+                        run->solve.rejected_inverted ? why : "", suspects[0] ? "; " : "",
+                        suspects));
   else if (factor > 0.)
     PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -44,6 +44,18 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbRunSuspects(SbRun run, size_t size, char text[])
+{
+  char names[256];
+
+  SbEffectsWithoutPotential(run->model->neffect, run->model->effect, sizeof(names), names);
+  if (names[0])
+    SbAppend(size, text,
+             "%sthe pressure of %s is on an open surface, so that Newton's method has no energy to "
+             "minimise: close the surface, or use shorter steps",
+             text[0] ? "; " : "", names);
+}
+
 PetscBool SbRunTooShort(SbRun run, PetscReal dt)
 {
   return (PetscBool)(run->solve.rejected_inverted &&

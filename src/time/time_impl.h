@@ -71,6 +71,8 @@ PetscErrorCode SbRunReadStop(SbRun run);
    end. Collective. */
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Appends to the reason of a failed Newton's method the effects that it may be due to. */
+void SbRunSuspects(SbRun run, size_t size, char text[]);
 /* Whether inverted.c rejected the last step, and would reject one of length dt, s. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 

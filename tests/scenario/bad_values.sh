@@ -123,7 +123,25 @@ warns "-effect_damp_alpha|-effect_damp_beta" block.opts -effects damp -effect_da
 warns "-body_block_poisson|0.4999|p2" block.opts -body_block_poisson 0.4999
 warns "-body_block_poisson|-0.95" block.opts -body_block_poisson -0.95
 warns "-body_block_poisson|-0.999" block.opts -body_block_poisson -0.999 -body_block_material linear
+core=(-body_block_inclusions core -sets core -set_core_at "halfspace:1,0,0,1" -inclusion_core_material linear -inclusion_core_young 1e5
+  -inclusion_core_density 1000)
+warns "-inclusion_core_poisson|0.4999|p2" block.opts "${core[@]}" -inclusion_core_poisson 0.4999
+warns "-inclusion_core_poisson|-0.999" block.opts "${core[@]}" -inclusion_core_poisson -0.999
+for name in boundary all; do
+  printf '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 1 "%s"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1
+$EndNodes\n$Elements\n2\n1 2 2 1 1 1 2 3\n2 4 2 2 1 1 2 3 4\n$EndElements\n' $name >named.msh
+  warns "group:$name|block" block.opts -body_block_mesh named.msh "${hold[@]}" -effects hold -effect_hold_on $name
+done
 warns "-probe_tip_at|0.9 m" block.opts -probes tip -probe_tip_at 1,0,0
+
+# Lines longer than any buffer: they are read whole, and counted as one.
+long=$(head -c 300000 /dev/zero | tr '\0' x)
+printf '# %s\n0 0 0\n1 0 0 oops\n' "$long" >copies.txt
+error 2 "-body_block_copies|copies.txt|line 3" block.opts -body_block_copies copies.txt
+printf '0 0 0%s\n1 0 0 oops\n' "${long//x/ }" >copies.txt
+error 2 "-body_block_copies|copies.txt|line 2" block.opts -body_block_copies copies.txt
+printf '# %s\n0 0.%s\n1 1\n2\n' "$long" "${long//x/1}" >table.txt
+error 2 "-effect_gravity_time|table.txt|line 4" block.opts -effects gravity -effect_gravity_time table:table.txt
 warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2 -output_dir cut
 check "cut/run.json: $(tail -n 3 cut/run.json)" grep -q '"status": "cut short"' cut/run.json
 "${mpi[@]}" 1 "$supple" block.opts -ts_max_steps 4 -output_dir whole >out.txt 2>&1

@@ -204,9 +204,52 @@ static PetscErrorCode test_tables(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* test_formula -formulas FILE: the value of each line of a file, or ! and the column of its error,
+   for tests/verify/formulas.py, which compares them with those of python/supple. */
+static PetscErrorCode print_values(const char *path)
+{
+  const PetscReal place[3] = {0.5, -2, 3};
+  FILE *file = fopen(path, "r");
+  char *line = NULL;
+  size_t size = 0;
+  ssize_t n;
+
+  PetscFunctionBeginUser;
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s", path);
+  while ((n = getline(&line, &size, file)) > 0) {
+    PetscErrorCode ierr;
+    SbFormula f;
+
+    line[n - 1] = 0;
+    PetscCall(PetscPushErrorHandler(sb_test_keep, NULL));
+    ierr = SbFormulaCreate(PETSC_COMM_SELF, line, "-test", &f);
+    PetscCall(PetscPopErrorHandler());
+    if (ierr) {
+      const char *column = strstr(sb_test_text, "column ");
+
+      printf("!%d\n", column ? atoi(column + 7) : -1);
+      continue;
+    }
+    printf("%.17g\n", (double)value_at(f, 4, place));
+    PetscCall(SbFormulaDestroy(&f));
+  }
+  free(line);
+  (void)fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool compare;
+
   SB_TEST_BEGIN(argc, argv);
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-formulas", path, sizeof(path), &compare));
+  if (compare) {
+    PetscCall(print_values(path));
+    PetscCall(PetscFinalize());
+    return 0;
+  }
   PetscCall(test_cases());
   PetscCall(test_uses());
   PetscCall(test_not_finite());

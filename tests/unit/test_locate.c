@@ -195,6 +195,16 @@ static PetscErrorCode check_outside(void)
     SB_CHECK(SbLocatorFind(l, q, &cell, w) == PETSC_MAX_REAL && cell == -1,
              "found among no tets: %d", (int)cell);
     PetscCall(SbLocatorDestroy(&l));
+
+    // a point that is none
+    PetscCall(SbLocatorCreate(1, cells + 4, x, NULL, &l));
+    for (int i = 0; i < 2; i++) {
+      const PetscReal none[3] = {0.2, i ? NAN : INFINITY, 0.2};
+
+      SB_CHECK(SbLocatorFind(l, none, &cell, w) == PETSC_MAX_REAL && cell == -1 && w[0] == 0,
+               "%g: found in the tet %d", none[1], (int)cell);
+    }
+    PetscCall(SbLocatorDestroy(&l));
   }
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -133,10 +133,51 @@ static PetscErrorCode check_thin(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mesher that adds a vertex in the middle of a tet. */
+static PetscErrorCode divide(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
+                             SbTets *tets)
+{
+  PetscFunctionBeginUser;
+  (void)where, (void)size;
+  *tets = (SbTets){.nvert = 5, .ncell = 4};
+  PetscCall(PetscMalloc1(15, &tets->x));
+  PetscCall(PetscMalloc1(16, &tets->cell));
+  PetscCall(PetscArraycpy(tets->x, hull->x, 12));
+  for (int k = 0; k < 3; k++)
+    tets->x[12 + k] = 0.25;
+  for (int i = 0; i < 16; i++)
+    tets->cell[i] = i % 5 ? ((const PetscInt *)ctx)[i % 4] : 4;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A tet that is inverted at rest holds no place: an error, no use of the tet -1, whose vertices
+   are far outside of all arrays here. */
+static PetscErrorCode check_no_place(void)
+{
+  const PetscReal now[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const PetscReal rest[12] = {0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const PetscInt far = PETSC_MAX_INT / 4;
+  PetscInt cells[8] = {far, far, far, far, 0, 1, 2, 3};
+  PetscInt region = 0;
+  SbOldMesh old = {
+    .nvert = 4, .ncell = 1, .X = rest, .x = now, .cell = cells + 4, .region = &region};
+  SbRemeshing how = {.mesher = divide, .ctx = cells + 4, .size = 1, .quality = 0.1};
+  SbNewMesh mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFacesCreate(4, 1, old.cell, &old.faces));
+  PetscCall(SbLocatorCreate(1, old.cell, rest, NULL, &old.rest));
+  SB_CHECK_ERROR(SbRemeshBody("a tet", &old, &how, &mesh), PETSC_ERR_USER_INPUT, "volume");
+  PetscCall(SbLocatorDestroy(&old.rest));
+  PetscCall(SbFacesDestroy(&old.faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_same());
   PetscCall(check_thin());
+  PetscCall(check_no_place());
   SB_TEST_END();
 }

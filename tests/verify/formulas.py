@@ -67,6 +67,57 @@ def check_random():
     check(values > 100, f"only {values} are formulas")
 
 
+def check_same(count=int(os.environ.get("SB_MUTATIONS", "4000"))):
+    """Random formulas, and some that a few changed letters have damaged: the program gives the same values, and errors at the same columns."""
+    program = Path(os.environ.get("SB_BUILD", "build")) / "tests" / "unit" / "test_formula"
+    if not program.exists():
+        print(f"no {program}: not compared with the program")
+        return
+    choose = random.Random(2)
+    functions = {"sin": 1, "cos": 1, "sqrt": 1, "abs": 1, "exp": 1, "log": 1, "floor": 1, "tanh": 1, "min": 2, "max": 2, "atan2": 2, "step": 1, "ramp": 1, "clamp": 3}
+
+    def expression(depth):
+        way = choose.randrange(9) if depth else choose.randrange(2)
+        if way == 0:
+            return choose.choice("txyz") if choose.randrange(4) else "pi"
+        if way == 1:
+            return choose.choice(("0", "1", "2.5", ".5", "1e-3", "3.", "0x1F", "1e400", "7e-320"))
+        if way == 2:
+            return choose.choice("+-") + expression(depth - 1)
+        if way == 3:
+            name = choose.choice(list(functions))
+            return f"{name}({','.join(expression(depth - 1) for _ in range(functions[name]))})"
+        if way == 4:
+            return f"({expression(depth - 1)})"
+        return expression(depth - 1) + choose.choice(("+", "-", " * ", "/", "^", "**")) + expression(depth - 1)
+
+    texts = []
+    for i in range(count):
+        text = expression(choose.randrange(1, 6))
+        for _ in range(choose.randrange(3) if i % 2 else 0):
+            at = choose.randrange(len(text) + 1)
+            text = text[:at] + choose.choice((*"()+-*/^,.;txe10 _$", "", "sin", "\t")) + text[at + choose.randrange(3):]
+        texts.append(text)
+    (OUT / "formulas.txt").write_text("".join(text + "\n" for text in texts))
+    done = subprocess.run([program, "-formulas", OUT / "formulas.txt"], capture_output=True, text=True)
+    told = done.stdout.splitlines()
+    check(done.returncode == 0 and len(told) == count, f"{len(told)} answers for {count} formulas: {done.stderr[-300:]}")
+    errors = 0
+    for text, theirs in zip(texts, told):
+        try:
+            mine = float(Formula(text)(PLACE))
+        except FormulaError as e:
+            column = str(e).split("column ")[1].split()[0].rstrip(":,")
+            check(theirs == f"!{column}", f"'{text}': here an error at column {column}, in the program {theirs}")
+            errors += 1
+            continue
+        check(not theirs.startswith("!"), f"'{text}' is {mine}, in the program an error at column {theirs[1:]}")
+        right = float(theirs)
+        near = mine == right or math.isnan(mine) and math.isnan(right) or abs(mine - right) <= 1e-9 * max(abs(mine), abs(right), 1e-300)
+        check(near, f"'{text}' is {mine}, in the program {right}")
+    check(errors > count / 10, f"only {errors} errors")
+
+
 def check_tables():
     path = OUT / "table.txt"
     path.write_text("# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5")
@@ -128,6 +179,7 @@ def check_sources():
 if __name__ == "__main__":
     check_cases()
     check_random()
+    check_same()
     check_tables()
     check_plot()
     check_sources()
