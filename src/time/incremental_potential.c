@@ -93,7 +93,7 @@ static PetscErrorCode negative_eigenvalues(void *ctx, PetscInt *n)
 static PetscErrorCode linearise(void *ctx, Vec X, Vec Y, PetscReal s)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceLinearisePressure(((SbPotential)ctx)->run->model->space, X, Y, -1., s));
+  PetscCall(SbSpaceLineariseStress(((SbPotential)ctx)->run->model->space, X, Y, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,7 +233,6 @@ PetscErrorCode SbPotentialCreate(SbRun run)
   q->run = run;
   q->barrier = (SbNewtonBarrier){.max_step = max_step,
                                  .advance = advance,
-                                 .prescribed_part = prescribed_part,
                                  .inverted = inverted,
                                  .hessian = hessian,
                                  .solve = solve,
@@ -245,10 +244,16 @@ PetscErrorCode SbPotentialCreate(SbRun run)
                                  .filter = m->may_filter ? filter : NULL,
                                  .negative_eigenvalues = negative_eigenvalues,
                                  .linearise = m->dynamic ? NULL : linearise,
+                                 .prescribed_part = prescribed_part,
                                  .interrupted = interrupted,
                                  .barrier = m->contacts.npotential ? &q->barrier : NULL,
                                  .ctx = q,
                                  .nonsymmetric = (PetscBool)(run->solve.nonsymmetric.U != NULL)};
+
+  q->problem.quadratic = (PetscBool)!m->dynamic;
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    if (!m->material[k]->adaptive && m->material[k]->tangent != SB_TANGENT_EXACT)
+      q->problem.quadratic = PETSC_FALSE;
 
   /* rounding of the strain energy of a rotated body: eps E V */
   for (PetscInt b = 0; b < m->nbody; b++)
@@ -266,6 +271,9 @@ PetscErrorCode SbPotentialBegin(SbPotential q, const SbSolvedStep *step, PetscBo
   PetscFunctionBeginUser;
   q->problem.dt = m->dynamic ? step->dt : 0.;
   q->problem.warm_start = warm;
+  q->problem.may_give_up =
+    (PetscBool)(q->run->clock.may_give_up && q->problem.quadratic && !q->problem.nonsymmetric);
+  q->problem.start = m->contacts.npotential ? NULL : step->U0;
   if (!m->contacts.npotential)
     PetscFunctionReturn(PETSC_SUCCESS);
   q->barrier.start = step->U0;
