@@ -58,7 +58,7 @@ typedef struct {
                            are exact or, `filtered`, positive semi-definite in each cell. required:
                            the solve with it will not be repeated
     negative_eigenvalues - NULL: unknown. Number in the last factorisation, -1: unknown
-    linearise            - NULL: nothing to linearise. Tangents take the pressures linearised at X,
+    linearise            - NULL: nothing to linearise. Tangents take the stresses linearised at X,
                            or at X for the step to X - s Y; X NULL: of the iterate again
     prescribed_part      - sets all of D but the prescribed unknowns to zero
     interrupted          - NULL: never. Whether the solve is to be given up

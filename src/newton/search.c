@@ -15,10 +15,11 @@
   again from the old iterate (watchdog technique: Chamberlain et al. 1982; Nocedal and Wright,
   section 15.6).
 
-  Linearised pressure (SbNewtonProblem.linearise). Spurious changes of volume of a full step in
-  bending would give wrong pressures in the next tangent, and steps of a hundredth; pressures that
-  are linearised at the old iterate do not. The first such step raises E far, and the next two bring
-  it back.
+  Linearised stresses (SbNewtonProblem.linearise). Those of the state after a full step in bending
+  would be wrong by what it stretches spuriously, and steps a hundredth; stresses that are
+  linearised at the old iterate are not. The first such step raises E far, and some of the next ones
+  bring it back; of one that would invert tets a part is taken. If they do not, a load step that can
+  be shortened is given up.
 
   Forces without a potential. Along an ascent direction of a static run the residual decides. In a
   slender body it rises as much as E does in rotation, so such a step may be provisional, too: the
@@ -333,7 +334,7 @@ static PetscErrorCode take(Search *q)
   n->provisional.rise += q->change;
   n->change = q->change - q->undone;
 
-  /* the pressures of the next tangent, linearised at the old X */
+  /* the stresses of the next tangent, linearised at the old X */
   if (p->linearise)
     PetscCall((*p->linearise)(p->ctx, snes->vec_sol, snes->vec_sol_update, q->s));
   PetscCall(VecCopy(n->to.x, snes->vec_sol));

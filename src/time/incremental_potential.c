@@ -7,9 +7,8 @@
   energy is psi(u_0 + w (X - u_0)) / w^2. Barrier contact is evaluated at X, with the weight that
   the integrator gives its force.
 
-  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the
-  step, as if it were an unknown of its own (src/fem/quadratic.c). Time steps are short enough
-  without.
+  Stresses. In static runs the geometric stiffness uses the linearised stresses after the step, as
+  if they were unknowns of their own (src/fem/linear_stress.c). Time steps are short enough without.
 
   Barrier contact is solved when the last step is a full one, and below a part of the way of the
   fastest body in a time step (static: of the size of the smallest body), and below a part of the

@@ -4,6 +4,9 @@
   is halved and repeated from the last equilibrium; after each successful step the length doubles
   again.
 
+  With -static_adapt a step without contact that converges slowly is given up early and halved, at
+  most EARLY times in a row: beyond a limit load the energy has to be searched.
+
   Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be
   halved forever. Below -static_min_increment the run stops; the growth of displacements with the
   load, over its minimum of all steps, tells a limit load from other failures. A shortened step
