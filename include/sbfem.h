@@ -22,6 +22,13 @@ typedef struct {
   const PetscReal *a; /* acceleration, m/s^2; NULL in a static run */
 } SbStage;
 
+/* Stress at a point of a batch, after a step of Newton's method whose linearisation it is from
+   (src/fem/linear_stress.c). */
+typedef struct {
+  SbPack p;    /* modulus of the dilatation times it, Pa */
+  SbPack S[6]; /* second Piola-Kirchhoff stress 00 01 02 11 12 22, Pa */
+} SbLinearStress;
+
 /* Cells of one body and one material, owned or ghost: the unit of dispatch. */
 typedef struct {
   PetscInt body;
@@ -37,6 +44,7 @@ typedef struct {
   SbMaterial
     pointwise;    /* the law at the points, less its volumetric part where that is of the mean */
   PetscInt nnode; /* of a cell: 4, of P2 SB_CELL_NODES */
+  SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
 } SbRegion;
 
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
@@ -118,8 +126,8 @@ struct _p_SbSpace {
     block_scale;    /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
-  SbPack *pressure; /* [nbatch] of SbSpaceLinearisePressure(), NULL before it, */
-  PetscBool linear_pressure; /* and whether tangents have them instead of the pressures of states */
+  SbPack *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
+  PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
 };
 
 /* the space and its vectors */
@@ -167,11 +175,10 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, Pets
 /* f += M (a + alpha v); a or v may be NULL. */
 void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 
-/* Sets the cell pressures of tangents to linearised ones (src/fem/quadratic.c), p = p(U) + part
-   dp/dU . along step; U, step: m. step NULL: p(U). U NULL: tangents have the pressures of their
-   states again. Collective. */
-PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscReal along,
-                                        PetscReal part);
+/* Sets the stresses of tangents to linearised ones (src/fem/linear_stress.c): from the last ones to
+   S(U) - dS/dU . step by this part; U, step: m. step NULL: S(U). U NULL: tangents have the stresses
+   of their states again. Collective. */
+PetscErrorCode SbSpaceLineariseStress(SbSpace space, Vec U, Vec step, PetscReal part);
 
 /* Adapts the penalty on jumps of CR and DG to the state U, m (src/fem/jump.c). steps: load steps,
    with the energies of full jumps; time steps, where the energy of each face at U is kept within

@@ -87,6 +87,7 @@ typedef struct {
     softens  - stress has a maximum in compression, beyond which cells invert
     jacobian - theta is J - 1, cubic in the displacement; of other laws it is at most quadratic, or
                that of a spin
+    share    - psi_mu has the part share mu/2 theta^2
 */
 typedef struct {
   const char *name;
@@ -94,6 +95,7 @@ typedef struct {
   PetscInt nrow;
   const SbOption *row; /* [nrow] */
   PetscBool linear, softens, jacobian;
+  PetscReal share;
   SbMaterialOps ops;
 } SbMaterialType;
 
@@ -159,6 +161,9 @@ PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m);
 PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m);
 /* lambda + 2 mu: of the fastest wave, rho c^2, and the stiffest for one length */
 PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m);
+
+/* lambda + share mu: factor of theta^2/2 in psi */
+PetscReal SbMaterialDilatationModulus(const struct _p_SbMaterial *m);
 
 /* p = -lambda theta, Pa, positive in compression: resists the change of volume, and oscillates from
    cell to cell where an element locks. Not collective. */

@@ -25,7 +25,6 @@ typedef struct {
     within
                        a barrier, all ranks (may be NULL)
     advance          - obstacles move to this fraction of their motion in the step
-    prescribed_part  - sets all of D but the prescribed unknowns to zero
     inverted         - strain energy at X, J, and number of inverted cells, all ranks
     hessian          - assembles the Hessian of the barriers at X, or its substitute; nblock: number
                        of its blocks, all ranks, 0: no contact, and the other outputs are not used.
@@ -38,7 +37,6 @@ typedef struct {
 typedef struct {
   PetscErrorCode (*max_step)(void *ctx, Vec X, Vec Y, PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*advance)(void *ctx, PetscReal fraction);
-  PetscErrorCode (*prescribed_part)(void *ctx, Vec D);
   PetscErrorCode (*inverted)(void *ctx, Vec X, PetscReal *energy, PetscInt *n);
   PetscErrorCode (*hessian)(void *ctx, Vec X, Vec F, SbContactHessian kind, Vec rhs,
                             PetscInt *nblock);
@@ -60,8 +58,9 @@ typedef struct {
                            are exact or, `filtered`, positive semi-definite in each cell. required:
                            the solve with it will not be repeated
     negative_eigenvalues - NULL: unknown. Number in the last factorisation, -1: unknown
-    linearise            - NULL: nothing to linearise. Tangents take the pressures linearised at X,
+    linearise            - NULL: nothing to linearise. Tangents take the stresses linearised at X,
                            or at X for the step to X - s Y; X NULL: of the iterate again
+    prescribed_part      - sets all of D but the prescribed unknowns to zero
     interrupted          - NULL: never. Whether the solve is to be given up
 */
 typedef struct {
@@ -69,13 +68,17 @@ typedef struct {
   PetscErrorCode (*filter)(void *ctx, PetscBool filtered, PetscBool required);
   PetscErrorCode (*negative_eigenvalues)(void *ctx, PetscInt *n);
   PetscErrorCode (*linearise)(void *ctx, Vec X, Vec Y, PetscReal s);
+  PetscErrorCode (*prescribed_part)(void *ctx, Vec D);
   PetscErrorCode (*interrupted)(void *ctx, PetscBool *is);
   const SbNewtonBarrier *barrier; /* borrowed; NULL: none */
+  Vec start; /* static, without barriers: the last equilibrium, m; borrowed. NULL: unknown */
   void *ctx;                      /* of all operations; borrowed */
   PetscReal rounding;             /* of the strain energy, J */
   PetscReal dt;                   /* length of the step, s; 0: without inertia */
   PetscBool nonsymmetric;         /* some forces have no potential */
-  PetscBool warm_start; /* the solve starts from the last one's solution, with its tolerance */
+  PetscBool quadratic;   /* static: tangents are exact */
+  PetscBool may_give_up; /* static: the load step can be shortened */
+  PetscBool warm_start;  /* the solve starts from the last one's solution, with its tolerance */
 } SbNewtonProblem;
 
 /* Constructor of the SNESType, for SNESRegister(). */

@@ -98,6 +98,8 @@ typedef struct {
 
   /* static */
   PetscInt static_steps;   /* equal load steps to full load */
+  PetscBool adapt;         /* static: load steps are shortened early, */
+  PetscBool may_give_up;   /* and the one to be solved may be */
   PetscReal min_increment; /* smallest load increment as a part of 1 / static_steps */
   struct {
     PetscBool on;      /* steps along the path of equilibria, with the load factor as unknown */

@@ -263,6 +263,8 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(PetscFree(s->batch_weight));
   PetscCall(PetscFree(s->couplings.start));
   PetscCall(PetscFree(s->couplings.node));
+  for (PetscInt r = 0; r < s->nregion; r++)
+    PetscCall(PetscFree(s->region[r].stress));
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));
   PetscCall(PetscFree(s->batch_memory));

@@ -101,9 +101,11 @@ typedef struct {
   PetscReal stiffness; /* factor on dP/dF */
   PetscReal
     damping; /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
-  PetscReal lambda;       /* volumetric modulus of the law, Pa */
-  PetscReal mu;           /* shear modulus of the law, Pa */
-  const SbPack *pressure; /* pressure in addition to the law's own, Pa, tension; NULL: none */
+  PetscReal lambda;             /* volumetric modulus of the law, Pa */
+  PetscReal mu;                 /* shear modulus of the law, Pa */
+  const SbPack *pressure;       /* pressure in addition to the law's own, Pa, tension; NULL: none */
+  const SbPack *mean;           /* that of a linearised stress */
+  const SbLinearStress *stress; /* NULL: that of the state */
 } Factors;
 
 static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
@@ -166,13 +168,17 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
     SbPack C[81], D[10][9];
 
     /* a full tangent dP/dF, without its volumetric part; damping is added */
-    m->ops.tangent(m, F, C);
+    if (x->stress)
+      SbLinearStressTangent(m, F, x->stress, x->pressure ? *x->pressure : NULL,
+                            x->mean ? *x->mean : NULL, C);
+    else
+      m->ops.tangent(m, F, C);
     if (split) {
       m->ops.dilatation_gradient(m, F, split->D);
       split->factor = x->stiffness;
       remove_volumetric(x->lambda, (const SbPack *)split->D, C);
     }
-    if (x->pressure && m->ops.dilatation_hessian)
+    if (x->pressure && !x->stress && m->ops.dilatation_hessian)
       m->ops.dilatation_hessian(m, F, *x->pressure, C);
     scaled_volumes(V, x->stiffness, W);
     SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
@@ -215,6 +221,13 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 #define KEPT 10.      /* times mu, */
 #define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
+/* Whether tangents have linearised stresses: not those that the user wants filtered. */
+SB_INLINE PetscBool has_linear_stress(SbSpace s, const SbRegion *region)
+{
+  return (PetscBool)(s->linear_stress && region->stress &&
+                     (region->material->adaptive || region->material->tangent == SB_TANGENT_EXACT));
+}
+
 /* Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta
    times the mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2
    m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
@@ -237,13 +250,16 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
-    if (s->linear_pressure)
+    if (s->linear_stress)
       memcpy(p, s->pressure[batch], sizeof(p));
     at.lambda = 0.;
     at.pressure =
       m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
+    at.mean = m->jacobian && law->tangent == SB_TANGENT_EXACT_SPD ? NULL : &p;
   }
   for (int q = 0; q < points.n; q++) {
+    if (has_linear_stress(s, region))
+      at.stress = &region->stress[points.n * (batch - region->bstart) + q];
     SbPointVolume(&points, q, W);
     law_blocks(law, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
   }
@@ -352,16 +368,11 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       quadratic_blocks(s, region, stage->u, &factors, b, out, K);
     else {
       Factors at = factors;
-      SbPack p;
 
       if (!m->linear)
         SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
-      if (s->linear_pressure && m->ops.dilatation_hessian && m->tangent == SB_TANGENT_EXACT) {
-        SbMaterialPressure(m, (const SbPack *)F[0], p);
-        for (int l = 0; l < SB_BATCH; l++)
-          p[l] += s->pressure[b][l];
-        at.pressure = &p;
-      }
+      if (has_linear_stress(s, region))
+        at.stress = &region->stress[b - region->bstart];
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
 
       /* b_a = V D grad psi_a, as the force of a stress D */

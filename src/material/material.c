@@ -202,6 +202,11 @@ PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
   return m->rest->lambda + 2. * m->rest->mu;
 }
 
+PetscReal SbMaterialDilatationModulus(const struct _p_SbMaterial *m)
+{
+  return m->rest->lambda + m->type->share * m->rest->mu;
+}
+
 void SbMaterialPressure(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p)
 {
   m->ops.dilatation(m, F, p);

@@ -204,6 +204,7 @@ const SbMaterialType SbMaterialNeoHookean = {
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .jacobian = PETSC_TRUE,
+  .share = 5. / 6.,
   .ops = {.energy = energy_neohookean,
           .stress = stress_neohookean,
           .tangent = tangent_neohookean,

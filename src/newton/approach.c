@@ -111,7 +111,7 @@ PetscErrorCode SbNewtonApproach(SNES snes)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   PetscCall(VecWAXPY(D, -1., b->start, X));
-  PetscCall((*b->prescribed_part)(p->ctx, D));
+  PetscCall((*p->prescribed_part)(p->ctx, D));
   PetscCall(VecCopy(b->start, X));
   for (int round = 0; round < APPROACHES; round++) {
     /* the rest of the motion at once */

@@ -22,8 +22,68 @@
 #define STAGNANT_STEPS 5 /* such steps in a row after which a load step is halved */
 #define PATIENCE 50      /* barriers: iterations between checks of progress */
 #define WORTH \
-  0.01           /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
+  0.01          /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
+#define SLOW 15 /* iterations after which a load step that may be shortened is given up, */
+#define QUADRATIC 0.1   /* unless each one reduces the residual to this fraction */
+#define DIFFERENCE 1e-7 /* fraction of a prescribed motion, for finite differences by it */
 #define EARLY 10 /* iterations in which friction is not lagged: normal forces are updated in each */
+
+/* Static: the first iteration, from the last equilibrium. Where displacements are prescribed, the
+   rest of the guess X stays behind them and the cells between are distorted; so the right-hand side
+   has the derivative of the residual by the prescribed motion D, and the bodies move with it. */
+static PetscErrorCode predict(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
+  const Vec X = snes->vec_sol;
+  const Vec Y = snes->vec_sol_update;
+  const Vec F = snes->vec_func;
+  const Vec D = n->provisional.Y; /* work vector */
+  const Vec guess = n->provisional.X;
+  SbNewtonEnergy energy;
+  PetscReal slope, prescribed, other;
+
+  /* a guess that differs by prescribed motions */
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(D, -1., p->start, X));
+  PetscCall(VecCopy(D, guess));
+  PetscCall((*p->prescribed_part)(p->ctx, D));
+  PetscCall(VecAXPY(guess, -1., D));
+  PetscCall(VecNorm(D, NORM_INFINITY, &prescribed));
+  PetscCall(VecNorm(guess, NORM_INFINITY, &other));
+  if (prescribed == 0. || other > 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(X, guess));
+  PetscCall((*p->linearise)(p->ctx, p->start, NULL, 1.));
+
+  /* the residual of the linearised problem */
+  PetscCall(VecWAXPY(n->to.x, DIFFERENCE, D, p->start));
+  PetscCall(SNESComputeFunction(snes, n->to.x, n->to.r));
+  PetscCall(VecCopy(p->start, X));
+  PetscCall(SNESComputeFunction(snes, X, F));
+  PetscCall(VecAXPY(n->to.r, -1., F));
+  PetscCall(VecAXPY(F, 1. / DIFFERENCE, n->to.r));
+  PetscCall(VecNorm(F, NORM_2, &snes->norm));
+
+  /* its solution */
+  PetscCall(SbNewtonFindDirection(snes, &slope));
+  if (!snes->reason)
+    PetscCall(VecAXPY(Y, -1., D));
+  else
+    PetscCall(VecAYPX(Y, 0., D));
+  PetscCall(VecAXPY(X, -1., Y));
+  PetscCall((*p->energy)(p->ctx, X, &energy, n->to.elastic, NULL));
+  if (snes->reason || energy.ninverted || PetscIsInfOrNanReal(energy.strain)) {
+    PetscCall(VecCopy(guess, X));
+    PetscCall((*p->linearise)(p->ctx, X, NULL, 1.));
+    snes->reason = SNES_CONVERGED_ITERATING;
+    PetscCall(PetscInfo(snes, "without prediction\n"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall((*p->linearise)(p->ctx, p->start, Y, 1.));
+  snes->iter = 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* The first iterate, and its residual. */
 static PetscErrorCode begin(SNES snes)
@@ -44,6 +104,8 @@ static PetscErrorCode begin(SNES snes)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (p->linearise)
     PetscCall((*p->linearise)(p->ctx, snes->vec_sol, NULL, 1.));
+  if (p->linearise && p->start && !p->warm_start)
+    PetscCall(predict(snes));
   PetscCall(SNESComputeFunction(snes, snes->vec_sol, snes->vec_func));
   PetscCall(VecNorm(snes->vec_func, NORM_2, &snes->norm));
   n->initial = snes->norm;
@@ -96,6 +158,11 @@ static void check_progress(SNES snes, PetscReal s)
     snes->reason = SNES_DIVERGED_MAX_IT;
   if (check)
     n->fall_checked = n->fall;
+
+  /* a load step that does not converge quadratically */
+  if (!snes->reason && p->may_give_up && snes->iter >= SLOW && snes->norm > QUADRATIC * n->before)
+    snes->reason = SNES_DIVERGED_LINE_SEARCH;
+  n->before = snes->norm;
 
   /* very short load steps */
   if (!p->barrier && p->dt == 0. && !n->provisional.n)

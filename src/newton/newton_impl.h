@@ -39,7 +39,8 @@ typedef struct {
     Vec X, Y;        /* iterate before them; the first one led to X - Y */
     PetscReal slope; /* slope of E at X along that step, J */
     PetscReal norm;  /* norm of the residual there, N */
-    PetscReal first; /* change of E over it, J */
+    PetscReal first; /* change of E over it, J, */
+    PetscReal part;  /* and the fraction of Y that it was */
     PetscReal rise;  /* change of E over all of them, J */
   } provisional;
 
@@ -55,6 +56,7 @@ typedef struct {
   /* the loop */
   PetscBool full;               /* the last step was a full one */
   PetscReal initial;            /* norm of the first residual, N */
+  PetscReal before;             /* norm of the last residual, N */
   PetscReal tolerance;          /* absolute tolerance of the last solve, N */
   PetscBool patient;            /* barriers, without -snes_max_it: may exceed its default */
   PetscReal fall, fall_checked; /* of E in this solve, and until the last check of progress, J */

@@ -15,10 +15,11 @@
   again from the old iterate (watchdog technique: Chamberlain et al. 1982; Nocedal and Wright,
   section 15.6).
 
-  Linearised pressure (SbNewtonProblem.linearise). Spurious changes of volume of a full step in
-  bending would give wrong pressures in the next tangent, and steps of a hundredth; pressures that
-  are linearised at the old iterate do not. The first such step raises E far, and the next two bring
-  it back.
+  Linearised stresses (SbNewtonProblem.linearise). Those of the state after a full step in bending
+  would be wrong by what it stretches spuriously, and steps a hundredth; stresses that are
+  linearised at the old iterate are not. The first such step raises E far, and some of the next ones
+  bring it back; of one that would invert tets a part is taken. If they do not, a load step that can
+  be shortened is given up.
 
   Forces without a potential. Along an ascent direction of a static run the residual decides. In a
   slender body it rises as much as E does in rotation, so such a step may be provisional, too: the
@@ -41,7 +42,10 @@
 #define TRIES 5    /* longer steps, at most */
 #define PROVISIONAL \
   1 /* non-monotone steps that may follow each other while E is above where they began */
-#define PROVISIONAL_LINEARISED 2 /* the same where pressures are linearised */
+#define PROVISIONAL_LINEARISED 8 /* the same where stresses are linearised */
+#define PROVISIONAL_ASCENT 3     /* and the first one is in a direction of ascent */
+#define STAYS 0.5  /* static: least decrease of a residual within the rounding of E that counts */
+#define INTACT 0.1 /* least part of a provisional step, for one that inverts no tet */
 
 /* A line search. */
 typedef struct {
@@ -146,7 +150,7 @@ static void judge(Search *q)
   const PetscReal goal = DECREASE * (n->provisional.n ? n->provisional.slope : q->s * q->slope);
   const PetscReal nothing = NOTHING * q->noise;
   PetscReal before = from->norm;
-  PetscBool within, no_potential;
+  PetscBool within, no_potential, stays;
 
   /* sufficient decrease of E */
   q->total = n->provisional.n ? n->provisional.rise + q->change : q->change;
@@ -161,7 +165,8 @@ static void judge(Search *q)
     q->enough = (PetscBool)(q->enough || to->norm <= (1. - DECREASE * q->s) * before);
 
   /* at the solution, where residuals are rounding as well */
-  n->rounding = (PetscBool)(q->s == 1. && !q->enough && descent && within && -q->slope <= nothing);
+  stays = (PetscBool)(!q->enough || (n->problem->quadratic && to->norm > STAYS * before));
+  n->rounding = (PetscBool)(q->s == 1. && stays && descent && within && -q->slope <= nothing);
   if (descent && within)
     q->enough = (PetscBool)(q->enough || -q->slope <= nothing);
 }
@@ -172,7 +177,11 @@ static void allow_provisional(Search *q)
   const Newton *n = q->n;
   const Iterate *from = &n->from;
   const Iterate *to = &n->to;
-  const PetscInt most = n->problem->linearise ? PROVISIONAL_LINEARISED : PROVISIONAL;
+  const PetscReal slope = n->provisional.n ? n->provisional.slope : q->slope;
+  PetscInt most = PROVISIONAL;
+
+  if (n->problem->linearise)
+    most = slope < 0. ? PROVISIONAL_LINEARISED : PROVISIONAL_ASCENT;
 
   q->provisional = (PetscBool)(!q->enough && !q->monotone && (q->slope < 0. || q->circulatory) &&
                                n->provisional.n < most && q->change < PETSC_INFINITY &&
@@ -288,7 +297,7 @@ static PetscErrorCode undo_provisional(Search *q)
   q->change = n->provisional.first;
   q->undone = n->provisional.rise;
   n->provisional.n = 0;
-  q->s = 1.; /* the first one was full; collision detection may have limited the one from there */
+  q->s = n->provisional.part; /* collision detection may have limited the one from there */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -319,12 +328,13 @@ static PetscErrorCode take(Search *q)
     n->provisional.slope = q->slope;
     n->provisional.norm = n->from.norm;
     n->provisional.first = q->change;
+    n->provisional.part = q->s;
     n->provisional.rise = 0.;
   }
   n->provisional.rise += q->change;
   n->change = q->change - q->undone;
 
-  /* the pressures of the next tangent, linearised at the old X */
+  /* the stresses of the next tangent, linearised at the old X */
   if (p->linearise)
     PetscCall((*p->linearise)(p->ctx, snes->vec_sol, snes->vec_sol_update, q->s));
   PetscCall(VecCopy(n->to.x, snes->vec_sol));
@@ -367,6 +377,19 @@ PetscErrorCode SbNewtonSearch(SNES snes, PetscReal slope, PetscReal *s)
     }
     if (q.enough || q.provisional)
       break;
+
+    /* linearised stresses: a part of the step that inverts no tet */
+    if (p->linearise && !q.monotone && q.s > 2. * INTACT && n->to.ninverted > n->from.ninverted) {
+      q.s *= 0.5;
+      continue;
+    }
+
+    /* a shorter load step needs fewer iterations */
+    if (p->may_give_up) {
+      snes->reason = SNES_DIVERGED_LINE_SEARCH;
+      *s = q.s;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
 
     /* the search goes on with a better direction, or from the iterate before provisional steps */
     if (n->provisional.n) {

@@ -7,9 +7,8 @@
   energy is psi(u_0 + w (X - u_0)) / w^2. Barrier contact is evaluated at X, with the weight that
   the integrator gives its force.
 
-  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the
-  step, as if it were an unknown of its own (src/fem/quadratic.c). Time steps are short enough
-  without.
+  Stresses. In static runs the geometric stiffness uses the linearised stresses after the step, as
+  if they were unknowns of their own (src/fem/linear_stress.c). Time steps are short enough without.
 
   Barrier contact is solved when the last step is a full one, and below a part of the way of the
   fastest body in a time step (static: of the size of the smallest body), and below a part of the
@@ -93,7 +92,7 @@ static PetscErrorCode negative_eigenvalues(void *ctx, PetscInt *n)
 static PetscErrorCode linearise(void *ctx, Vec X, Vec Y, PetscReal s)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceLinearisePressure(((SbPotential)ctx)->run->model->space, X, Y, -1., s));
+  PetscCall(SbSpaceLineariseStress(((SbPotential)ctx)->run->model->space, X, Y, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,7 +232,6 @@ PetscErrorCode SbPotentialCreate(SbRun run)
   q->run = run;
   q->barrier = (SbNewtonBarrier){.max_step = max_step,
                                  .advance = advance,
-                                 .prescribed_part = prescribed_part,
                                  .inverted = inverted,
                                  .hessian = hessian,
                                  .solve = solve,
@@ -245,10 +243,16 @@ PetscErrorCode SbPotentialCreate(SbRun run)
                                  .filter = m->may_filter ? filter : NULL,
                                  .negative_eigenvalues = negative_eigenvalues,
                                  .linearise = m->dynamic ? NULL : linearise,
+                                 .prescribed_part = prescribed_part,
                                  .interrupted = interrupted,
                                  .barrier = m->contacts.npotential ? &q->barrier : NULL,
                                  .ctx = q,
                                  .nonsymmetric = (PetscBool)(run->solve.nonsymmetric.U != NULL)};
+
+  q->problem.quadratic = (PetscBool)!m->dynamic;
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    if (!m->material[k]->adaptive && m->material[k]->tangent != SB_TANGENT_EXACT)
+      q->problem.quadratic = PETSC_FALSE;
 
   /* rounding of the strain energy of a rotated body: eps E V */
   for (PetscInt b = 0; b < m->nbody; b++)
@@ -266,6 +270,9 @@ PetscErrorCode SbPotentialBegin(SbPotential q, const SbSolvedStep *step, PetscBo
   PetscFunctionBeginUser;
   q->problem.dt = m->dynamic ? step->dt : 0.;
   q->problem.warm_start = warm;
+  q->problem.may_give_up =
+    (PetscBool)(q->run->clock.may_give_up && q->problem.quadratic && !q->problem.nonsymmetric);
+  q->problem.start = m->contacts.npotential ? NULL : step->U0;
   if (!m->contacts.npotential)
     PetscFunctionReturn(PETSC_SUCCESS);
   q->barrier.start = step->U0;

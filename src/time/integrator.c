@@ -87,6 +87,9 @@ const SbOption SbTimeRows[] = {
    "work"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
+  {"static_adapt", SB_OPTION_BOOL, 1, "", "true", "",
+   "give a load step up early that shorter ones reach in fewer iterations; false: only when its "
+   "solve fails"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
    "static: smallest load increment, as a fraction of a load step; below it the run stops, and "
    "says whether a limit load is likely"},

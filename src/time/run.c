@@ -58,6 +58,7 @@ static PetscErrorCode read_static(SbRun r)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionInt(&SbRunScope, "static_steps", &r->clock.static_steps));
+  PetscCall(SbOptionBool(&SbRunScope, "static_adapt", &r->clock.adapt));
   PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->clock.min_increment));
   PetscCall(SbOptionSecond(&SbRunScope, "static_control", &r->clock.arc.on));
   r->clock.t_end = 1.;

@@ -4,6 +4,9 @@
   is halved and repeated from the last equilibrium; after each successful step the length doubles
   again.
 
+  With -static_adapt a step without contact that converges slowly is given up early and halved, at
+  most EARLY times in a row: beyond a limit load the energy has to be searched.
+
   Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be
   halved forever. Below -static_min_increment the run stops; the growth of displacements with the
   load, over its minimum of all steps, tells a limit load from other failures. A shortened step
@@ -13,6 +16,9 @@
 
 #define LIMIT \
   10. /* growth of displacements with the load, over its minimum, that indicates a limit load */
+#define EARLY 4 /* halvings in a row of load steps that are given up early */
+#define EASY \
+  25 /* iterations of a load step, failed attempts included, after which its length doubles */
 #define PUSH \
   1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
 #define EXCESS \
@@ -228,12 +234,13 @@ PetscErrorCode SbStaticSolve(SbRun run)
     const SbSolvedStep end = {factor, next - factor, run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE;
-    PetscBool found;
+    PetscBool found, easy;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure
        takes long */
     if (run->solve.nonsymmetric.U && !run->counters.steps && !contact)
       PetscCall(find_free_body(&load, PETSC_FALSE, PETSC_FALSE, &found));
+    run->clock.may_give_up = (PetscBool)(run->clock.adapt && !contact && halvings < EARLY);
     if (!run->solve.free_body)
       PetscCall(SbRunAttempt(run, &attempt, &ok));
 
@@ -278,13 +285,15 @@ PetscErrorCode SbStaticSolve(SbRun run)
       PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
     if (run->counters.newton_step)
       halvings = 0;
+    easy = (PetscBool)(run->counters.newton_step <= EASY);
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     if (run->clock.paused || run->clock.stopped)
       break;
 
     /* lengthen the next step */
     factor = next;
-    length = PetscMin(2. * length, nominal);
+    if (!run->clock.adapt || easy)
+      length = PetscMin(2. * length, nominal);
   }
   PetscCall(VecDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);

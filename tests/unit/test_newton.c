@@ -468,7 +468,6 @@ static void add_barrier(Problem *p, Vec start)
   p->prescribed = PETSC_TRUE;
   p->barrier = (SbNewtonBarrier){.max_step = max_step,
                                  .advance = advance,
-                                 .prescribed_part = prescribed_part,
                                  .inverted = inverted,
                                  .hessian = hessian,
                                  .solve = solve,
@@ -477,6 +476,7 @@ static void add_barrier(Problem *p, Vec start)
                                  .start = start,
                                  .total_mass = 1.};
   p->newton.barrier = &p->barrier;
+  p->newton.prescribed_part = prescribed_part;
   p->newton.dt = 1.;
 }
 
