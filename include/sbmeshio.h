@@ -250,10 +250,8 @@ PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void 
 /* Allocates n vertices, numbered from 1 on. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Adds to the note what the reader has done, or what a mesh does not need and is left out: each
-   kind once, with its count. SbImportNoteSkipped() writes these into the note. */
-void SbImportRemark(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+   kind once, with its count. */
 PetscErrorCode SbImportSkip(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
-void SbImportNoteSkipped(SbImport *import);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);

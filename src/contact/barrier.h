@@ -338,10 +338,14 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
 PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
                               PetscReal x[]);
 
-/* Multipliers (multipliers.c). Find: of a pair; NULL: it has none. Update: takes the forces at the
+/* Multipliers of pairs (pair_forces.c): what a pair is found by; the order of that, for qsort() and
+   bsearch(); the multipliers of a pair, NULL: it has none. */
+void SbPairKey(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY]);
+int SbPairForceOrder(const void *p, const void *q);
+const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
+/* Multipliers (multipliers.c). Update: takes the forces at the
    current positions, of a solution, for the friction of the next one as well; `again`: they have
    changed by more than a tolerance. Collective. */
-const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
 PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
 PetscErrorCode SbMultipliersKeep(Barrier *b);

@@ -40,8 +40,7 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PairForce *known =
-      has_multipliers(b) && b->multipliers.now.n ? SbMultiplierFind(b, pair) : NULL;
+    const PairForce *known = has_multipliers(b) ? SbMultiplierFind(b, pair) : NULL;
     Active a = {.pair = *pair, .force = known ? known->force : 0.};
 
     if (!known &&

@@ -24,49 +24,6 @@
 #define STUCK 3          /* ... updates; else it settles no further */
 #define LOOSE 0.1        /* then the tolerance without a warning */
 
-static void find_key(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY])
-{
-  key[0] = pair->side;
-  key[1] = pair->kind;
-  for (int k = 0; k < 4; k++)
-    key[2 + k] = SbContactNumber(b->surface, pair->v[k]);
-}
-
-static int compare(const PetscInt p[PAIR_KEY], const PetscInt q[PAIR_KEY])
-{
-  for (int k = 0; k < PAIR_KEY; k++)
-    if (p[k] != q[k])
-      return p[k] < q[k] ? -1 : 1;
-  return 0;
-}
-
-static int by_pair(const void *p, const void *q)
-{
-  return compare(((const PairForce *)p)->key, ((const PairForce *)q)->key);
-}
-
-const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
-{
-  const PairForces *m = &b->multipliers.now;
-  PetscInt key[PAIR_KEY];
-  PetscInt low = 0;
-  PetscInt high = m->n;
-
-  find_key(b, pair, key);
-  while (low < high) {
-    const PetscInt middle = (low + high) / 2;
-    const int order = compare(key, m->pair[middle].key);
-
-    if (!order)
-      return &m->pair[middle];
-    if (order < 0)
-      high = middle;
-    else
-      low = middle + 1;
-  }
-  return NULL;
-}
-
 /* What multipliers are wrong by, over the width, and where. */
 typedef struct {
   PetscReal by;
@@ -113,10 +70,10 @@ static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **min
     if (d[1] >= 0.)
       continue;
     list[*n] = (PairForce){.force = -d[1]};
-    find_key(b, &a->pair, list[(*n)++].key);
+    SbPairKey(b, &a->pair, list[(*n)++].key);
   }
   if (*n)
-    qsort(list, (size_t)*n, sizeof(*list), by_pair);
+    qsort(list, (size_t)*n, sizeof(*list), SbPairForceOrder);
 
   /* friction */
   for (PetscInt i = 0; i < b->friction.pairs.n && b->options.sticks; i++) {
@@ -128,8 +85,8 @@ static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **min
 
     if (!counts(b, &friction->on.pair))
       continue;
-    find_key(b, &friction->on.pair, at.key);
-    with = *n ? (PairForce *)bsearch(&at, list, (size_t)*n, sizeof(*list), by_pair) : NULL;
+    SbPairKey(b, &friction->on.pair, at.key);
+    with = *n ? (PairForce *)bsearch(&at, list, (size_t)*n, sizeof(*list), SbPairForceOrder) : NULL;
     for (int k = 0; k < 3; k++) {
       q[k] *= factor;
       if (with)
@@ -155,7 +112,7 @@ static PetscErrorCode share(const Barrier *b, PetscInt n, const PairForce mine[]
   PetscCall(PetscArraycpy(table->pair, all, table->n));
   PetscCall(PetscFree(all));
   if (table->n)
-    qsort(table->pair, (size_t)table->n, sizeof(*table->pair), by_pair);
+    qsort(table->pair, (size_t)table->n, sizeof(*table->pair), SbPairForceOrder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

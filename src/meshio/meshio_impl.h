@@ -202,3 +202,7 @@ PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size,
                             char value[]); /* value in quotes */
 /* Reads the rest of the line as a name, trimmed; "" if empty. */
 PetscErrorCode SbScanRestOfLine(SbScan *scan, size_t size, char name[]);
+
+/* Adds to the note of an import; writes what SbImportSkip() counted into it. */
+void SbImportRemark(SbImport *import, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+void SbImportNoteSkipped(SbImport *import);
