@@ -126,7 +126,8 @@ struct _p_SbSpace {
     block_scale;    /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
-  SbPack *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
+  SbPack
+    *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
 };
 

@@ -72,13 +72,13 @@ typedef struct {
   PetscErrorCode (*interrupted)(void *ctx, PetscBool *is);
   const SbNewtonBarrier *barrier; /* borrowed; NULL: none */
   Vec start; /* static, without barriers: the last equilibrium, m; borrowed. NULL: unknown */
-  void *ctx;                      /* of all operations; borrowed */
-  PetscReal rounding;             /* of the strain energy, J */
-  PetscReal dt;                   /* length of the step, s; 0: without inertia */
-  PetscBool nonsymmetric;         /* some forces have no potential */
-  PetscBool quadratic;   /* static: tangents are exact */
-  PetscBool may_give_up; /* static: the load step can be shortened */
-  PetscBool warm_start;  /* the solve starts from the last one's solution, with its tolerance */
+  void *ctx; /* of all operations; borrowed */
+  PetscReal rounding;     /* of the strain energy, J */
+  PetscReal dt;           /* length of the step, s; 0: without inertia */
+  PetscBool nonsymmetric; /* some forces have no potential */
+  PetscBool quadratic;    /* static: tangents are exact */
+  PetscBool may_give_up;  /* static: the load step can be shortened */
+  PetscBool warm_start;   /* the solve starts from the last one's solution, with its tolerance */
 } SbNewtonProblem;
 
 /* Constructor of the SNESType, for SNESRegister(). */

@@ -118,9 +118,9 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
    NULL. */
 void SbBatchState(SbSpace space, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS]);
-/* linear_stress.c: C = the tangent of a law at F with the linearised stress. Pressures of P2's mean,
-   Pa, tension, or NULL: hessian in the second derivative of theta, mean in the stress. Filtered, C
-   is positive semi-definite. */
+/* linear_stress.c: C = the tangent of a law at F with the linearised stress. Pressures of P2's
+   mean, Pa, tension, or NULL: hessian in the second derivative of theta, mean in the stress.
+   Filtered, C is positive semi-definite. */
 void SbLinearStressTangent(const struct _p_SbMaterial *m, const SbPack F[9],
                            const SbLinearStress *stress, const SbPack hessian, const SbPack mean,
                            SbPack C[81]);

@@ -177,7 +177,8 @@ static PetscErrorCode list_body(SbMesh mesh, PetscInt body, PetscInt *ncell, Pet
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     if (mesh->cell_body[c] != body)
       continue;
-    PetscCall(PetscArraycpy(*cell + 4 * n++, mesh->cell + 4 * c, 4));
+    PetscCall(PetscArraycpy(*cell + 4 * n, mesh->cell + 4 * c, 4));
+    n++;
     for (int f = 0; f < 4; f++) {
       if (!(mesh->face_set[4 * c + f] & SB_ON_BOUNDARY))
         continue;

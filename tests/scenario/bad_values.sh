@@ -128,6 +128,7 @@ core=(-body_block_inclusions core -sets core -set_core_at "halfspace:1,0,0,1" -i
 warns "-inclusion_core_poisson|0.4999|p2" block.opts "${core[@]}" -inclusion_core_poisson 0.4999
 warns "-inclusion_core_poisson|-0.999" block.opts "${core[@]}" -inclusion_core_poisson -0.999
 for name in boundary all; do
+  # shellcheck disable=SC2016 # gmsh's own
   printf '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 1 "%s"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1
 $EndNodes\n$Elements\n2\n1 2 2 1 1 1 2 3\n2 4 2 2 1 1 2 3 4\n$EndElements\n' $name >named.msh
   warns "group:$name|block" block.opts -body_block_mesh named.msh "${hold[@]}" -effects hold -effect_hold_on $name

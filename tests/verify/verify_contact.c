@@ -328,7 +328,8 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
    mm. */
 #define TABLE                                                                                   \
   "-bodies a,table -body_table_mesh box:1.4,0.6,0.1:3,2,1 -body_table_translate "               \
-  "-0.213,-0.187,-0.121 -body_table_material linear -body_table_young 2e6 -body_table_poisson 0.3 " \
+  "-0.213,-0.187,-0.121 -body_table_material linear -body_table_young 2e6 -body_table_poisson " \
+  "0.3 "                                                                                        \
   "-body_table_density "                                                                        \
   "100 -effect_hold_type fixed -effect_hold_on table "
 
