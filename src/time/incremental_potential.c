@@ -8,7 +8,8 @@
   the integrator gives its force.
 
   Stresses. In static runs the geometric stiffness uses the linearised stresses after the step, as
-  if they were unknowns of their own (src/fem/linear_stress.c). Time steps are short enough without.
+  if they were unknowns of their own (src/fem/linear_stress.c). Time steps are short enough without;
+  constraints of nodes, which change from solve to solve, are solved again from a solution.
 
   Barrier contact is solved when the last step is a full one, and below a part of the way of the
   fastest body in a time step (static: of the size of the smallest body), and below a part of the
@@ -216,6 +217,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
 {
   const SbModel m = run->model;
   const SNES snes = run->solve.snes;
+  const PetscBool nodes = (PetscBool)(m->contacts.n > m->contacts.npotential);
   SNESType type;
   PetscBool newton;
   SbPotential q;
@@ -242,7 +244,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
   q->problem = (SbNewtonProblem){.energy = energy,
                                  .filter = m->may_filter ? filter : NULL,
                                  .negative_eigenvalues = negative_eigenvalues,
-                                 .linearise = m->dynamic ? NULL : linearise,
+                                 .linearise = m->dynamic || nodes ? NULL : linearise,
                                  .prescribed_part = prescribed_part,
                                  .interrupted = interrupted,
                                  .barrier = m->contacts.npotential ? &q->barrier : NULL,

@@ -416,7 +416,7 @@ int main(int argc, char **argv)
   PetscCall(check_held("-ts_adapt_type basic -time genalpha"));
   PetscCall(check_ledger("", 0.));
   PetscCall(check_ledger("-accuracy 0.1", 0.1));
-  PetscCall(check_failed("1", PETSC_TRUE));
+  PetscCall(check_failed("1 -static_steps 3", PETSC_TRUE));
   PetscCall(check_failed("2", PETSC_FALSE));
   SB_TEST_END();
 }
