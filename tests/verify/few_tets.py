@@ -76,7 +76,7 @@ TIGHT = "-snes_rtol 1e-10 -ksp_rtol 1e-10 -ts_dt 0.01 -ts_max_time 0.03"
 CLAMP = "-effect_clamp_type fixed -effect_clamp_on foot -sets foot,tip -set_foot_at halfspace:0,0,1,0.001 -set_tip_at halfspace:0,0,-1,-0.09"
 HANG = f"-effects gravity,clamp {CLAMP}"
 FLOOR = "-effects gravity,floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,-0.0001"
-STACK = ("-bodies a,b -body_b_translate 0.01,0.01,0.1002 -effects gravity,clamp,meet -effect_clamp_type fixed -effect_clamp_on a.zmin "
+STACK = ("-bodies a,b -body_b_translate 0.01,0.013,0.1002 -effects gravity,clamp,meet -effect_clamp_type fixed -effect_clamp_on a.zmin "
          "-effect_meet_type contact -effect_meet_friction 0.2")
 PROBES = ("-probes p,q,r -probe_p_at 0.09,0.01,0.01 -probe_p_fields displacement,velocity,von_mises -probe_q_on a -probe_q_fields "
           "position,stress -probe_r_in a -probe_r_fields pressure,J,energy_density")
