@@ -276,7 +276,9 @@ static inline PetscBool SbFrictionSticks(const Barrier *b, const FrictionPair *f
 /* The friction force over q, of its length p over Coulomb's limit. */
 static inline PetscReal SbBarrierFactor(const Barrier *b, PetscReal p)
 {
-  return p >= 1. ? 1. / p : b->options.sticks ? 1. : 2. - p;
+  if (p >= 1.)
+    return 1. / p;
+  return b->options.sticks ? 1. : 2. - p;
 }
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
 PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,

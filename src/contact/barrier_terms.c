@@ -291,8 +291,10 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
     const PetscReal p = SbBarrierSticking(b, friction, q);
     PetscReal factor = SbBarrierFactor(b, p);
     const PetscBool slides = (PetscBool)(p >= (b->options.sticks ? SLIDES : 1.));
-    PetscReal curve = slides ? 0. : b->options.sticks ? 1. : 2. - 2. * p;
+    PetscReal curve = 0.;
 
+    if (!slides)
+      curve = b->options.sticks ? 1. : 2. - 2. * p;
     (void)SbBarrierSlip(b, friction, friction->slip);
     friction->sticks =
       (PetscBool)(slides && kind != SB_HESSIAN_MAJORIZED &&

@@ -1,6 +1,6 @@
 /*
-  friction_pairs.c - lagged friction of pairs: of the barrier and of penalty springs by the smooth
-  energy of response_barrier.c, of responses with multipliers by exact ones (multipliers.c).
+  friction_pairs.c - friction of pairs: -effect_X_sticking exact by multipliers (multipliers.c),
+  smooth by the energy of response_barrier.c.
 
   Normal forces and slip directions of friction are those of an earlier state y: the start of the
   step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is

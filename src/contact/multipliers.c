@@ -1,5 +1,6 @@
 /*
-  multipliers.c - multipliers of pairs, of the responses `augmented`, `projected` and `multiplier`.
+  multipliers.c - multipliers of pairs: of gaps with augmented, projected and multiplier; of
+  friction.
 
   The constraint of a pair is g >= 0, g its gap beyond the one that it keeps. Its force is that of
   the augmented Lagrangian, <l - c g>, with the multiplier l and the stiffness c = k area
