@@ -1,6 +1,6 @@
 /*
   contact_impl.h - the effect `contact`: shared by responses of nodes (nodes.c, friction_nodes.c)
-  and of surfaces (barrier.h).
+  and of surfaces (surfaces.h).
 */
 #pragma once
 #include "obstacle.h"

@@ -5,10 +5,10 @@
   In the matrix a pair has the stiffness of the response `augmented`, the rest is in its row
   (SbPairMatrixLaw).
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 /* Adds the row of the derivative of `direction` . sum weight x by the free components of nodes. */
-static PetscErrorCode add_row(const Barrier *b, const Active *a, const PetscReal direction[3],
+static PetscErrorCode add_row(const Surfaces *b, const Active *a, const PetscReal direction[3],
                               PetscReal goal, PetscReal soft, PetscReal stiffness,
                               SbConstraintRows *rows)
 {
@@ -54,13 +54,13 @@ static void find_tangents(const PetscReal n[3], PetscReal t[2][3])
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
   if (!contact->exact)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierUpdate(b, u));
+  PetscCall(SbSurfacesUpdate(b, u));
 
   /* gaps */
   for (PetscInt i = 0; i < b->active.n; i++) {
@@ -82,9 +82,9 @@ PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const Pe
     PetscReal q[3], slip[3], t[2][3];
 
     if (!counts(b, &friction->on.pair) ||
-        !SbFrictionSticks(b, friction, SbBarrierSticking(b, friction, q)))
+        !SbFrictionSticks(b, friction, SbPairSticking(b, friction, q)))
       continue;
-    (void)SbBarrierSlip(b, friction, slip);
+    (void)SbPairSlip(b, friction, slip);
     find_tangents(friction->on.at.n, t);
     for (int k = 0; k < 2; k++)
       PetscCall(add_row(b, &friction->on, t[k], SbDot3(slip, t[k]), soft,

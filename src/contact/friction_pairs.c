@@ -1,6 +1,6 @@
 /*
   friction_pairs.c - friction of pairs: -effect_X_sticking exact by multipliers (multipliers.c),
-  smooth by the energy of response_barrier.c.
+  smooth by the energy of surfaces.c.
 
   Normal forces and slip directions of friction are those of an earlier state y: the start of the
   step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is
@@ -9,7 +9,7 @@
   when it is small (Li et al. 2020, section 5.7). They converge if a change of friction changes
   normal forces by less than itself.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define LAGS 100 /* largest number of lagged-friction iterations of a load step */
 #define STUCK \
@@ -20,7 +20,7 @@
 #define PARTINGS 20 /* solves of a load step that separate overlaps */
 
 /* Its multiplier, turned to the tangent plane of now and within Coulomb's limit. */
-static void find_tangent(const Barrier *b, FrictionPair *friction)
+static void find_tangent(const Surfaces *b, FrictionPair *friction)
 {
   const PairForce *known = SbMultiplierFind(b, &friction->on.pair);
   const PetscReal *n = friction->on.at.n;
@@ -37,7 +37,7 @@ static void find_tangent(const Barrier *b, FrictionPair *friction)
 
 /* Displacement in the step of the obstacle's contact point by rotation, beyond that of its
    vertices. */
-static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *friction)
+static void find_rotation(const Surfaces *b, PetscBool end, FrictionPair *friction)
 {
   const SbContactSurface m = b->surface;
   const PetscInt *v = friction->on.pair.v;
@@ -69,7 +69,7 @@ static void find_rotation(const Barrier *b, PetscBool end, FrictionPair *frictio
   }
 }
 
-PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
+PetscErrorCode SbSurfacesFindFriction(Surfaces *b, PetscBool end)
 {
   PetscFunctionBeginUser;
   b->friction.next.n = 0;
@@ -77,8 +77,7 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
     PetscReal energy, gradient[12];
     FrictionPair friction = {.on = b->active.pair[i]};
 
-    friction.force =
-      b->contact.friction.mu * SbBarrierNormalForce(b, &friction.on, &energy, gradient);
+    friction.force = b->contact.friction.mu * SbPairNormalForce(b, &friction.on, &energy, gradient);
     if (friction.force <= 0.)
       continue;
     friction.stiffness = friction.force / b->friction.slip;
@@ -96,7 +95,7 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbBarrierSwapFriction(Barrier *b)
+void SbSurfacesSwapFriction(Surfaces *b)
 {
   const FrictionPairs friction = b->friction.pairs;
 
@@ -104,21 +103,21 @@ void SbBarrierSwapFriction(Barrier *b)
   b->friction.next = friction;
 }
 
-PetscErrorCode SbBarrierLag(Barrier *b)
+PetscErrorCode SbSurfacesLag(Surfaces *b)
 {
   const SbSpace s = b->surface->space;
   PetscReal *f;
   PetscReal sum[2] = {0.};
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
+  PetscCall(SbSurfacesFindFriction(b, PETSC_TRUE));
 
   /* the normal forces cancel */
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  (void)SbBarrierAddGradient(b, 1., f);
-  SbBarrierSwapFriction(b);
-  (void)SbBarrierAddGradient(b, -1., f);
-  SbBarrierSwapFriction(b);
+  (void)SbSurfacesAddGradient(b, 1., f);
+  SbSurfacesSwapFriction(b);
+  (void)SbSurfacesAddGradient(b, -1., f);
+  SbSurfacesSwapFriction(b);
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   for (PetscInt i = 0; i < b->friction.next.n; i++)
@@ -131,7 +130,7 @@ PetscErrorCode SbBarrierLag(Barrier *b)
 
 /* Whether friction of the last solution differs from that of the next one by more than it may, and
    a further solve may help. */
-static PetscErrorCode needs_more(SbEffect e, Barrier *b, PetscBool last, PetscBool solved,
+static PetscErrorCode needs_more(SbEffect e, Surfaces *b, PetscBool last, PetscBool solved,
                                  PetscBool *more)
 {
   PairFriction *f = &b->friction;
@@ -139,7 +138,7 @@ static PetscErrorCode needs_more(SbEffect e, Barrier *b, PetscBool last, PetscBo
     e->dynamic && !b->options.friction_solves ? MUCH : b->options.friction_tolerance;
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierLag(b));
+  PetscCall(SbSurfacesLag(b));
   if (f->lag < FALLS * f->least) {
     f->least = f->lag;
     f->nstuck = 0;
@@ -160,10 +159,10 @@ static PetscErrorCode needs_more(SbEffect e, Barrier *b, PetscBool last, PetscBo
 /* After a solve: friction takes the normal forces and directions of the solution, while its lag is
    large. How many solves a step may have: those of the option; a time step two, both of solutions;
    a load step LAGS, of which the first ones separate overlaps. */
-PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                               PetscBool solved, PetscBool *again)
+PetscErrorCode SbContactUpdateFriction_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                                PetscBool solved, PetscBool *again)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbEffect e = contact->effect;
   const PetscInt given = b->options.friction_solves;
   const PetscInt most = e->dynamic ? 2 : LAGS;
@@ -178,11 +177,11 @@ PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, con
   last = (PetscBool)(++b->friction.nlag >= (given ? given : most));
   if (last && (given || e->dynamic))
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierUpdate(b, u));
+  PetscCall(SbSurfacesUpdate(b, u));
 
   /* in a static run overlaps are separated within the step */
   if (parts && b->friction.nlag < PARTINGS) {
-    PetscCall(SbBarrierSeparate(e, s, 0., PETSC_FALSE));
+    PetscCall(SbSurfacesSeparate(e, s, 0., PETSC_FALSE));
     b->separation.parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -191,7 +190,7 @@ PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, con
   PetscCall(needs_more(e, b, last, solved, &more));
   if (!more)
     PetscFunctionReturn(PETSC_SUCCESS);
-  SbBarrierSwapFriction(b);
+  SbSurfacesSwapFriction(b);
   *again = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,7 +11,7 @@
   which is stiff relative to the lighter body, as whole bodies collide. Pairs already within the
   width get none, so that a body at rest stays at rest.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define RIGID 1e5  /* restitution: stiffness over mass of the lighter body / dt^2 */
 #define EARLY 0.05 /* extension of the path over its length: near misses count as impacts */
@@ -19,7 +19,7 @@
 #define KEEP 0.01  /* tolerance of the impact's position, over the gap above the width */
 
 /* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
-static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
+static PetscReal meets(const Surfaces *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)
 {
   const SbContactSurface m = b->surface;
@@ -47,7 +47,7 @@ static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscR
 
 /* The spring of a pair at the positions x of its impact; false: it does not approach. Vertices with
    positive weights come first, those of bodies before others. */
-static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const PetscReal x[],
+static PetscBool find_spring(const Surfaces *b, const SbContactPair *pair, const PetscReal x[],
                              Spring *spring)
 {
   const SbContactSurface m = b->surface;
@@ -68,7 +68,7 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
   }
   for (int i = 0; i < 3; i++)
     spring->at.normal[i] = turned ? -d.n[i] : d.n[i];
-  spring->start = SbBarrierSpringPlace(b, spring);
+  spring->start = SbSpringPlace(b, spring);
   for (PetscInt k = 0; k < spring->at.n; k++)
     spring->approach -=
       spring->at.weight[k] * SbDot3(spring->at.normal, b->motion.other + 3 * spring->at.v[k]);
@@ -76,10 +76,10 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
   return (PetscBool)(spring->approach > 0.);
 }
 
-PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,
-                                            const PetscReal u0[], const PetscReal v0[])
+PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, PetscReal dt,
+                                             const PetscReal u0[], const PetscReal v0[])
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbContactSurface m = b->surface;
   PetscReal *u1, *x;
 
@@ -92,8 +92,8 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
   PetscCall(PetscMalloc1(3 * s->nnode, &u1));
   for (PetscInt i = 0; i < 3 * s->nnode; i++)
     u1[i] = u0[i] + dt * v0[i];
-  PetscCall(SbBarrierUpdate(b, u0));
-  PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(SbSurfacesUpdate(b, u0));
+  PetscCall(SbSurfacesPlace(b, u1, 1., b->motion.other));
   PetscCall(PetscFree(u1));
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.other));
   PetscCall(PetscMalloc1(3 * m->nvertex, &x));
@@ -128,9 +128,9 @@ PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work)
+PetscErrorCode SbContactImpactWork_Surfaces(SbContact contact, PetscReal *work)
 {
-  const Barrier *b = (const Barrier *)contact;
+  const Surfaces *b = (const Surfaces *)contact;
   PetscReal push[15];
 
   PetscFunctionBeginUser;
@@ -138,14 +138,14 @@ PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work)
     const Spring *spring = &b->springs.spring[i];
 
     if (counts_spring(b, spring))
-      *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
+      *work += SbSpringForce(b, spring, push) * (SbSpringPlace(b, spring) - spring->start);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal share)
+PetscErrorCode SbContactScaleRestitution_Surfaces(SbContact contact, PetscReal share)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
 
   PetscFunctionBeginUser;
   b->contact.bounce.left = share;
@@ -154,7 +154,7 @@ PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal sh
 
     /* a goal lowered below the spring's deflection would release it: keep it active for the next
        iteration */
-    spring->held = (PetscBool)(SbBarrierSpringPlace(b, spring) < spring->goal);
+    spring->held = (PetscBool)(SbSpringPlace(b, spring) < spring->goal);
     spring->goal = spring->start + SbRestitutionGap(&b->contact.bounce, 0., spring->approach);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,7 @@
   is the force of a pair that sticks, and what exceeds mu N of it slips (Simo and Laursen). At the
   end t stays, so that u = 0 where a pair sticks. N and directions are those of the solution before.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define SETTLED 1e-3     /* tolerance of gaps, over those that are kept */
 #define EXACT 1e-10      /* the same of exact constraints in static runs */
@@ -32,7 +32,7 @@ typedef struct {
   PetscReal x[3];
 } Wrong;
 
-static void find_worse(const Barrier *b, const SbContactPair *pair, PetscReal by, Wrong *worst)
+static void find_worse(const Surfaces *b, const SbContactPair *pair, PetscReal by, Wrong *worst)
 {
   if (by <= worst->by)
     return;
@@ -44,7 +44,7 @@ static void find_worse(const Barrier *b, const SbContactPair *pair, PetscReal by
 }
 
 /* mine[n], in order: the forces of a solution, of pairs that this rank counts; the caller frees. */
-static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **mine, Wrong *worst)
+static PetscErrorCode find_forces(const Surfaces *b, PetscInt *n, PairForce **mine, Wrong *worst)
 {
   PairForce *list;
 
@@ -81,7 +81,7 @@ static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **min
     const FrictionPair *friction = &b->friction.pairs.pair[i];
     const PetscReal scale = friction->stiffness * of_pair(b, b->widths.w, &friction->on.pair);
     PetscReal q[3];
-    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, friction, q));
+    const PetscReal factor = SbPairFrictionFactor(b, SbPairSticking(b, friction, q));
     PairForce at, *with;
 
     if (!counts(b, &friction->on.pair))
@@ -100,7 +100,8 @@ static PetscErrorCode find_forces(const Barrier *b, PetscInt *n, PairForce **min
 }
 
 /* The table of all ranks from entries that each rank counts. Collective. */
-static PetscErrorCode share(const Barrier *b, PetscInt n, const PairForce mine[], PairForces *table)
+static PetscErrorCode share(const Surfaces *b, PetscInt n, const PairForce mine[],
+                            PairForces *table)
 {
   const PetscInt size = (PetscInt)sizeof(*mine);
   PairForce *all;
@@ -117,7 +118,7 @@ static PetscErrorCode share(const Barrier *b, PetscInt n, const PairForce mine[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode warn(const Barrier *b, const Wrong *worst)
+static PetscErrorCode warn(const Surfaces *b, const Wrong *worst)
 {
   const SbSpace s = b->surface->space;
   const SbEffect e = b->contact.base.effect;
@@ -144,7 +145,7 @@ static PetscErrorCode warn(const Barrier *b, const Wrong *worst)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
+PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again)
 {
   const MPI_Comm comm = b->surface->space->comm;
   Multipliers *m = &b->multipliers;
@@ -171,8 +172,8 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
   if (by > tolerance && m->stuck < STUCK && m->updates < UPDATES) {
     m->updates++;
     PetscCall(share(b, n, mine, &m->now));
-    PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
-    SbBarrierSwapFriction(b);
+    PetscCall(SbSurfacesFindFriction(b, PETSC_TRUE));
+    SbSurfacesSwapFriction(b);
     b->motion.known = PETSC_FALSE;
     *again = PETSC_TRUE;
   } else if (by > LOOSE && !m->said) {
@@ -183,7 +184,7 @@ PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMultipliersKeep(Barrier *b)
+PetscErrorCode SbMultipliersKeep(Surfaces *b)
 {
   PairForce *mine;
   PetscInt n;
@@ -198,7 +199,7 @@ PetscErrorCode SbMultipliersKeep(Barrier *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMultipliersRestore(Barrier *b)
+PetscErrorCode SbMultipliersRestore(Surfaces *b)
 {
   Multipliers *m = &b->multipliers;
 

@@ -11,7 +11,7 @@
   penetrate edges and faces, or be passed within a step: there it is `barrier`, unless the scene
   needs an option that it lacks.
 */
-#include "barrier.h"
+#include "surfaces.h"
 #include "nodes.h"
 
 static const SbOption rows[] = {
@@ -270,7 +270,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   c->base.restitution = c->bounce.e;
   if (surfaces)
-    PetscCall(SbBarrierCreate(e, scope));
+    PetscCall(SbSurfacesCreate(e, scope));
   else
     PetscCall(SbContactNodesCreate(e, scope));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -278,7 +278,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
-  .size = PetscMax(sizeof(Barrier), sizeof(Nodes)),
+  .size = PetscMax(sizeof(Surfaces), sizeof(Nodes)),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

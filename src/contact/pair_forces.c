@@ -2,9 +2,9 @@
   pair_forces.c - the table of multipliers of pairs: entries are found by the features of a pair,
   whose numbers do not depend on the partition.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
-void SbPairKey(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY])
+void SbPairKey(const Surfaces *b, const SbContactPair *pair, PetscInt key[PAIR_KEY])
 {
   key[0] = pair->side;
   key[1] = pair->kind;
@@ -23,7 +23,7 @@ int SbPairForceOrder(const void *p, const void *q)
   return 0;
 }
 
-const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair)
+const PairForce *SbMultiplierFind(const Surfaces *b, const SbContactPair *pair)
 {
   const PairForces *m = &b->multipliers.now;
   PairForce at;

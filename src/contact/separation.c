@@ -11,14 +11,14 @@
   stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is
   none left.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define STIFF 10.     /* static run: stiffness over that of the barrier */
 #define SAME 1e-5     /* of the bodies' size: positions this close coincide */
 #define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
 
 /* Whether two bodies coincide: then no separation direction exists. */
-static PetscErrorCode same_place(const Barrier *b, const PetscInt body[2], PetscBool *same)
+static PetscErrorCode same_place(const Surfaces *b, const PetscInt body[2], PetscBool *same)
 {
   const SbContactSurface m = b->surface;
   PetscReal box[2][6];
@@ -40,9 +40,9 @@ static PetscErrorCode same_place(const Barrier *b, const PetscInt body[2], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
+PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
   SbContactOverlap *o = &b->separation.overlap;
   PetscBool inside = PETSC_FALSE;
@@ -155,7 +155,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     Spring spring = {
       .at = *p, .stiffness = b->separation.stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
 
-    spring.start = SbBarrierSpringPlace(b, &spring);
+    spring.start = SbSpringPlace(b, &spring);
     spring.goal =
       spring.start +
       (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact.overlap.left))) : all);

@@ -8,7 +8,7 @@
   stiffness to theirs; the elastic energy of delta is that of the error.
 
   The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n
-  (src/contact/barrier_terms.c) is the error of the state. In a dynamic run K includes inertia: the
+  (src/contact/pair_terms.c) is the error of the state. In a dynamic run K includes inertia: the
   error is relative to the same step without gaps.
 */
 #include "ledger_impl.h"

@@ -7,7 +7,7 @@
   end inside the bowl, and resting bodies are supported.
 */
 #pragma once
-#include "../../src/contact/barrier.h"
+#include "../../src/contact/surfaces.h"
 #include "contact.h"
 
 #define POUR_G 9.81
@@ -89,7 +89,7 @@ static inline PetscErrorCode pour_furthest(TestScene *t, const PetscReal bowl[3]
 }
 
 /* Depth of a point in a convex body, behind n triangles of it, m; negative outside. */
-static inline PetscReal pour_depth(const Barrier *s, const PetscInt from[], PetscInt n,
+static inline PetscReal pour_depth(const Surfaces *s, const PetscInt from[], PetscInt n,
                                    const PetscReal p[3])
 {
   PetscReal depth = PETSC_MAX_REAL;
@@ -115,7 +115,7 @@ static inline PetscReal pour_depth(const Barrier *s, const PetscInt from[], Pets
 */
 static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
 {
-  const Barrier *s = (const Barrier *)contact_effect(m, "meet")->data;
+  const Surfaces *s = (const Surfaces *)contact_effect(m, "meet")->data;
   PetscInt *list[CONTACT_BODIES];
   PetscInt n[CONTACT_BODIES] = {0};
 

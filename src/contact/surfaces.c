@@ -1,8 +1,7 @@
 /*
-  response_barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass
-  through each other.
+  surfaces.c - contact of surfaces: pairs of their features with an energy of the gap, and friction.
 
-  Below the width w pairs of features repel each other by the barrier of pair_energy.c, an
+  Barrier. Below the width w pairs of features repel each other by the barrier of pair_energy.c, an
   energy that is infinite at contact. It is part of the potential that Newton's method minimises
   (src/newton), and every iteration is limited by continuous collision detection
   (pairs.c). So an accepted state can be reached from the one before it without
@@ -26,7 +25,7 @@
   (initial_contacts.c), by the width or, in a static run, half of it; where that fails, by their
   vertices. Bodies that intersect are separated by penalty springs (separation.c).
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define WIDTH 1e-3      /* default w over the size of the smallest body */
 #define WIDTH_CUBE 3e-3 /* largest default w over the cube root of its volume */
@@ -45,16 +44,16 @@
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
 /* Stiffness of springs of this material, Pa/m: that of a layer of cells. */
-static PetscReal spring_of(const Barrier *b, SbMaterial law)
+static PetscReal spring_of(const Surfaces *b, SbMaterial law)
 {
   return b->options.stiffness *
          PetscMin(SbMaterialWaveModulus(law), STIFFEST * SbMaterialShearModulus(law)) /
          b->surface->mean_edge;
 }
 
-static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
+static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   const PetscInt nbody = s->mesh->nbody;
   PetscReal cube = PETSC_MAX_REAL;
   SbFacet *facet;
@@ -68,7 +67,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   nobstacle = 3 * (b->surface->nvertex - b->surface->nbody_vertex);
   s->coupled = PETSC_TRUE;
   if (!b->contact.partner.obstacle)
-    PetscCall(SbBarrierFindBodies(e, s->mesh));
+    PetscCall(SbSurfacesFindBodies(e, s->mesh));
 
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++)
@@ -111,7 +110,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 }
 
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
-static PetscErrorCode find_path(Barrier *b, PetscReal t, PetscReal dt)
+static PetscErrorCode find_path(Surfaces *b, PetscReal t, PetscReal dt)
 {
   const SbContactSurface m = b->surface;
 
@@ -130,7 +129,7 @@ static PetscErrorCode find_path(Barrier *b, PetscReal t, PetscReal dt)
 
 /* The separation direction of a pair at distance zero: the normal of the triangle, or of both
    edges, where surfaces face each other. n: from the second side to the first; false: none. */
-static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[],
+static PetscBool facing(const Surfaces *b, const SbContactPair *pair, const PetscReal normal[],
                         PetscReal n[3])
 {
   const PetscReal *x[4];
@@ -155,11 +154,11 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
   return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
 }
 
-static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, PetscReal t,
-                                               PetscReal dt, const PetscReal u[], PetscBool *first,
-                                               SbInitialContacts *list)
+static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
+                                                PetscReal dt, const PetscReal u[], PetscBool *first,
+                                                SbInitialContacts *list)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbEffect e = contact->effect;
   const SbContactSurface m = b->surface;
   const PetscReal tiny = 1e-9 * m->size;
@@ -171,8 +170,8 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
   *first = PETSC_TRUE;
   PetscCall(find_path(b, t, dt));
   PetscCall(SbContactSurfaceMarkDriven(m));
-  PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
-  PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->separation.searched));
+  PetscCall(SbSurfacesPlace(b, u, 0., b->motion.x));
+  PetscCall(SbSurfacesSeparate(e, s, dt, (PetscBool)!b->separation.searched));
   b->separation.searched = PETSC_TRUE;
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
@@ -209,7 +208,7 @@ static PetscErrorCode initial_contacts_barrier(SbContact contact, SbSpace s, Pet
    summed over all. */
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
@@ -219,7 +218,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
-    PetscCall(SbBarrierPlace(b, u, 0., b->motion.x));
+    PetscCall(SbSurfacesPlace(b, u, 0., b->motion.x));
     PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
     PetscCall(PetscCalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
     PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
@@ -281,7 +280,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 /* Energy of pairs without multipliers at the current positions, J, and the work of its forces there
    on the obstacle along the path of this step, J; this rank's. They rotate with the obstacle:
    moment times angle. */
-static PetscReal gap_energy(const Barrier *b, PetscReal *along)
+static PetscReal gap_energy(const Surfaces *b, PetscReal *along)
 {
   PetscReal sum = 0.;
 
@@ -289,7 +288,7 @@ static PetscReal gap_energy(const Barrier *b, PetscReal *along)
   for (PetscInt i = 0; i < b->active.n && !has_multipliers(b); i++) {
     Term t;
 
-    SbBarrierTerm(b, i, &t);
+    SbPairTerm(b, i, &t);
     if (!t.counts)
       continue;
     sum += t.energy;
@@ -309,7 +308,7 @@ static PetscReal gap_energy(const Barrier *b, PetscReal *along)
 /* w = scale times its default. */
 static void set_scale(SbEffect e, PetscReal scale)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
 
   for (PetscInt i = 0; i < b->surface->space->mesh->nbody; i++)
     b->widths.w[i] *= scale / b->widths.scale;
@@ -318,16 +317,16 @@ static void set_scale(SbEffect e, PetscReal scale)
   b->motion.known = PETSC_FALSE;
 }
 
-static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, PetscReal growth,
-                                          PetscBool *changed)
+static PetscErrorCode scale_width_surfaces(SbContact contact, PetscReal factor, PetscReal growth,
+                                           PetscBool *changed)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbEffect e = contact->effect;
   PetscReal far = b->surface->size;
   PetscReal least;
 
   PetscFunctionBeginUser;
-  if (b->options.width > 0. || b->separation.overlapping)
+  if (!is_barrier(b) || b->options.width > 0. || b->separation.overlapping)
     PetscFunctionReturn(PETSC_SUCCESS);
   b->widths.wider = factor > 1. ? factor : 0.;
   b->widths.growth = growth;
@@ -342,10 +341,10 @@ static PetscErrorCode scale_width_barrier(SbContact contact, PetscReal factor, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
-                                         PetscReal speed, PetscReal u0[])
+static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
+                                          PetscReal speed, PetscReal u0[])
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbEffect e = contact->effect;
   const SbContactSurface m = b->surface;
   PetscReal least = PETSC_MAX_REAL;
@@ -362,30 +361,30 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   if (!b->motion.begun)
     PetscCall(SbContactSurfaceMarkDriven(m));
   if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
-    PetscCall(SbBarrierPlace(b, u0, 0., b->motion.x));
-    PetscCall(SbBarrierSeparate(
+    PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
+    PetscCall(SbSurfacesSeparate(
       e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.)));
   }
   if (!b->motion.begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, &moved));
     if (moved)
-      PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
+      PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE));
   }
   b->motion.begun = PETSC_TRUE;
-  PetscCall(SbBarrierUpdate(b, u0));
+  PetscCall(SbSurfacesUpdate(b, u0));
   if (b->widths.wider >
       0.) { /* widens the barrier as far as its energy grows by at most `growth` */
     const PetscReal old = b->widths.scale;
 
     energy[0] = gap_energy(b, &unused);
     set_scale(e, PetscMin(1., b->widths.wider * old));
-    PetscCall(SbBarrierUpdate(b, u0));
+    PetscCall(SbSurfacesUpdate(b, u0));
     energy[1] = gap_energy(b, &unused);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
     if (energy[1] - energy[0] > b->widths.growth)
       set_scale(e, old);
     b->widths.wider = 0.;
-    PetscCall(SbBarrierUpdate(b, u0));
+    PetscCall(SbSurfacesUpdate(b, u0));
   }
   PetscCall(PetscArraycpy(b->motion.start, b->motion.x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->active.n; i++)
@@ -402,35 +401,35 @@ static PetscErrorCode begin_step_barrier(SbContact contact, SbSpace s, PetscReal
   b->friction.nlag = b->friction.nstuck = 0;
   b->friction.lag = 0.;
   b->friction.least = PETSC_INFINITY;
-  PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
-  SbBarrierSwapFriction(b);
+  PetscCall(SbSurfacesFindFriction(b, PETSC_FALSE));
+  SbSurfacesSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode max_step_barrier(SbContact contact, SbSpace s, const PetscReal u0[],
-                                       const PetscReal u1[], PetscReal *part, PetscInt *nactive)
+static PetscErrorCode max_step_surfaces(SbContact contact, SbSpace s, const PetscReal u0[],
+                                        const PetscReal u1[], PetscReal *part, PetscInt *nactive)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, u0));
+  PetscCall(SbSurfacesUpdate(b, u0));
   *nactive = b->active.n;
-  PetscCall(SbBarrierPlace(b, u1, 1., b->motion.other));
+  PetscCall(SbSurfacesPlace(b, u1, 1., b->motion.other));
   PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other, part));
   b->record.shortest = PetscMin(b->record.shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
+static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stage)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
   PetscReal power;
   PetscReal progress[2] = {0., 0.}; /* of springs: what they opened, what they should */
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(SbSurfacesUpdate(b, stage->u));
 
   /* work of contact on the bodies in the step: of pairs, by their energy or, with multipliers, the
      forces at its end; of friction; of springs */
@@ -440,7 +439,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   for (PetscInt i = 0; i < b->active.n && has_multipliers(b); i++) {
     Term t;
 
-    SbBarrierTerm(b, i, &t);
+    SbPairTerm(b, i, &t);
     for (int k = 0; k < 12 && t.counts; k++) {
       const PetscInt c = 3 * t.v[k / 3] + k % 3;
 
@@ -451,11 +450,11 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     const FrictionPair *pair = &b->friction.pairs.pair[i];
     PetscReal u[3], q[3];
-    const PetscReal factor = SbBarrierFactor(b, SbBarrierSticking(b, pair, q));
+    const PetscReal factor = SbPairFrictionFactor(b, SbPairSticking(b, pair, q));
 
     if (!counts(b, &pair->on.pair))
       continue;
-    (void)SbBarrierSlip(b, pair, u);
+    (void)SbPairSlip(b, pair, u);
     b->friction.loss += factor * SbDot3(q, u);
     for (int k = 0; k < 12; k++) {
       const PetscInt v = pair->on.pair.v[k / 3];
@@ -468,12 +467,12 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   }
   for (PetscInt i = 0; i < b->springs.n; i++) {
     const Spring *spring = &b->springs.spring[i];
-    const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
+    const PetscReal way = SbSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
     if (!counts_spring(b, spring))
       continue;
-    b->contact.base.work += SbBarrierSpring(b, spring, push) * way;
+    b->contact.base.work += SbSpringForce(b, spring, push) * way;
     if (i >= b->springs.n - b->springs.nbounce)
       continue;
     progress[0] += PetscMin(way, spring->goal - spring->start);
@@ -489,7 +488,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
                               : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
-    PetscCall(SbBarrierLag(b));
+    PetscCall(SbSurfacesLag(b));
   b->friction.most = PetscMax(b->friction.most, b->friction.lag);
 
   for (PetscInt i = 0; i < b->active.n; i++)
@@ -509,9 +508,9 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 
 /* Forces follow from the positions and the multipliers: these are saved, and accumulated sums. The
    first record of a rank has its sums; with multipliers each further one has one of them. */
-static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
+static PetscErrorCode save_surfaces(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
-  const Barrier *b = (const Barrier *)e->data;
+  const Surfaces *b = (const Surfaces *)e->data;
   const PairForces *m = &b->multipliers.kept;
   const PetscReal sum[SUMS] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
                                s->rank ? 0. : b->widths.scale};
@@ -534,10 +533,10 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[],
-                                   PetscInt n, const PetscReal records[])
+static PetscErrorCode load_surfaces(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[],
+                                    PetscInt n, const PetscReal records[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   PairForces *m = &b->multipliers.kept;
   PetscReal sum[SUMS] = {0.};
 
@@ -571,26 +570,26 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
 
 /* After a solve: multipliers, then friction. Where only friction has multipliers, a time step takes
    those of the step before. */
-static PetscErrorCode update_barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                     PetscBool solved, PetscBool *again)
+static PetscErrorCode update_surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                      PetscBool solved, PetscBool *again)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const PetscBool settles = (PetscBool)(!contact->effect->dynamic || b->options.settled > 0.);
 
   PetscFunctionBeginUser;
   if (solved && (has_multipliers(b) || (b->options.sticks && settles))) {
-    PetscCall(SbBarrierUpdate(b, u));
+    PetscCall(SbSurfacesUpdate(b, u));
     PetscCall(SbMultipliersUpdate(b, again));
     if (*again)
       PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbContactUpdateFriction_Barrier(contact, s, u, solved, again));
+  PetscCall(SbContactUpdateFriction_Surfaces(contact, s, u, solved, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_barrier(SbEffect e)
+static PetscErrorCode destroy_surfaces(SbEffect e)
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbContactPairsDestroy(&b->pairs));
@@ -612,51 +611,35 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const SbContactOps barrier_ops = {
-  .initial_contacts = initial_contacts_barrier,
-  .begin_step = begin_step_barrier,
-  .find_impacts = SbContactFindImpacts_Barrier,
-  .gradient = SbContactGradient_Barrier,
-  .hessian = SbContactHessian_Barrier,
-  .max_step = max_step_barrier,
-  .update_friction = update_barrier,
-  .impact_work = SbContactImpactWork_Barrier,
-  .scale_restitution = SbContactScaleRestitution_Barrier,
-  .gap = SbContactGap_Barrier,
-  .points = SbContactPoints_Barrier,
-  .nearest = SbContactNearest_Barrier,
-  .gap_forces = SbContactGapForces_Barrier,
-  .scale_width = scale_width_barrier,
-};
-/* The same of springs, with multipliers or exact constraints. */
-static const SbContactOps spring_ops = {
-  .initial_contacts = initial_contacts_barrier,
-  .begin_step = begin_step_barrier,
-  .find_impacts = SbContactFindImpacts_Barrier,
-  .gradient = SbContactGradient_Barrier,
-  .hessian = SbContactHessian_Barrier,
-  .max_step = max_step_barrier,
-  .update_friction = update_barrier,
+static const SbContactOps surface_ops = {
+  .initial_contacts = initial_contacts_surfaces,
+  .begin_step = begin_step_surfaces,
+  .find_impacts = SbContactFindImpacts_Surfaces,
+  .gradient = SbContactGradient_Surfaces,
+  .hessian = SbContactHessian_Surfaces,
+  .max_step = max_step_surfaces,
+  .update_friction = update_surfaces,
   .constraints = SbContactConstraints_Pairs,
-  .impact_work = SbContactImpactWork_Barrier,
-  .scale_restitution = SbContactScaleRestitution_Barrier,
-  .gap = SbContactGap_Barrier,
-  .points = SbContactPoints_Barrier,
-  .nearest = SbContactNearest_Barrier,
-  .gap_forces = SbContactGapForces_Barrier,
+  .impact_work = SbContactImpactWork_Surfaces,
+  .scale_restitution = SbContactScaleRestitution_Surfaces,
+  .gap = SbContactGap_Surfaces,
+  .points = SbContactPoints_Surfaces,
+  .nearest = SbContactNearest_Surfaces,
+  .gap_forces = SbContactGapForces_Surfaces,
+  .scale_width = scale_width_surfaces,
 };
-static const SbEffectOps barrier_effect = {
-  .setup = setup_barrier,
-  .force = SbEffectForce_Barrier,
-  .accept = accept_barrier,
-  .save = save_barrier,
-  .load = load_barrier,
-  .history = SbEffectHistory_Barrier,
-  .summary = SbEffectSummary_Barrier,
-  .destroy = destroy_barrier,
+static const SbEffectOps surface_effect = {
+  .setup = setup_surfaces,
+  .force = SbEffectForce_Surfaces,
+  .accept = accept_surfaces,
+  .save = save_surfaces,
+  .load = load_surfaces,
+  .history = SbEffectHistory_Surfaces,
+  .summary = SbEffectSummary_Surfaces,
+  .destroy = destroy_surfaces,
 };
 
-PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
 {
   static const char *const obstacle[] = {
     "force_x",     "force_y", "force_z", "torque_x",      "torque_y",     "torque_z", "contacts",
@@ -664,7 +647,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   static const char *const bodies[] = {
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   int search, sticking;
 
   PetscFunctionBeginUser;
@@ -681,12 +664,12 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
   }
   PetscCall(SbOptionInt(scope, "friction_solves", &b->options.friction_solves));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->options.friction_tolerance));
-  e->ops = barrier_effect;
+  e->ops = surface_effect;
   PetscCall(SbOptionReal(scope, "stiffness", &b->options.stiffness));
   PetscCall(SbOptionReal(scope, "multiplier_tolerance", &b->options.settled));
   PetscCall(SbOptionChoice(scope, "sticking", &sticking));
   b->options.sticks = (PetscBool)(b->contact.friction.mu > 0. && sticking == 0);
-  b->contact.base.ops = is_barrier(b) ? &barrier_ops : &spring_ops;
+  b->contact.base.ops = &surface_ops;
   b->contact.base.exact = is_exact(b);
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);

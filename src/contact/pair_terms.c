@@ -1,11 +1,11 @@
 /*
-  barrier_terms.c - the pairs of the response `barrier` at an iterate, their energy and its
-  derivatives, and those of friction, described in response_barrier.c.
+  pair_terms.c - the pairs of surfaces at an iterate, their energy and its
+  derivatives, and those of friction, described in surfaces.c.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
-PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
-                              PetscReal x[])
+PetscErrorCode SbSurfacesPlace(const Surfaces *b, const PetscReal u[], PetscReal progress,
+                               PetscReal x[])
 {
   const PetscInt first = 3 * b->surface->nbody_vertex;
 
@@ -18,7 +18,7 @@ PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
+PetscErrorCode SbSurfacesUpdate(Surfaces *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->surface->space->nnode_owned;
   PetscBool same;
@@ -35,7 +35,7 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscCall(PetscArraycpy(b->motion.u, u, n));
   b->motion.progress = b->contact.base.progress;
   b->motion.known = PETSC_TRUE;
-  PetscCall(SbBarrierPlace(b, u, b->contact.base.progress, b->motion.x));
+  PetscCall(SbSurfacesPlace(b, u, b->contact.base.progress, b->motion.x));
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   b->active.n = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -56,8 +56,8 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbBarrierNormalForce(const Barrier *b, const Active *a, PetscReal *energy,
-                               PetscReal gradient[12])
+PetscReal SbPairNormalForce(const Surfaces *b, const Active *a, PetscReal *energy,
+                            PetscReal gradient[12])
 {
   const SbPairLaw law = SbPairLawOf(b, a);
   PetscReal force = 0.;
@@ -73,7 +73,7 @@ PetscReal SbBarrierNormalForce(const Barrier *b, const Active *a, PetscReal *ene
 }
 
 /* f += sign times the gradient of n vertices, distributed to their owned nodes, N. */
-static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
+static void spread(const Surfaces *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
                    const PetscReal gradient[], PetscReal f[])
 {
   const SbContactSurface m = b->surface;
@@ -95,20 +95,20 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
 /* An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to
    first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not
    matter here. */
-PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                          PetscReal f[], PetscReal *bound)
+PetscErrorCode SbContactGapForces_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                           PetscReal f[], PetscReal *bound)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, u));
+  PetscCall(SbSurfacesUpdate(b, u));
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
     const SbContactPair *pair = &a->pair;
     const SbPairLaw law = SbPairLawOf(b, a);
     PetscReal d[3], energy, gradient[12];
-    const PetscReal force = SbBarrierNormalForce(b, a, &energy, gradient);
+    const PetscReal force = SbPairNormalForce(b, a, &energy, gradient);
     PetscReal part;
 
     SbPairLawEvaluate(&law, a->gap, pair->area, d);
@@ -124,7 +124,7 @@ PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
+void SbPairTerm(const Surfaces *b, PetscInt i, Term *t)
 {
   const PetscInt k = i - b->active.n;
 
@@ -139,15 +139,15 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->normal = a->at.n;
     t->force = 0.;
     if (k < 0)
-      t->force = SbBarrierNormalForce(b, a, &t->energy, t->gradient);
+      t->force = SbPairNormalForce(b, a, &t->energy, t->gradient);
     else {
       const FrictionPair *friction = &b->friction.pairs.pair[k];
       const PetscReal most = PetscSqr(friction->force) / friction->stiffness;
       PetscReal q[3];
-      const PetscReal p = SbBarrierSticking(b, friction, q);
+      const PetscReal p = SbPairSticking(b, friction, q);
 
       for (int c = 0; c < 12; c++)
-        t->gradient[c] = SbBarrierFactor(b, p) * t->weight[c / 3] * q[c % 3];
+        t->gradient[c] = SbPairFrictionFactor(b, p) * t->weight[c / 3] * q[c % 3];
       if (b->options.sticks)
         t->energy = most * (p < 1. ? 0.5 * p * p : p - 0.5) -
                     0.5 * SbDot3(friction->tangent, friction->tangent) / friction->stiffness;
@@ -164,21 +164,21 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
     t->weight = spring->at.weight;
     t->normal = spring->at.normal;
     t->counts = counts_spring(b, spring);
-    t->force = SbBarrierSpring(b, spring, t->gradient);
-    t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
+    t->force = SbSpringForce(b, spring, t->gradient);
+    t->energy = 0.5 * t->force * (spring->goal - SbSpringPlace(b, spring));
   }
 }
 
 /* f += sign times the gradient of all energies at the current positions, N; returns this rank's
    sum, J. */
-PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[])
+PetscReal SbSurfacesAddGradient(const Surfaces *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0.;
 
   for (PetscInt i = 0; i < nterm(b); i++) {
     Term t;
 
-    SbBarrierTerm(b, i, &t);
+    SbPairTerm(b, i, &t);
     spread(b, t.n, t.v, sign, t.gradient, f);
     if (t.counts)
       sum += t.energy;
@@ -186,32 +186,32 @@ PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[])
   return sum;
 }
 
-PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
+PetscErrorCode SbEffectForce_Surfaces(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, stage->u));
-  (void)SbBarrierAddGradient(b, -1., f);
+  PetscCall(SbSurfacesUpdate(b, stage->u));
+  (void)SbSurfacesAddGradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                         PetscReal *energy, PetscReal f[])
+PetscErrorCode SbContactGradient_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal *energy, PetscReal f[])
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, u));
-  *energy += SbBarrierAddGradient(b, 1., f);
+  PetscCall(SbSurfacesUpdate(b, u));
+  *energy += SbSurfacesAddGradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     PetscReal slip[3];
 
-    (void)SbBarrierSlip(b, &b->friction.pairs.pair[i], slip);
+    (void)SbPairSlip(b, &b->friction.pairs.pair[i], slip);
     if (SbDot3(slip, b->friction.pairs.pair[i].slip) < 0.)
       b->friction.pairs.pair[i].turns = PETSC_TRUE;
   }
@@ -220,7 +220,7 @@ PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const Pet
 
 /* Adds the blocks of a Hessian by n vertices where one of both has nodes here; H[144], or with
    `weight` H[9] with respect to the weighted sum of positions. */
-static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[],
+static PetscErrorCode add_blocks(Surfaces *b, PetscInt n, const PetscInt vertex[],
                                  const PetscReal weight[], const PetscReal H[])
 {
   const SbContactSurface m = b->surface;
@@ -245,7 +245,7 @@ static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[]
 
 /* A pair of nearly parallel edges, which counts less, and one that is pressed together, have no
    row. */
-SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row)
+SbPairLaw SbPairMatrixLaw(const Surfaces *b, const Active *a, PetscBool *row)
 {
   SbPairLaw law = SbPairLawOf(b, a);
   PetscReal d[3];
@@ -262,15 +262,15 @@ SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row)
   return law;
 }
 
-PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
+PetscErrorCode SbContactHessian_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                         SbContactHessian kind, SbBlocks *blocks, PetscReal r[])
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   PetscReal energy, gradient[12], H[144];
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, u));
+  PetscCall(SbSurfacesUpdate(b, u));
 
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
@@ -288,14 +288,14 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     FrictionPair *friction = &b->friction.pairs.pair[i];
     PetscReal T[9], q[3];
-    const PetscReal p = SbBarrierSticking(b, friction, q);
-    PetscReal factor = SbBarrierFactor(b, p);
+    const PetscReal p = SbPairSticking(b, friction, q);
+    PetscReal factor = SbPairFrictionFactor(b, p);
     const PetscBool slides = (PetscBool)(p >= (b->options.sticks ? SLIDES : 1.));
     PetscReal curve = 0.;
 
     if (!slides)
       curve = b->options.sticks ? 1. : 2. - 2. * p;
-    (void)SbBarrierSlip(b, friction, friction->slip);
+    (void)SbPairSlip(b, friction, friction->slip);
     friction->sticks =
       (PetscBool)(slides && kind != SB_HESSIAN_MAJORIZED &&
                   (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
@@ -324,7 +324,7 @@ PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const Pets
     const Spring *spring = &b->springs.spring[i];
     PetscReal T[9];
 
-    if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal)
+    if (!spring->held && SbSpringPlace(b, spring) >= spring->goal)
       continue;
     for (int k = 0; k < 9; k++)
       T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];

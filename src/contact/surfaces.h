@@ -1,5 +1,5 @@
 /*
-  barrier.h - contact of surfaces, by any response: barrier, or springs on the same pairs with
+  surfaces.h - contact of surfaces, by any response: barrier, or springs on the same pairs with
   multipliers (multipliers.c).
 */
 #pragma once
@@ -74,7 +74,7 @@ typedef struct {
   SbContactSearch search;
   PetscInt friction_solves;     /* most lagged-friction iterations of a step; 0: by default */
   PetscReal friction_tolerance; /* of the lag */
-} BarrierOptions;
+} SurfaceOptions;
 
 /* Positions of the surfaces' vertices within a step. */
 typedef struct {
@@ -86,7 +86,7 @@ typedef struct {
   PetscReal *other;     /* [nvertex][3] end of a motion, m */
   PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */
   PetscBool known;      /* x and the active pairs are up to date for u and progress */
-} BarrierMotion;
+} SurfaceMotion;
 
 /* By body, [nbody+1]; the obstacle's are infinite. */
 typedef struct {
@@ -96,7 +96,7 @@ typedef struct {
   PetscReal scale;         /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; growth of energy by it, J */
-} BarrierWidths;
+} SurfaceWidths;
 
 typedef struct {
   PetscInt n, size;
@@ -137,13 +137,13 @@ typedef struct {
   PetscReal energy;         /* of the barrier at the start, then at the end of the step */
   PetscReal obstacle_power; /* work along the obstacle's path in this step, forces of its start */
   PetscReal work;           /* on the bodies since the start */
-} BarrierSums;
+} SurfaceSums;
 
 /* Of the run, for the summary. */
 typedef struct {
   PetscReal least, shortest; /* smallest gap, m; shortest safe part of an iteration */
   PetscInt most;             /* largest number of active pairs */
-} BarrierRecord;
+} SurfaceRecord;
 
 /* History columns of pairs of bodies. */
 typedef struct {
@@ -155,24 +155,24 @@ typedef struct {
 
 typedef struct {
   Contact contact; /* first */
-  BarrierOptions options;
+  SurfaceOptions options;
   SbContactSurface surface;
   SbContactPairs pairs;
-  BarrierMotion motion;
-  BarrierWidths widths;
+  SurfaceMotion motion;
+  SurfaceWidths widths;
   ActivePairs active;
   Multipliers multipliers;
   PairFriction friction;
   Separation separation;
   Springs springs;
   SbContactBlocks blocks; /* of a Hessian while it is summed up */
-  BarrierSums sums;
-  BarrierRecord record;
+  SurfaceSums sums;
+  SurfaceRecord record;
   PairColumns columns;
-} Barrier;
+} Surfaces;
 
 /* The value of a pair from those of its sides: width or pressure. */
-static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
+static inline PetscReal of_pair(const Surfaces *b, const PetscReal value[],
                                 const SbContactPair *pair)
 {
   const PetscInt *part = b->surface->part;
@@ -180,32 +180,32 @@ static inline PetscReal of_pair(const Barrier *b, const PetscReal value[],
   return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
 }
 
-static inline PetscBool is_barrier(const Barrier *b)
+static inline PetscBool is_barrier(const Surfaces *b)
 {
   return (PetscBool)(b->contact.response == BARRIER);
 }
 
 /* Whether constraints are enforced exactly: by a null space, or with multipliers as unknowns. */
-static inline PetscBool is_exact(const Barrier *b)
+static inline PetscBool is_exact(const Surfaces *b)
 {
   return (PetscBool)(b->contact.response == PROJECTED || b->contact.response == MULTIPLIER);
 }
 
 /* Whether forces have multipliers. */
-static inline PetscBool has_multipliers(const Barrier *b)
+static inline PetscBool has_multipliers(const Surfaces *b)
 {
   return (PetscBool)(is_exact(b) || b->contact.response == AUGMENTED);
 }
 
 /* Whether there is a table of multipliers: of forces, of friction, or of both. */
-static inline PetscBool has_table(const Barrier *b)
+static inline PetscBool has_table(const Surfaces *b)
 {
   return (PetscBool)(has_multipliers(b) || b->options.sticks);
 }
 
 /* How a pair resists. */
 #define STIFFER 10. /* springs of exact constraints, over those of `augmented` */
-static inline SbPairLaw SbPairLawOf(const Barrier *b, const Active *a)
+static inline SbPairLaw SbPairLawOf(const Surfaces *b, const Active *a)
 {
   return (SbPairLaw){.spring = (PetscBool)!is_barrier(b),
                      .width = of_pair(b, b->widths.w, &a->pair),
@@ -214,16 +214,16 @@ static inline SbPairLaw SbPairLawOf(const Barrier *b, const Active *a)
                      .guard = of_pair(b, b->widths.guard, &a->pair)};
 }
 /* The same of its part in the matrix of linear systems; row: the rest is in a row. */
-SbPairLaw SbPairMatrixLaw(const Barrier *b, const Active *a, PetscBool *row);
+SbPairLaw SbPairMatrixLaw(const Surfaces *b, const Active *a, PetscBool *row);
 
 /* Whether this rank counts the pair. */
-static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
+static inline PetscBool counts(const Surfaces *b, const SbContactPair *pair)
 {
   return (PetscBool)b->surface->own[pair->v[pair->v[0] < b->surface->nbody_vertex ? 0 : 1]];
 }
 
 /* Whether this rank counts the spring: by its first vertex of a body. */
-static inline PetscBool counts_spring(const Barrier *b, const Spring *spring)
+static inline PetscBool counts_spring(const Surfaces *b, const Spring *spring)
 {
   PetscInt k = 0;
 
@@ -232,14 +232,13 @@ static inline PetscBool counts_spring(const Barrier *b, const Spring *spring)
   return (PetscBool)b->surface->own[spring->at.v[k]];
 }
 
-/* Makes e, with its Contact, an effect of the response `barrier`. Not collective. */
-PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);
+/* Makes e, with its Contact, an effect of surfaces in contact. Not collective. */
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope);
 /* Positions at the local displacements u; pairs with gaps below the width, ordered by number.
    Collective. */
-PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
+PetscErrorCode SbSurfacesUpdate(Surfaces *b, const PetscReal u[]);
 /* Tangential slip u of a pair since the step began, m; its length. */
-static inline PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction,
-                                      PetscReal u[3])
+static inline PetscReal SbPairSlip(const Surfaces *b, const FrictionPair *friction, PetscReal u[3])
 {
   PetscReal normal = 0.;
 
@@ -255,10 +254,10 @@ static inline PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *fric
   return PetscSqrtReal(SbDot3(u, u));
 }
 /* q = t + c u of the slip u, the force of a pair that sticks; its length over Coulomb's limit. */
-static inline PetscReal SbBarrierSticking(const Barrier *b, const FrictionPair *friction,
-                                          PetscReal q[3])
+static inline PetscReal SbPairSticking(const Surfaces *b, const FrictionPair *friction,
+                                       PetscReal q[3])
 {
-  (void)SbBarrierSlip(b, friction, q);
+  (void)SbPairSlip(b, friction, q);
   for (int i = 0; i < 3; i++)
     q[i] = friction->tangent[i] + friction->stiffness * q[i];
   return PetscSqrtReal(SbDot3(q, q)) / friction->force;
@@ -268,39 +267,39 @@ static inline PetscReal SbBarrierSticking(const Barrier *b, const FrictionPair *
 #define SLIDES (1. - 1e-6)
 
 /* Whether the rest of its stiffness is in rows. */
-static inline PetscBool SbFrictionSticks(const Barrier *b, const FrictionPair *friction,
+static inline PetscBool SbFrictionSticks(const Surfaces *b, const FrictionPair *friction,
                                          PetscReal p)
 {
   return (PetscBool)(is_exact(b) && b->options.sticks && (p < SLIDES || friction->sticks));
 }
 /* The friction force over q, of its length p over Coulomb's limit. */
-static inline PetscReal SbBarrierFactor(const Barrier *b, PetscReal p)
+static inline PetscReal SbPairFrictionFactor(const Surfaces *b, PetscReal p)
 {
   if (p >= 1.)
     return 1. / p;
   return b->options.sticks ? 1. : 2. - p;
 }
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
-PetscReal SbBarrierNormalForce(const Barrier *b, const Active *active, PetscReal *energy,
-                               PetscReal gradient[12]);
+PetscReal SbPairNormalForce(const Surfaces *b, const Active *active, PetscReal *energy,
+                            PetscReal gradient[12]);
 /* f += sign times the gradient of all energies at the current positions, N; returns this rank's
    sum, J. */
-PetscReal SbBarrierAddGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
+PetscReal SbSurfacesAddGradient(const Surfaces *b, PetscReal sign, PetscReal f[]);
 /* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of
    e. */
-PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh);
+PetscErrorCode SbSurfacesFindBodies(SbEffect e, SbMesh mesh);
 /* Into `next` normal forces and directions at the current positions, at the end of the step or its
    start. */
-PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
+PetscErrorCode SbSurfacesFindFriction(Surfaces *b, PetscBool end);
 /* Swaps `next` and the friction in use. */
-void SbBarrierSwapFriction(Barrier *b);
+void SbSurfacesSwapFriction(Surfaces *b);
 /* Computes `lag` (friction_pairs.c), and `next` at the end of the step. Collective. */
-PetscErrorCode SbBarrierLag(Barrier *b);
+PetscErrorCode SbSurfacesLag(Surfaces *b);
 /* Finds overlaps at the current positions, and the springs that separate them in a step of length
    dt, s; `first` of a run: errors where they cannot. Collective. */
-PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
+PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
 /* normal . sum weight x of a spring at the current positions, m. */
-static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spring)
+static inline PetscReal SbSpringPlace(const Surfaces *b, const Spring *spring)
 {
   PetscReal g = 0.;
 
@@ -309,10 +308,10 @@ static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spr
   return g;
 }
 /* Its force, N, and the gradient of its energy by its vertices, N. */
-static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring,
-                                        PetscReal gradient[15])
+static inline PetscReal SbSpringForce(const Surfaces *b, const Spring *spring,
+                                      PetscReal gradient[15])
 {
-  const PetscReal all = spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring));
+  const PetscReal all = spring->stiffness * (spring->goal - SbSpringPlace(b, spring));
   const PetscReal force = spring->held ? all : PetscMax(0., all);
 
   for (int k = 0; k < 15; k++)
@@ -329,53 +328,53 @@ typedef struct {
   PetscReal gradient[15];           /* of the energy by the vertices, N */
   const PetscReal *weight, *normal; /* normal . sum weight x is the gap or its like */
 } Term;
-static inline PetscInt nterm(const Barrier *b)
+static inline PetscInt nterm(const Surfaces *b)
 {
   return b->motion.begun ? b->active.n + b->friction.pairs.n + b->springs.n : 0;
 }
-void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
+void SbPairTerm(const Surfaces *b, PetscInt i, Term *term);
 
 /* x[nvertex][3] = positions, m, at u and after the fraction `progress` of the obstacle's path.
    Collective. */
-PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress,
-                              PetscReal x[]);
+PetscErrorCode SbSurfacesPlace(const Surfaces *b, const PetscReal u[], PetscReal progress,
+                               PetscReal x[]);
 
 /* Multipliers of pairs (pair_forces.c): what a pair is found by; the order of that, for qsort() and
    bsearch(); the multipliers of a pair, NULL: it has none. */
-void SbPairKey(const Barrier *b, const SbContactPair *pair, PetscInt key[PAIR_KEY]);
+void SbPairKey(const Surfaces *b, const SbContactPair *pair, PetscInt key[PAIR_KEY]);
 int SbPairForceOrder(const void *p, const void *q);
-const PairForce *SbMultiplierFind(const Barrier *b, const SbContactPair *pair);
+const PairForce *SbMultiplierFind(const Surfaces *b, const SbContactPair *pair);
 /* Multipliers (multipliers.c). Update: takes the forces at the
    current positions, of a solution, for the friction of the next one as well; `again`: they have
    changed by more than a tolerance. Collective. */
-PetscErrorCode SbMultipliersUpdate(Barrier *b, PetscBool *again);
+PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
-PetscErrorCode SbMultipliersKeep(Barrier *b);
-PetscErrorCode SbMultipliersRestore(Barrier *b);
+PetscErrorCode SbMultipliersKeep(Surfaces *b);
+PetscErrorCode SbMultipliersRestore(Surfaces *b);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows);
 
 /* Operations (sbcontact.h, sbeffect.h). */
-PetscErrorCode SbContactFindImpacts_Barrier(SbContact contact, SbSpace s, PetscReal dt,
-                                            const PetscReal u0[], const PetscReal v0[]);
-PetscErrorCode SbContactImpactWork_Barrier(SbContact contact, PetscReal *work);
-PetscErrorCode SbContactScaleRestitution_Barrier(SbContact contact, PetscReal share);
-PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
-PetscErrorCode SbContactGradient_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                         PetscReal *energy, PetscReal f[]);
-PetscErrorCode SbContactGapForces_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                          PetscReal f[], PetscReal *bound);
-PetscErrorCode SbContactHessian_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                        SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);
-PetscErrorCode SbContactUpdateFriction_Barrier(SbContact contact, SbSpace s, const PetscReal u[],
-                                               PetscBool solved, PetscBool *again);
-PetscErrorCode SbContactGap_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
-                                    PetscReal gap[], PetscReal normal[]);
-PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
-                                       SbContactPoints *list);
-PetscErrorCode SbContactNearest_Barrier(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
-                                        char text[]);
-PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
-                                       const PetscReal r[], PetscReal values[]);
-PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);
+PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, PetscReal dt,
+                                             const PetscReal u0[], const PetscReal v0[]);
+PetscErrorCode SbContactImpactWork_Surfaces(SbContact contact, PetscReal *work);
+PetscErrorCode SbContactScaleRestitution_Surfaces(SbContact contact, PetscReal share);
+PetscErrorCode SbEffectForce_Surfaces(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
+PetscErrorCode SbContactGradient_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                          PetscReal *energy, PetscReal f[]);
+PetscErrorCode SbContactGapForces_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                           PetscReal f[], PetscReal *bound);
+PetscErrorCode SbContactHessian_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                         SbContactHessian kind, SbBlocks *blocks, PetscReal r[]);
+PetscErrorCode SbContactUpdateFriction_Surfaces(SbContact contact, SbSpace s, const PetscReal u[],
+                                                PetscBool solved, PetscBool *again);
+PetscErrorCode SbContactGap_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
+                                     PetscReal gap[], PetscReal normal[]);
+PetscErrorCode SbContactPoints_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
+                                        SbContactPoints *list);
+PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
+                                         char text[]);
+PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *stage,
+                                        const PetscReal r[], PetscReal values[]);
+PetscErrorCode SbEffectSummary_Surfaces(SbEffect e, SbSpace s, size_t size, char text[]);

@@ -1,8 +1,8 @@
 /*
-  barrier_output.c - output of barrier contact: history columns, contact points, gaps at nodes, the
+  pair_output.c - output of contact of surfaces: history columns, contact points, gaps at nodes, the
   closest pair and the summary.
 */
-#include "barrier.h"
+#include "surfaces.h"
 
 #define PAIRS 200 /* most pairs of bodies with columns */
 #define TWO 4     /* columns of two bodies */
@@ -10,11 +10,11 @@
 
 /* The bodies that take part; with -effect_X_pairs columns for each pair of them behind those of
    e. */
-PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh)
+PetscErrorCode SbSurfacesFindBodies(SbEffect e, SbMesh mesh)
 {
   static const char *const two_names[TWO] = {"force_x", "force_y", "force_z", "contacts"};
   static const char *const one_names[ONE] = {"normal_force", "contacts"};
-  Barrier *p = (Barrier *)e->data;
+  Surfaces *p = (Surfaces *)e->data;
   const PetscBool self = p->options.self;
   const PetscInt fixed = e->ncolumn;
   PetscInt n = fixed;
@@ -76,8 +76,8 @@ PetscErrorCode SbBarrierFindBodies(SbEffect e, SbMesh mesh)
 
 /* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss
    so far. */
-PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
-                                       const PetscReal r[], PetscReal values[])
+PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *stage,
+                                        const PetscReal r[], PetscReal values[])
 {
   /* of bodies, and of an obstacle */
   enum {
@@ -90,7 +90,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     UNGUARDED
   };
   static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   const int *at = places[b->contact.partner.obstacle != NULL];
   PetscReal least[2] = {PETSC_MAX_REAL, 0.}; /* gap, minus depth */
   SbPose pose;
@@ -100,11 +100,11 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscCall(PetscArrayzero(values, e->ncolumn));
   if (!b->motion.begun)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(SbSurfacesUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->active.n; i++)
     least[0] = PetscMin(least[0], b->active.pair[i].gap);
   for (PetscInt i = 0; i < b->springs.n; i++) /* of the overlaps found at the start of the step */
-    least[1] = PetscMin(least[1], SbBarrierSpringPlace(b, &b->springs.spring[i]) -
+    least[1] = PetscMin(least[1], SbSpringPlace(b, &b->springs.spring[i]) -
                                     b->springs.spring[i].at.depth - b->springs.spring[i].start);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 2, MPIU_REAL, MPI_MIN, s->comm));
   if (b->contact.partner.obstacle)
@@ -115,7 +115,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     PetscInt one, two;
     Term t;
 
-    SbBarrierTerm(b, i, &t);
+    SbPairTerm(b, i, &t);
     if (!t.counts)
       continue;
     values[at[CONTACTS]] += (i < b->active.n && is_barrier(b)) || t.force > 0.;
@@ -166,7 +166,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
 
 /* The contact point of a term: its place on the body, the force there; the gap is left to the
    caller. */
-static SbContactPoint point_of(const Barrier *b, const Term *t)
+static SbContactPoint point_of(const Surfaces *b, const Term *t)
 {
   const PetscInt *part = b->surface->part;
   const PetscInt nbody = b->surface->space->mesh->nbody;
@@ -194,15 +194,15 @@ static SbContactPoint point_of(const Barrier *b, const Term *t)
   return p;
 }
 
-PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
-                                       SbContactPoints *list)
+PetscErrorCode SbContactPoints_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
+                                        SbContactPoints *list)
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   PetscBool *told;
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(SbSurfacesUpdate(b, stage->u));
   PetscCall(PetscCalloc1(nterm(b), &told));
   for (PetscInt i = 0; i < nterm(b); i++) {
     const PetscInt spring = i - b->active.n - b->friction.pairs.n;
@@ -210,7 +210,7 @@ PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbSta
     SbDistance d;
     Term t;
 
-    SbBarrierTerm(b, i, &t);
+    SbPairTerm(b, i, &t);
     if (told[i] || !t.counts)
       continue;
     p = point_of(b, &t);
@@ -218,7 +218,7 @@ PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbSta
       p.id[0] = -1 - b->springs.spring[spring].at.number;
       p.id[1] = SbContactNumber(b->surface, t.v[0]);
       p.id[2] = SbContactNumber(b->surface, t.v[t.n - 1]);
-      p.gap = SbBarrierSpringPlace(b, &b->springs.spring[spring]);
+      p.gap = SbSpringPlace(b, &b->springs.spring[spring]);
       if (spring < b->springs.n - b->springs.nbounce)
         p.gap -= b->springs.spring[spring].start + b->springs.spring[spring].at.depth;
     } else if (i >= b->active.n) /* friction of a pair in contact only at the start of the step */
@@ -234,7 +234,7 @@ PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbSta
 
       if (memcmp(pair, with, offsetof(SbContactPair, area)))
         continue; /* not the same features */
-      SbBarrierTerm(b, k, &t);
+      SbPairTerm(b, k, &t);
       other = point_of(b, &t);
       for (int j = 0; j < 3; j++)
         p.force[j] += other.force[j];
@@ -248,14 +248,14 @@ PetscErrorCode SbContactPoints_Barrier(SbContact contact, SbSpace s, const SbSta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactGap_Barrier(SbContact contact, SbSpace s, const SbStage *stage,
-                                    PetscReal gap[], PetscReal normal[])
+PetscErrorCode SbContactGap_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
+                                     PetscReal gap[], PetscReal normal[])
 {
-  Barrier *b = (Barrier *)contact;
+  Surfaces *b = (Surfaces *)contact;
   const SbContactSurface m = b->surface;
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(SbSurfacesUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
     const PetscInt *vertex = a->pair.v;
@@ -279,9 +279,9 @@ PetscErrorCode SbContactGap_Barrier(SbContact contact, SbSpace s, const SbStage 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[])
+PetscErrorCode SbEffectSummary_Surfaces(SbEffect e, SbSpace s, size_t size, char text[])
 {
-  Barrier *b = (Barrier *)e->data;
+  Surfaces *b = (Surfaces *)e->data;
   PetscReal value[3] = {b->record.least, b->record.shortest, -(PetscReal)b->record.most};
 
   PetscFunctionBeginUser;
@@ -300,10 +300,10 @@ PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactNearest_Barrier(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
-                                        char text[])
+PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
+                                         char text[])
 {
-  const Barrier *b = (const Barrier *)contact;
+  const Surfaces *b = (const Surfaces *)contact;
   const SbEffect e = contact->effect;
   const PetscReal *x = b->motion.x;
   const Active *least = NULL;
