@@ -174,6 +174,11 @@ bench: deps ## speed, kept as CSV below tests/perf/results; QUICK=1 measures les
 	$(AGAIN) bin/supple bin/supple-mesh tests
 	@scripts/bench --build $(BUILD) $(if $(QUICK),--quick)
 
+measured: deps ## what others measured or published beside what supple finds, into docs/reports/measured.md
+	$(AGAIN) bin/supple
+	@scripts/venv
+	@scripts/measured --write
+
 locking: deps ## how P1, P2, CR and DG behave near nu = 1/2, measured into docs/reports/locking.md with its plots (about 10 minutes)
 	$(AGAIN) $(BUILD)/tests/perf/locking
 	@scripts/locking --build $(BUILD)
@@ -234,7 +239,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench measured locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
