@@ -11,6 +11,7 @@
 #define WASTE \
   1e3 /* a source with an error smaller than the largest one by this factor is too accurate */
 #define WIDTH 79
+#define LOCKED 49.7 /* bulk over shear modulus, nu = 0.49 */
 
 #define ROOM 2048 /* length of the advice text */
 
@@ -135,6 +136,40 @@ static PetscReal cost(SbLedger l, const Seconds *s, int source)
   }
 }
 
+/* Whether P1 locks in the body b so far that the estimate is only a lower bound: above nu = 0.49 it
+   was 0.14 to 0.32 of the true error (docs/reference/error_estimates.md). */
+static PetscBool locked(SbLedger l, PetscInt b)
+{
+  const SbModel m = l->run->model;
+  const SbMaterial law = m->material[b];
+
+  return (PetscBool)(m->element[b]->nodes_per[0] && !m->element[b]->nodes_per[1] &&
+                     SbMaterialBulkModulus(law) > LOCKED * SbMaterialShearModulus(law));
+}
+
+/* The first body that locks, -1: none. */
+static PetscInt first_locked(SbLedger l)
+{
+  for (PetscInt b = 0; b < l->run->model->nbody; b++)
+    if (locked(l, b))
+      return b;
+  return -1;
+}
+
+static void say_locked(SbLedger l, char w[ROOM])
+{
+  const SbModel m = l->run->model;
+  const PetscInt b = first_locked(l);
+
+  if (b < 0)
+    return;
+  SbAppend(ROOM, w,
+           "P1 locks in %s at its Poisson's ratio: the estimate is INVALID, the error of the mesh "
+           "may be many times as large; -body_%s_element %s does not lock. ",
+           m->body[b].name, m->body[b].name,
+           m->contacts.nactive_set || m->contacts.npotential ? "cr" : "p2 (or cr)");
+}
+
 /* Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the
    same tets its relative error is about half the square of the relative error r of a first-order
    element, for small r (bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of it). So edges may be
@@ -162,6 +197,8 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
   times = c * r * PetscSqrtReal(r);
 
   /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
+  if (locked(l, body))
+    return; /* said already */
   if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * SbMaterialShearModulus(law)) {
     SbAppend(
       ROOM, w,
@@ -261,7 +298,7 @@ static void report_accuracy(SbLedger l, char w[ROOM])
   h = PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
   if (l->accuracy > 0.) {
     SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy,
-             all <= l->accuracy ? "met" : "NOT met");
+             all <= l->accuracy && first_locked(l) < 0 ? "met" : "NOT met");
     if (mesh > 0.7 * l->accuracy)
       SbAppend(ROOM, w,
                "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where "
@@ -364,19 +401,23 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
                         "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
                         (double)l->stored));
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
-    PetscCall(print_line(l, &s, SbErrorNames[i], SbLedgerError(l, i), q ? &q[i] : NULL,
-                         i == SB_ERROR_ROUNDING ? -1. : s.source[i], notes[i]));
+    PetscCall(
+      print_line(l, &s, SbErrorNames[i], SbLedgerError(l, i), q ? &q[i] : NULL,
+                 i == SB_ERROR_ROUNDING ? -1. : s.source[i],
+                 i == SB_ERROR_SPACE && first_locked(l) >= 0 ? "locked: invalid" : notes[i]));
     for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
       char name[16];
 
       PetscCall(PetscSNPrintf(name, sizeof(name), "  %.8s", m->body[b].name));
-      PetscCall(print_line(l, &s, name, PetscSqrtReal(l->space_error[b]), NULL, -1., ""));
+      PetscCall(print_line(l, &s, name, PetscSqrtReal(l->space_error[b]), NULL, -1.,
+                           locked(l, b) ? "locked: invalid" : ""));
     }
   }
   PetscCall(print_line(l, &s, "set-up", -1., NULL, s.setup, ""));
   PetscCall(print_line(l, &s, "output", -1., NULL, s.output, ""));
   PetscCall(print_line(l, &s, "estimates", -1., NULL, s.estimates, "of this table"));
   PetscCall(print_line(l, &s, "together", together(l), NULL, s.total, ""));
+  say_locked(l, words);
   say_largest(l, &s, words);
   say_wasted(l, &s, words);
   report_accuracy(l, words);

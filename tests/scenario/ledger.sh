@@ -59,6 +59,10 @@ words() { tr '\n' ' ' <"$1"; }
 check "p2 is advised to p2" test -z "$(grep 'element p2' <<<"$(words quadratic1.txt)")"
 "$supple" bar.opts -body_bar_poisson 0.4999 -ledger yes -output_dir locked >locked.txt 2>&1
 check "no word of locking" grep -q 'P1 locks.*-body_bar_element p2' <<<"$(words locked.txt)"
+check "an invalid estimate is not said" grep -q 'estimate is INVALID' <<<"$(words locked.txt)"
+"$supple" bar.opts -body_bar_poisson 0.47 -ledger yes -output_dir nearly >nearly.txt 2>&1
+check "an estimate at nu 0.47 is called invalid" test -z "$(grep INVALID nearly.txt)"
+check "no word of locking at nu 0.47" grep -q 'P1 locks.*-body_bar_element p2' <<<"$(words nearly.txt)"
 "$supple" bar.opts -body_bar_mesh box:0.4,0.1,0.1:6 -ledger yes -output_dir six >six.txt 2>&1
 longer=$(sed -n 's/.*body_bar_element p2 does it with edges of \([0-9.]*\) times.*/\1/p' <<<"$(words six.txt)")
 across=$(awk -v k="$longer" 'BEGIN { print (k > 1 ? int(6 / k + 0.5) : 0) }')
