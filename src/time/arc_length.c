@@ -15,8 +15,9 @@
   The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng,
   Comput. Methods Appl. Mech. Eng. 179, 1999): unlike the sign of the determinant or of the work of
   the loads it is right at limit points and after bifurcations. The first step has the load
-  increment 1 / static_steps, later ones are longer while iterations are few. A step that does not
-  converge, or ends at a large angle to its predictor (on another branch), is halved.
+  increment 1 / static_steps, later ones are longer while iterations are few and the path is
+  straight, shorter where it bends. A step that does not converge, or ends at a large angle to its
+  predictor (on another branch), is halved.
 
   q is a finite difference of residuals, exact for loads proportional to lambda; with moving
   supports and formulas of t (here lambda) its step is small. The last step is solved at lambda = 1.
@@ -28,9 +29,10 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DESIRED 4.  /* number of iterations below which steps become longer */
+#define DESIRED 6.  /* number of iterations below which steps become longer */
+#define TURN .3     /* and angle between a step and its predictor */
 #define MOST 25     /* largest number of iterations; then a step is halved */
-#define STRAIGHT .7 /* smallest cosine of the angle between a step and its predictor */
+#define STRAIGHT .8 /* largest angle between a step and its predictor; then it is halved, too */
 #define FINE 1e-6   /* step of lambda for q where R is not linear in it */
 
 typedef struct {
@@ -48,6 +50,7 @@ typedef struct {
   PetscReal load;          /* |q| at the start of the run, N */
   PetscInt negative; /* negative eigenvalues of K at the start of the last step; -1: unknown */
   PetscReal turned;  /* sign of dlambda at the start of the last step */
+  PetscReal angle;   /* between the step and its predictor, which measures the path's curvature */
 } Path;
 
 /* Weighted product (a, b), m^2. */
@@ -187,7 +190,8 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscCall(VecWAXPY(p->d, -1., run->state.U, p->X));
   PetscCall(product(p, p->d, p->d, &dd));
   PetscCall(product(p, p->d, p->begin, &dv));
-  if (*ok && !(sign * dv >= STRAIGHT * PetscSqrtReal(dd * vv))) {
+  p->angle = PetscAcosReal(PetscMax(-1., PetscMin(1., sign * dv / PetscSqrtReal(dd * vv))));
+  if (*ok && !(p->angle <= STRAIGHT)) {
     *ok = PETSC_FALSE;
     PetscCall(SbRunFail(run, "load factor %g: the path turns too sharply", (double)p->factor));
   }
@@ -332,8 +336,10 @@ static PetscErrorCode accept_step(Path *p, PetscInt its, PetscReal *l)
   PetscFunctionBeginUser;
   PetscCall(VecWAXPY(path, -1., run->state.U, p->X));
   PetscCall(product(p, path, path, &length));
-  *l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
-  *l = PetscMin(*l, run->clock.arc.longest * run->clock.arc.first);
+  *l *= PetscMin(PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1)))),
+                 TURN / PetscMax(p->angle, 0.5 * TURN));
+  if (run->clock.arc.longest > 0.)
+    *l = PetscMin(*l, run->clock.arc.longest * run->clock.arc.first);
   PetscCall(VecScale(path, *l / PetscSqrtReal(length)));
   PetscCall(VecCopy(p->X, run->state.U));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,8 +3,8 @@
   work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
   change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
   times angle); damping dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own
-  work (src/effect/barrier.c), as the energy of its gaps may change much in a step. The rest of the
-  difference between the energies at the start and now was dissipated (negative: added) by the
+  work (src/contact/surfaces.c), as the energy of its gaps may change much in a step. The rest of
+  the difference between the energies at the start and now was dissipated (negative: added) by the
   integrator. A stable implicit one adds little; if one adds most of the energy, it is unstable, and
   the run means nothing from there on.
 */

@@ -100,9 +100,9 @@ const SbOption SbTimeRows[] = {
    "arc_length: largest number of steps; the run ends there"},
   {"static_max_displacement", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
    "arc_length: the run ends when the displacement of any node exceeds this; 0: no limit"},
-  {"static_longest_step", SB_OPTION_REAL, 1, "", "10", "(0, inf)",
+  {"static_longest_step", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
    "arc_length: largest increment of arc length, as a multiple of the first one, whose load "
-   "increment is 1/-static_steps"},
+   "increment is 1/-static_steps; 0: no limit, they adapt to the bend of the path"},
   {0},
 };
 
