@@ -3,12 +3,12 @@
   step.
 
   -accuracy e: the time step is chosen so that the integrator's error is uniform over the run
-  (TSAdapt, error per unit of time), and the tolerance of solves so that their estimated error is a
-  tenth of e. The mesh is not changed. Barrier contact may have half of e: the width of the barrier
-  is adapted to the error of its gaps, which is proportional to it. It is reduced at once, and the
-  step solved again; it is increased only between steps and while the energy stored in the gaps
-  hardly grows, which would accelerate the bodies apart. The error of contact need not be less than
-  a tenth of the mesh's.
+  (TSAdapt, error per unit of time), at least a hundredth of -ts_dt, and the tolerance of solves so
+  that their estimated error is a tenth of e. The mesh is not changed. Barrier contact may have half
+  of e: the width of the barrier is adapted to the error of its gaps, which is proportional to it.
+  It is reduced at once, and the step solved again; it is increased only between steps and while the
+  energy stored in the gaps hardly grows, which would accelerate the bodies apart. The error of
+  contact need not be less than a tenth of the mesh's.
 
   -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step
   took longer than s, and reduced when it took less than s / 2. Results differ from run to run.
@@ -28,7 +28,7 @@
 #define LOOSEST 0.3 /* largest relative tolerance of a solve */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* factor on the error of a solve */
-#define SHORTEST 1e-6 /* shortest step over the length of the run */
+#define SHORTEST 0.01 /* shortest step over -ts_dt: bounds the cost */
 
 PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
 {
@@ -92,6 +92,16 @@ static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx,
   PetscFunctionBeginUser;
   *order = l->order;
   *ratio = allowed > 0. ? PetscMax(0., l->step_time - NOISE * left_by_solves(l)) / allowed : 0.;
+  if (*ratio > 1. && !l->warned_shortest && step->dt <= 1.001 * SHORTEST * run->clock.dt) {
+    l->warned_shortest = PETSC_TRUE;
+    PetscCall(SbWarning(
+      run->model->comm,
+      "t = %g s: -accuracy %g asks for steps %.2g times as long as %g s, which is a hundredth of "
+      "-ts_dt: the run goes on with that, and its error is reported at the end; %sa larger "
+      "-accuracy, damping, or a smaller -ts_dt where the cost does not matter",
+      (double)step->t, (double)l->accuracy, (double)PetscPowReal(*ratio, -1. / (PetscReal)l->order),
+      (double)step->dt, l->order == 1 ? "try -time genalpha (of second order), " : "try "));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,7 +116,7 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
     PetscCall(TSGetAdapt(run->solve.ts, &adapt));
 
     /* explicit steps are at most the stable one */
-    PetscCall(TSAdaptSetStepLimits(adapt, SHORTEST * run->clock.t_end,
+    PetscCall(TSAdaptSetStepLimits(adapt, SHORTEST * run->clock.dt,
                                    run->solve.snes && run->solve.J ? 0.1 * run->clock.t_end
                                                                    : run->clock.dt));
   }

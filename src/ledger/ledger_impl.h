@@ -117,9 +117,10 @@ struct _p_SbLedger {
     residuals; /* seconds on this rank: all estimates, solves, residuals */
 
   /* adaptive_tolerance.c */
-  PetscBool may_tune; /* the program chooses tolerances */
-  PetscReal rtol;     /* relative tolerance of solves */
-  PetscInt narrowed;  /* number of reductions of contact widths */
+  PetscBool may_tune;        /* the program chooses tolerances */
+  PetscReal rtol;            /* relative tolerance of solves */
+  PetscInt narrowed;         /* number of reductions of contact widths */
+  PetscBool warned_shortest; /* -accuracy asks for shorter steps than its shortest */
   PetscBool mesh_bounds,
     width_bounds;        /* contact may exceed its share: mesh error is larger; width fixed */
   PetscInt nstep, nkept; /* -step_time_budget: number of steps; of those within the budget */

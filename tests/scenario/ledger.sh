@@ -78,6 +78,11 @@ check "a reaction that statics tell has an error" awk -v e="$(column react/ledge
 check "the field space_error: exit code $?" test $? = 0
 check "no field" grep -q space_error field/fields.xmf
 
+# -accuracy asks for steps far shorter than -ts_dt: a hundredth is the least, said once, and the run ends
+"$supple" swing.opts -accuracy 1e-6 -ts_max_time 0.02 -quiet -output_dir short >short.txt 2>&1
+check "steps that -accuracy bounds: exit code $?" test $? = 0
+check "a bound on steps is said once" test "$(grep -c 'asks for steps' short.txt)" = 1
+
 # nothing can move, so Newton's method solves nothing before the error of its solves is asked for
 for n in 1 2; do
   "${mpi[@]}" $n "$supple" swing.opts -body_bar_mesh box:0.1,0.1,0.1:1 -effect_hold_on boundary -solver rotated -ledger yes -output_dir still >still.txt 2>&1
