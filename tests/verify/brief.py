@@ -23,6 +23,7 @@ from pathlib import Path
 
 import h5py
 import numpy
+import PIL.Image
 
 TOP = Path(__file__).resolve().parents[2]
 OUT = Path(os.environ.get("SB_OUT", "build/test-out/brief")).resolve()
@@ -357,6 +358,12 @@ def live() -> None:
     picture = OUT / "live.png"
     text = call([sys.executable, "scripts/live", "--picture", picture, words[1], *words[2:]])
     check("frames" in text and picture.stat().st_size > 5000, f"no picture: {text}")
+
+    # the axes of space, red, green and blue, left below
+    corner = numpy.asarray(PIL.Image.open(picture).convert("RGB")).astype(int)[580:, 330:450]
+    for i in range(3):
+        others = numpy.delete(corner, i, axis=2).max(axis=2)
+        check(((corner[..., i] > 120) & (others < 60)).sum() > 10, f"no axis {'xyz'[i]} in the picture")
 
 
 def rigid() -> None:
