@@ -92,7 +92,7 @@ static const struct {
   {".obj", SbImportRead_Surface},   {".off", SbImportRead_Surface},
   {".ply", SbImportRead_Surface},   {".h5", SbImportRead_H5},
   {".xmf", SbImportRead_Xdmf},      {".poly", SbImportRead_Surface},
-  {".smesh", SbImportRead_Surface},
+  {".smesh", SbImportRead_Surface}, {".feb", SbImportRead_FEBio},
 };
 
 /* What the first lines of a file say of its format, whatever its name: the reader, or none. */
@@ -114,7 +114,7 @@ static const struct {
   {"CDF\x02", "netCDF (Exodus)", PETSC_FALSE, NULL},
   {"\x1f\x8b", "gzip (unpack it)", PETSC_FALSE, NULL},
   {"PK\x03\x04", "zip (unpack it)", PETSC_FALSE, NULL},
-  {"<febio_spec", "FEBio", PETSC_TRUE, NULL},
+  {"<febio_spec", "FEBio", PETSC_TRUE, SbImportRead_FEBio},
   {"ISO-10303-21", "STEP (geometry)", PETSC_FALSE, NULL},
 };
 

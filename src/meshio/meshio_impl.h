@@ -43,6 +43,7 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_FEBio(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
@@ -187,6 +188,27 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *import, SbMeshFormat format, FILE *f
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* The .xmf for ParaView of a mesh that was written to `h5`. */
 void SbWrite_Xdmf(const SbImport *import, const char *h5, FILE *file);
+
+/* xml.c: the tags of a file, one after the other */
+enum {
+  SB_XML_DEPTH = 32
+}; /* most elements in each other */
+typedef struct {
+  SbScan *scan;
+  PetscBool opens;             /* a tag that opens an element, else one that ends it */
+  PetscBool empty;             /* <name/>: its end comes next */
+  char name[SB_NAME_MAX];      /* of the element */
+  const char *begin, *end;     /* the tag, from its < to its > */
+  const char *text, *text_end; /* between the tag before and this one, behind comments */
+  int depth;                   /* open elements, this one too */
+  char open[SB_XML_DEPTH][SB_NAME_MAX];
+} SbXml;
+/* The next tag; false at the end of the file. Errors: tags that do not nest, or have no end. */
+PetscErrorCode SbXmlNext(SbXml *xml, PetscBool *more);
+/* Behind a tag that opens: to the end of its element. */
+PetscErrorCode SbXmlSkip(SbXml *xml);
+/* Value of an attribute of the tag; false and "" if there is none. */
+PetscBool SbXmlAttribute(const SbXml *xml, const char *name, size_t size, char value[]);
 
 /* gmsh_library.c: the work of SbGmshRun() in the child process. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);

@@ -42,6 +42,7 @@ static const struct {
   {"abaqus", ".inp", SbImportRead_Abaqus},
   {"unv", ".unv", SbImportRead_UNV},
   {"nastran", ".bdf", SbImportRead_Nastran},
+  {"febio", ".feb", SbImportRead_FEBio},
   {"h5", ".h5", SbImportRead_H5},
   {"xmf", ".xmf", SbImportRead_Xdmf},
   {"stl", ".stl", NULL},
