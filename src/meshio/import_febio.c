@@ -116,11 +116,20 @@ static PetscErrorCode name_of(FEBio *f, const char *key, char name[SB_GROUP_MAX]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The beginning of a text, on one line, for messages. */
+static const char *excerpt(const char *p, const char *end, char text[25])
+{
+  (void)snprintf(text, 25, "%.*s", (int)PetscMin(24, end - p), p);
+  SbCleanName(text, ' ');
+  return text;
+}
+
 /* Next number of a list between commas or blanks; false at its end. Advances *at. */
 static PetscErrorCode next_number(FEBio *f, const char **at, const char *end, const char *what,
                                   int64_t *number, PetscBool *more)
 {
   const char *p = *at;
+  char found[25];
   char *after;
 
   PetscFunctionBeginUser;
@@ -134,8 +143,7 @@ static PetscErrorCode next_number(FEBio *f, const char **at, const char *end, co
   f->scan->token = p;
   if (after == p || after > end || *number < 1 || *number > (int64_t)1 << 40 ||
       (after < end && *after != ',' && *after != ':' && !isspace((unsigned char)*after)))
-    SB_SCAN_ERROR(f->scan, "expected the number of %s, found '%.*s'", what,
-                  (int)PetscMin(16, end - p), p);
+    SB_SCAN_ERROR(f->scan, "expected the number of %s, found '%s'", what, excerpt(p, end, found));
   *at = after;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -159,7 +167,9 @@ static PetscErrorCode read_text(FEBio *f, const char **text, const char **end)
 /* A node: three coordinates between commas. */
 static PetscErrorCode read_node(FEBio *f)
 {
+  static const char *const places[3] = {"first", "second", "third"};
   const char *text, *end;
+  char found[25];
   int64_t label;
   PetscReal *x;
 
@@ -175,11 +185,8 @@ static PetscErrorCode read_node(FEBio *f)
     x[i] = strtod(text, &after);
     f->scan->token = text;
     if (text >= end || after == text || after > end || !isfinite(x[i]))
-      SB_SCAN_ERROR(f->scan, "expected three coordinates of node %lld, found '%.*s' as the %s",
-                    (long long)label, (int)PetscMin(24, end - text), text,
-                    i == 0   ? "first"
-                    : i == 1 ? "second"
-                             : "third");
+      SB_SCAN_ERROR(f->scan, "expected three coordinates of node %lld, found '%s' as the %s",
+                    (long long)label, excerpt(text, end, found), places[i]);
     text = after;
   }
   while (text < end && isspace((unsigned char)*text))

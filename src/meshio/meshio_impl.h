@@ -44,6 +44,9 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_FEBio(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_MED(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Exodus(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_CGNS(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
@@ -209,6 +212,20 @@ PetscErrorCode SbXmlNext(SbXml *xml, PetscBool *more);
 PetscErrorCode SbXmlSkip(SbXml *xml);
 /* Value of an attribute of the tag; false and "" if there is none. */
 PetscBool SbXmlAttribute(const SbXml *xml, const char *name, size_t size, char value[]);
+
+/* own_h5.c: SbH5IsOwn() of an open file. */
+PetscBool SbH5FileIsOwn(hid_t file, const char *path, size_t size, char why[]);
+
+/* child.c: work in a forked process; its result replaces the first `npart` of SbImportParts(), with
+   all of them also groups and note. Not collective; rank 0. */
+typedef struct {
+  const char *where, *who, *doing; /* "FILE", "gmsh", "made tetrahedra": of messages */
+  PetscReal seconds;               /* it is stopped after that time, s */
+  int npart;
+  PetscErrorCode (*work)(void *ctx, SbImport *result);
+  void *ctx;
+} SbChildJob;
+PetscErrorCode SbChildRun(const SbChildJob *job, SbImport *result);
 
 /* gmsh_library.c: the work of SbGmshRun() in the child process. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);

@@ -27,6 +27,23 @@ static inline PetscErrorCode fuzz_surface(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* netCDF's classic format; a file in HDF5 would be read in a child process. */
+static inline PetscErrorCode fuzz_exodus(const char *path, SbImport *im)
+{
+  SbScan scan;
+  PetscBool hdf5;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(im->where, path, &scan));
+  hdf5 = (PetscBool)(scan.data[0] != 'C');
+  PetscCall(PetscFree(scan.data));
+  if (hdf5)
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: is not of the classic format",
+            im->where);
+  PetscCall(SbImportRead_Exodus(path, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* read NULL: a closed surface, by its ending. */
 static const struct {
   const char *name, *ending;
@@ -43,6 +60,7 @@ static const struct {
   {"unv", ".unv", SbImportRead_UNV},
   {"nastran", ".bdf", SbImportRead_Nastran},
   {"febio", ".feb", SbImportRead_FEBio},
+  {"exodus", ".exo", fuzz_exodus},
   {"h5", ".h5", SbImportRead_H5},
   {"xmf", ".xmf", SbImportRead_Xdmf},
   {"stl", ".stl", NULL},
