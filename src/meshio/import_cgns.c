@@ -53,7 +53,8 @@ static const struct {
              {0, 0},
              {19, 13}};
 enum {
-  MIXED = 20
+  MIXED = 20,
+  NTYPE = (int)PETSC_STATIC_ARRAY_LENGTH(types)
 };
 
 /* Children of a node with this label; scratch. */
@@ -176,7 +177,7 @@ static PetscErrorCode read_section(CGNS *c, const char *name)
   SbFormat(sizeof(node), node, "%s/%s", c->zone, name);
   PetscCall(numbers_of(c, node, NULL, &n, &kind));
   PetscCall(range_of(c, node, "ElementRange", &section.first, &section.last));
-  if (n < 1 || !(kind[0] >= 2 && kind[0] < (double)PETSC_STATIC_ARRAY_LENGTH(types)))
+  if (n < 1 || !(kind[0] >= 2 && kind[0] < NTYPE))
     SB_FOREIGN_ERROR(f,
                      "the section '%s' has elements of CGNS' type %g; supple takes TETRA_4 and "
                      "TETRA_10: mesh the part with them",
@@ -196,7 +197,7 @@ static PetscErrorCode read_section(CGNS *c, const char *name)
     PetscInt tags;
     int k, dim;
 
-    if (!(type >= 2 && type < (double)PETSC_STATIC_ARRAY_LENGTH(types)) || type == MIXED)
+    if (!(type >= 2 && type < NTYPE) || type == MIXED)
       SB_FOREIGN_ERROR(f,
                        "element %lld in the section '%s' is of CGNS' type %g; supple takes "
                        "TETRA_4 and TETRA_10: mesh the part with them",

@@ -161,7 +161,7 @@ PetscErrorCode SbNetcdfHeader(SbForeign *f)
   s->swap = (PetscBool)(*(const char *)&one == 1);
   if (s->end - s->at < 8 || memcmp(s->at, "CDF", 3) != 0)
     SB_SCAN_ERROR(s, "expected the letters CDF; this is no file of netCDF");
-  h.version = s->at[3];
+  h.version = (unsigned char)s->at[3];
   if (h.version != 1 && h.version != 2 && h.version != 5)
     SB_SCAN_ERROR(s, "netCDF's format of version %d; supple reads 1, 2, 5 and those in HDF5",
                   h.version);
