@@ -6,7 +6,6 @@
   thousand times that), numbers are finite, nodes are there. HDF5 1.10 itself reads beyond its
   memory where a file is damaged: it works in a child process, with plain input and output.
 */
-#include <ctype.h>
 #include "foreign.h"
 
 enum {
@@ -246,20 +245,6 @@ PetscErrorCode SbForeignTexts(SbForeign *f, const char *name, int64_t *n, size_t
   (void)H5Tclose(type);
   (void)H5Dclose(set);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbForeignText(const char *text, size_t width, int64_t k, size_t size, char name[])
-{
-  const char *from = text + (size_t)k * width;
-  size_t n = 0;
-
-  while (n < width && n + 1 < size && from[n])
-    n++;
-  memcpy(name, from, n);
-  while (n && isspace((unsigned char)name[n - 1]))
-    n--;
-  name[n] = 0;
-  SbCleanName(name, '?');
 }
 
 /* Opens an attribute of one value; negative: there is none. */

@@ -3,6 +3,7 @@
   netCDF's classic format, and groups by their names.
 */
 #pragma once
+#include <ctype.h>
 #include "meshio_impl.h"
 
 /* A variable of netCDF's classic format. */
@@ -55,7 +56,20 @@ PetscErrorCode SbForeignRows(SbForeign *file, const char *name, int64_t *rows);
 PetscErrorCode SbForeignTexts(SbForeign *file, const char *name, int64_t *n, size_t *width,
                               char **text);
 /* Copies text k of these, trimmed and clean. */
-void SbForeignText(const char *text, size_t width, int64_t k, size_t size, char name[]);
+static inline void SbForeignText(const char *text, size_t width, int64_t k, size_t size,
+                                 char name[])
+{
+  const char *from = text + (size_t)k * width;
+  size_t n = 0;
+
+  while (n < width && n + 1 < size && from[n])
+    n++;
+  memcpy(name, from, n);
+  while (n && isspace((unsigned char)name[n - 1]))
+    n--;
+  name[n] = 0;
+  SbCleanName(name, '?');
+}
 /* Attributes of an object of HDF5; false and `value` as it was if there is none. */
 PetscBool SbForeignNumberOf(const SbForeign *file, const char *object, const char *name,
                             double *value);
