@@ -184,6 +184,13 @@ typedef struct {
   PetscSFNode
     *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
 } SbPart;
+/* touching.c: the same of a body in slabs; `before`: cells of earlier bodies on this rank; number:
+   file numbers of its vertices. Then the warning or error on all ranks of comm, of a body whose
+   number of parts is known. Collective. */
+PetscErrorCode SbSlabTouching(MPI_Comm comm, PetscInt before, const SbImport *import,
+                              const SbPart *part, const PetscInt number[], SbTouching *touching);
+PetscErrorCode SbTouchingReport(MPI_Comm comm, const SbTouching *touching, const char *where,
+                                const SbBody *body);
 /* slab.c: reads and prepares body b in slabs; `before`: cells of earlier bodies on this rank.
    Collective. */
 PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[],

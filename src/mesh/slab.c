@@ -424,6 +424,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   uint64_t *bits;
   PetscMPIInt *dest;
   SbRoute route;
+  SbTouching touching;
 
   PetscFunctionBeginUser;
   SB_CATCH(&caught, SbImportSlab(&body[b], s->rank, s->size, im, &s->rows));
@@ -469,6 +470,8 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(SbImportMeasure(s->comm, im, &s->part->faces, &body[b]));
   body[b].nvert = s->rows.N - im->nunused;
   PetscCall(count_parts(s, &body[b].npart));
+  PetscCall(SbSlabTouching(s->comm, before, im, s->part, s->used, &touching));
+  PetscCall(SbTouchingReport(s->comm, &touching, im->where, &body[b]));
 
   // surface edges with more than two facets; the home rank of the lower vertex has all facets of an
   // edge

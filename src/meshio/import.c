@@ -92,7 +92,11 @@ static const struct {
   {".obj", SbImportRead_Surface},   {".off", SbImportRead_Surface},
   {".ply", SbImportRead_Surface},   {".h5", SbImportRead_H5},
   {".xmf", SbImportRead_Xdmf},      {".poly", SbImportRead_Surface},
-  {".smesh", SbImportRead_Surface},
+  {".smesh", SbImportRead_Surface}, {".feb", SbImportRead_FEBio},
+  {".med", SbImportRead_MED},       {".exo", SbImportRead_Exodus},
+  {".e", SbImportRead_Exodus},      {".ex2", SbImportRead_Exodus},
+  {".g", SbImportRead_Exodus},      {".gen", SbImportRead_Exodus},
+  {".cgns", SbImportRead_CGNS},
 };
 
 /* What the first lines of a file say of its format, whatever its name: the reader, or none. */
@@ -110,11 +114,13 @@ static const struct {
   {"\x89HDF\r\n", "HDF5", PETSC_FALSE, SbImportRead_H5},
   {"<Xdmf", "XDMF", PETSC_TRUE, SbImportRead_Xdmf},
   {"CONTROL INFO", "GAMBIT (neutral file)", PETSC_FALSE, NULL},
-  {"CDF\x01", "netCDF (Exodus)", PETSC_FALSE, NULL},
-  {"CDF\x02", "netCDF (Exodus)", PETSC_FALSE, NULL},
+  {"CDF\x01", "netCDF (Exodus)", PETSC_FALSE, SbImportRead_Exodus},
+  {"CDF\x02", "netCDF (Exodus)", PETSC_FALSE, SbImportRead_Exodus},
+  {"CDF\x05", "netCDF (Exodus)", PETSC_FALSE, SbImportRead_Exodus},
+  {"@(#)ADF", "CGNS in the format ADF (cgnsconvert -h writes HDF5)", PETSC_FALSE, NULL},
   {"\x1f\x8b", "gzip (unpack it)", PETSC_FALSE, NULL},
   {"PK\x03\x04", "zip (unpack it)", PETSC_FALSE, NULL},
-  {"<febio_spec", "FEBio", PETSC_TRUE, NULL},
+  {"<febio_spec", "FEBio", PETSC_TRUE, SbImportRead_FEBio},
   {"ISO-10303-21", "STEP (geometry)", PETSC_FALSE, NULL},
 };
 
@@ -148,6 +154,11 @@ static PetscErrorCode check_contents(const SbBody *body, SbImport *im, SbReader 
                im->where, contents[i].kind);
     if (*read == contents[i].read)
       break;
+
+    // several formats are written in HDF5
+    if (contents[i].read == SbImportRead_H5 &&
+        (*read == SbImportRead_MED || *read == SbImportRead_Exodus || *read == SbImportRead_CGNS))
+      break;
     SbImportRemark(im, "read as a file of %s, which it is in spite of its name", contents[i].kind);
     *read = contents[i].read;
     break;
@@ -174,7 +185,7 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
 /* Reads the mesh of a body, without placing it. */
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
-  char known[256] = "";
+  char known[512] = "";
   char node[PETSC_MAX_PATH_LEN + 8];
   const char *dot = strrchr(body->mesh, '.');
   SbReader read = strncmp(body->mesh, "box:", 4) ? NULL : SbImportRead_Box;

@@ -380,7 +380,8 @@ static PetscErrorCode use_side(SbAbaqus *a, const SbAbaqusSide *side, const SbDe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A keyword that is not followed would change the mesh: nothing of it is silent. */
+/* A keyword that is not followed and would change the mesh is an error; one that joins nodes, or
+   changes the mesh during an analysis, is counted. */
 static PetscErrorCode check_keyword(SbAbaqus *a)
 {
   static const struct {
@@ -397,7 +398,29 @@ static PetscErrorCode check_keyword(SbAbaqus *a)
     {"*PARAMETER", NULL, "values of the file are formulas; write it with numbers"},
     {"*INSTANCE", "LIBRARY", "the mesh is that of another analysis; write its nodes and elements"},
     {"*INSTANCE", "INSTANCE", "the mesh is that of another analysis; write its nodes and elements"},
-    {"*PARAMETER SHAPE VARIATION", NULL, "it moves nodes; let Abaqus write the moved ones"}};
+    {"*PARAMETER SHAPE VARIATION", NULL, "it moves nodes; let Abaqus write the moved ones"},
+    {"*MODEL CHANGE", "REMOVE", "it takes elements away; write the mesh without them"},
+    {"*MODEL CHANGE", "ADD", "it adds elements during the analysis; write the mesh that is meant"},
+    {"*REFINE MESH", NULL, "it makes nodes and elements; write the mesh that CalculiX refined"},
+    {"*SUBSTRUCTURE GENERATE", NULL, "the mesh becomes a matrix; write its nodes and elements"}};
+  static const char *const said[] = {"*MODEL CHANGE",
+                                     "*ADAPTIVE MESH",
+                                     "*TIE",
+                                     "*CLEARANCE",
+                                     "*EMBEDDED ELEMENT",
+                                     "*FASTENER",
+                                     "*RIGID BODY",
+                                     "*CYCLIC SYMMETRY MODEL",
+                                     "*EQUATION",
+                                     "*MPC",
+                                     "*COUPLING",
+                                     "*KINEMATIC COUPLING",
+                                     "*CONTACT PAIR",
+                                     "*PARTICLE GENERATOR",
+                                     "*CRACK PROPAGATION",
+                                     "*SHELL TO SOLID COUPLING"};
+
+  const char *kind = SbAbaqusParameter(a, "TYPE");
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(refused); i++) {
@@ -406,10 +429,19 @@ static PetscErrorCode check_keyword(SbAbaqus *a)
     if (strcasecmp(a->keyword, refused[i].keyword) != 0 ||
         (parameter && !SbAbaqusParameter(a, parameter)))
       continue;
+
+    // of contact pairs only
+    if (!strcasecmp(a->keyword, "*MODEL CHANGE") && kind && !strncasecmp(kind, "CONTACT", 7))
+      continue;
     a->scan->token = a->line;
     SB_SCAN_ERROR(a->scan, "%s%s%s: %s", refused[i].keyword, parameter ? " with " : "",
                   parameter ? parameter : "", refused[i].why);
   }
+
+  // what joins or holds nodes, or changes the mesh while an analysis runs
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(said); i++)
+    if (!strcasecmp(a->keyword, said[i]))
+      PetscCall(SbImportSkip(a->deck.im, "%s", said[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -531,11 +563,8 @@ static PetscErrorCode read_block(SbAbaqus *a)
       break;
     } else if (ends(a, "PART") || ends(a, "INSTANCE"))
       break;
-    else {
-      if (!strcasecmp(a->keyword, "*MODEL CHANGE"))
-        PetscCall(SbImportSkip(a->deck.im, "*MODEL CHANGE"));
+    else
       SbScanEndOfLine(s);
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -361,12 +361,23 @@ void SbH5FindFrame(hid_t file, SbH5Frames *frames)
                              H5P_DEFAULT);
 }
 
-/* Opens an attribute; negative if there is none. */
+/* Opens an attribute of one value; negative if there is none. */
 static hid_t open_attribute(hid_t file, const char *object, const char *name)
 {
+  hid_t attribute, space;
+  hssize_t n;
+
   if (H5Aexists_by_name(file, object, name, H5P_DEFAULT) <= 0)
     return -1;
-  return H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+  attribute = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+  space = attribute < 0 ? -1 : H5Aget_space(attribute);
+  n = space < 0 ? -1 : H5Sget_simple_extent_npoints(space);
+  if (space >= 0)
+    (void)H5Sclose(space);
+  if (n == 1 || attribute < 0)
+    return attribute;
+  (void)H5Aclose(attribute);
+  return -1;
 }
 
 /* Value of an integer attribute; 0 if there is none. */

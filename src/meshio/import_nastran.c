@@ -659,14 +659,21 @@ static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
    counted. */
 static PetscErrorCode check_name(Nastran *b, const char *name)
 {
-  static const char *const refused[] = {"GRIDG",  "GRIDF",  "GRIDB",  "GRIDA",  "CORD3",
-                                        "SELOC",  "SEBULK", "CSUPER", "CHEX8",  "CHEX20",
-                                        "CWEDGE", "BEGIN",  "CIHEX",  "CSOLID", "CPYRM"};
-  static const char *const skipped[] = {"CELAS",   "CDAMP", "CMASS",  "CONM", "CBUSH", "CGAP",
-                                        "CVISC",   "CWELD", "CFAST",  "RBE",  "RBAR",  "RROD",
-                                        "RSPLINE", "CBEND", "CSHEAR", "MPC",  "CRAC2D"};
+  static const char *const refused[] = {
+    "GRIDG",  "GRIDF",   "GRIDB", "GRIDA",  "CORD3",  "SELOC",  "SEBULK", "SEMPLN",
+    "CSUPER", "CSUPEXT", "CHEX8", "CHEX20", "CWEDGE", "BEGIN",  "CIHEX",  "CSOLID",
+    "CPYRM",  "CTET",    "CHEX",  "CPENT",  "CIFHEX", "CIFPEN", "CTQUAD", "CRAC3D"};
+  static const char *const skipped[] = {
+    "CELAS",  "CDAMP",  "CMASS",  "CONM",    "CBUSH",  "CGAP",    "CVISC",  "CWELD",  "CFAST",
+    "RBE",    "RBAR",   "RROD",   "RSPLINE", "CBEND",  "CSHEAR",  "MPC",    "CRAC2D", "CSEAM",
+    "CTRIA",  "CTRIAX", "CTRAX",  "CQUAD",   "CQUADX", "CPLSTN",  "CPLSTS", "CHBDY",  "CHACAB",
+    "CHACBR", "CACINF", "CINTC",  "CCONEAX", "CDUM",   "GENEL",   "PLOTEL", "RJOINT", "RTRPLT",
+    "RSSCON", "SPOINT", "EPOINT", "CYSYM",   "BOLT",   "CIFQUAD", "CSPR"};
 
   PetscFunctionBeginUser;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
+    if (!strcasecmp(name, kinds[k].name))
+      PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(refused); i++)
     if (!strncasecmp(name, refused[i], strlen(refused[i])))
       SB_SCAN_ERROR(b->scan,
@@ -675,9 +682,12 @@ static PetscErrorCode check_name(Nastran *b, const char *name)
                     name);
   if (name[0] == '=')
     SB_SCAN_ERROR(b->scan, "a line of replication (=); write every entry in full");
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(skipped); i++)
-    if (!strncasecmp(name, skipped[i], strlen(skipped[i])) && strcasecmp(name, "MPCADD") != 0)
-      PetscCall(SbImportSkip(b->deck.im, "%.10s", name));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(skipped); i++) {
+    if (strncasecmp(name, skipped[i], strlen(skipped[i])) || !strcasecmp(name, "MPCADD"))
+      continue;
+    PetscCall(SbImportSkip(b->deck.im, "%.10s", name));
+    break;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -43,6 +43,10 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_FEBio(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_MED(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Exodus(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_CGNS(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
@@ -187,6 +191,41 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *import, SbMeshFormat format, FILE *f
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* The .xmf for ParaView of a mesh that was written to `h5`. */
 void SbWrite_Xdmf(const SbImport *import, const char *h5, FILE *file);
+
+/* xml.c: the tags of a file, one after the other */
+enum {
+  SB_XML_DEPTH = 32
+}; /* most elements in each other */
+typedef struct {
+  SbScan *scan;
+  PetscBool opens;             /* a tag that opens an element, else one that ends it */
+  PetscBool empty;             /* <name/>: its end comes next */
+  char name[SB_NAME_MAX];      /* of the element */
+  const char *begin, *end;     /* the tag, from its < to its > */
+  const char *text, *text_end; /* between the tag before and this one, behind comments */
+  int depth;                   /* open elements, this one too */
+  char open[SB_XML_DEPTH][SB_NAME_MAX];
+} SbXml;
+/* The next tag; false at the end of the file. Errors: tags that do not nest, or have no end. */
+PetscErrorCode SbXmlNext(SbXml *xml, PetscBool *more);
+/* Behind a tag that opens: to the end of its element. */
+PetscErrorCode SbXmlSkip(SbXml *xml);
+/* Value of an attribute of the tag; false and "" if there is none. */
+PetscBool SbXmlAttribute(const SbXml *xml, const char *name, size_t size, char value[]);
+
+/* own_h5.c: SbH5IsOwn() of an open file. */
+PetscBool SbH5FileIsOwn(hid_t file, const char *path, size_t size, char why[]);
+
+/* child.c: work in a forked process; its result replaces the first `npart` of SbImportParts(), with
+   all of them also groups and note. Not collective; rank 0. */
+typedef struct {
+  const char *where, *who, *doing; /* "FILE", "gmsh", "made tetrahedra": of messages */
+  PetscReal seconds;               /* it is stopped after that time, s */
+  int npart;
+  PetscErrorCode (*work)(void *ctx, SbImport *result);
+  void *ctx;
+} SbChildJob;
+PetscErrorCode SbChildRun(const SbChildJob *job, SbImport *result);
 
 /* gmsh_library.c: the work of SbGmshRun() in the child process. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);

@@ -36,16 +36,25 @@ static herr_t visit(hid_t where, const char *name, const H5L_info_t *info, void 
     (void)H5Oclose(object);
   if (what)
     (void)snprintf(r->why, r->size,
-                   "%s: /%s %s; a file of supple holds all of its own, so this "
+                   "%s: /%s %s; a file that supple reads holds all of its own, so this "
                    "one is not read",
                    r->path, name, what);
   return what != NULL;
 }
 
+PetscBool SbH5FileIsOwn(hid_t file, const char *path, size_t size, char why[])
+{
+  Reason reason = {size, why, path};
+
+  why[0] = 0;
+  H5E_BEGIN_TRY(void) H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, visit, &reason);
+  H5E_END_TRY
+  return (PetscBool)!why[0];
+}
+
 PetscBool SbH5IsOwn(const char *path, size_t size, char why[])
 {
   struct stat info;
-  Reason reason = {size, why, path};
   hid_t file, access;
 
   why[0] = 0;
@@ -62,7 +71,7 @@ PetscBool SbH5IsOwn(const char *path, size_t size, char why[])
   (void)H5Pset_fapl_mpio(access, MPI_COMM_SELF, MPI_INFO_NULL);
   H5E_BEGIN_TRY file = H5Fopen(path, H5F_ACC_RDONLY, access);
   if (file >= 0) {
-    (void)H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, visit, &reason);
+    (void)SbH5FileIsOwn(file, path, size, why);
     (void)H5Fclose(file);
   }
   H5E_END_TRY(void) H5Pclose(access);

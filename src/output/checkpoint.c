@@ -247,9 +247,9 @@ static herr_t add_attribute(hid_t where, const char *name, const H5A_info_t *inf
   if (attribute < 0)
     return strcmp(name, SCALARS) ? -1 : 0;
   if (H5Tget_class(type) == H5T_FLOAT)
-    bad = H5Aread(attribute, H5T_NATIVE_DOUBLE, &value.real);
+    bad = SbH5IsScalar(attribute) ? H5Aread(attribute, H5T_NATIVE_DOUBLE, &value.real) : -1;
   else if (H5Tget_class(type) == H5T_INTEGER)
-    bad = H5Aread(attribute, H5T_NATIVE_INT64, &value.integer);
+    bad = SbH5IsScalar(attribute) ? H5Aread(attribute, H5T_NATIVE_INT64, &value.integer) : -1;
   else
     bad = -1;
   *sum += SbHashBytes(value.bits, strlen(name), name);

@@ -349,6 +349,16 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Number of values of an attribute or dataset; -1: it cannot be said. */
+static hssize_t values_of(hid_t space)
+{
+  const hssize_t n = space < 0 ? -1 : H5Sget_simple_extent_npoints(space);
+
+  if (space >= 0)
+    (void)H5Sclose(space);
+  return n;
+}
+
 /* Opens a dataset and says its shape, [n][1] for a list; negative when it is not there. */
 static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
 {
@@ -389,6 +399,9 @@ PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, Pet
   const hid_t dataset = open_dataset(where, name, n);
   PetscBool ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)rows && n[1] == (hsize_t)ncomp);
 
+  // of more dimensions there may be more
+  if (ok)
+    ok = (PetscBool)(values_of(H5Dget_space(dataset)) == (hssize_t)rows * ncomp);
   if (ok)
     ok = (PetscBool)(H5Dread(dataset, SbH5TypeInMemory(type), H5S_ALL, H5S_ALL, H5P_DEFAULT,
                              values) >= 0);
@@ -437,6 +450,11 @@ PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool SbH5IsScalar(hid_t attribute)
+{
+  return (PetscBool)(values_of(H5Aget_space(attribute)) == 1);
+}
+
 /* The value of a scalar attribute whose type is of this class. */
 static PetscBool get(hid_t where, const char *name, H5T_class_t klass, hid_t memtype, void *value)
 {
@@ -446,7 +464,8 @@ static PetscBool get(hid_t where, const char *name, H5T_class_t klass, hid_t mem
   if (attribute >= 0) {
     const hid_t type = H5Aget_type(attribute);
 
-    good = (PetscBool)(H5Tget_class(type) == klass && H5Aread(attribute, memtype, value) >= 0);
+    good = (PetscBool)(H5Tget_class(type) == klass && SbH5IsScalar(attribute) &&
+                       H5Aread(attribute, memtype, value) >= 0);
     (void)H5Tclose(type);
     (void)H5Aclose(attribute);
   }
@@ -475,7 +494,8 @@ PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *o
   if (dataset >= 0) {
     const hid_t type = H5Dget_type(dataset);
 
-    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0) {
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 &&
+        H5Tget_size(type) < 1 << 28 && values_of(H5Dget_space(dataset)) == 1) {
       PetscCall(PetscCalloc1(H5Tget_size(type) + 1, text));
       good = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0);
     }

@@ -102,6 +102,8 @@ PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscI
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
+/* Whether an attribute has one value: into a variable no more may be read. */
+PetscBool SbH5IsScalar(hid_t attribute);
 /* ok turns false when the attribute is missing or of another kind. Not collective. */
 void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
 void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);

@@ -32,10 +32,20 @@ typedef struct {
 static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscInt ncomp,
                                PetscInt *n, void *array)
 {
+  const PetscInt64 rows = SbH5Rows(where, name, NULL);
+  const hid_t file = rows ? H5Iget_file_id(where) : -1;
+  hsize_t bytes = 0;
+
   PetscFunctionBeginUser;
   *(void **)array = NULL;
-  *n = (PetscInt)SbH5Rows(where, name, NULL);
-  if (!*n)
+  *n = (PetscInt)rows;
+  if (file >= 0) {
+    (void)H5Fget_filesize(file, &bytes);
+    (void)H5Fclose(file);
+  }
+
+  // more than the file can hold, compressed: it is damaged
+  if (!*n || (double)rows * ncomp > 1000. * (double)bytes)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(
     PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));

@@ -3,16 +3,17 @@
   pass through each other without a word, and nothing in the results says so.
 
   Boxes first; the rest is only for pairs of bodies whose boxes overlap. Of such a pair vertices and
-  centroids of tets of one body are looked for in the tets of the other one, and the depth of those
-  found is their distance from its surface. Bodies that share a face, and rounded surfaces whose
-  facets cut into each other, stay below SHALLOW. What is not seen: bodies that cross where neither
-  has a vertex or a centroid in the other.
+  centroids of tets of one body are looked for in the tets of the other one, and so are the middles
+  of what edges of its surface have between the facets of the other one through which they go: bars
+  that cross have neither a vertex nor a centroid in each other. The depth of those found is their
+  distance from its surface. Bodies that share a face, and rounded surfaces whose facets cut into
+  each other, stay below SHALLOW.
 */
 #include "sbgeometry.h"
 #include "scene_impl.h"
 
 #define SHALLOW 0.05 /* depth over the larger mean size of tets, up to which surfaces may cross */
-#define SAMPLES 1000 /* most points of a body in the common box that a rank looks at */
+#define SAMPLES 1000 /* most points, and edges, of a body in the common box that a rank looks at */
 #define PAIRS 256    /* most pairs that are looked at */
 
 /* Two bodies whose boxes overlap by more than `shallow`, m. */
@@ -26,6 +27,12 @@ typedef struct {
   PetscInt pair, side; /* sorted by these */
   PetscReal x[3];
 } Sample;
+
+/* An edge of the surface of body[side] of a pair. */
+typedef struct {
+  PetscInt pair, side; /* sorted by these */
+  PetscReal x[2][3];
+} Edge;
 
 /* Boxes of all bodies at the vertices x[nvert][3]. Collective. */
 static PetscErrorCode find_boxes(SbMesh mesh, const PetscReal x[], PetscReal box[][6])
@@ -165,6 +172,46 @@ static PetscInt list_samples(SbMesh mesh, const PetscReal x[], const Pair *p, Pe
   return to ? (n + each - 1) / each : n;
 }
 
+/* Whether p comes before q, by the same rule on all ranks. */
+static PetscBool is_before(const PetscReal p[3], const PetscReal q[3])
+{
+  for (int k = 0; k < 3; k++)
+    if (p[k] != q[k])
+      return (PetscBool)(p[k] < q[k]);
+  return PETSC_FALSE;
+}
+
+/* Counts this rank's edges of the surface of body[side] that reach into the common box, or writes
+   every `each`-th. An edge is that of the one of its two facets that has it upwards. */
+static PetscInt list_edges(SbMesh mesh, const PetscReal x[], const Pair *p, PetscInt pair,
+                           PetscInt side, PetscInt each, Edge to[])
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < 12 * mesh->ncell_owned; i++) {
+    const PetscInt c = i / 12;
+    const int f = (int)(i % 12) / 3;
+    const int k = (int)(i % 3);
+    Edge e = {.pair = pair, .side = side};
+    PetscBool reaches = PETSC_TRUE;
+
+    if (mesh->cell_body[c] != p->body[side] || !(mesh->face_set[4 * c + f] & SB_ON_BOUNDARY))
+      continue;
+    for (int a = 0; a < 2; a++)
+      for (int j = 0; j < 3; j++)
+        e.x[a][j] = x[3 * mesh->cell[4 * c + SbFaceVertex[f][(k + a) % 3]] + j];
+    for (int j = 0; j < 3; j++)
+      reaches = (PetscBool)(reaches && PetscMin(e.x[0][j], e.x[1][j]) <= p->box[3 + j] &&
+                            PetscMax(e.x[0][j], e.x[1][j]) >= p->box[j]);
+    if (!reaches || !is_before(e.x[0], e.x[1]))
+      continue;
+    if (to && n % each == 0)
+      to[n / each] = e;
+    n++;
+  }
+  return to ? (n + each - 1) / each : n;
+}
+
 /* What this rank has of a body, in the arrays of the mesh: tets, and triangles of the surface. */
 static PetscErrorCode list_body(SbMesh mesh, PetscInt body, PetscInt *ncell, PetscInt **cell,
                                 PetscInt *ntri, PetscInt **tri)
@@ -232,6 +279,111 @@ static PetscErrorCode find_depths(SbMesh mesh, const PetscReal x[], PetscInt b, 
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(SbLocatorDestroy(&locator));
   PetscCall(PetscFree2(cell, tri));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where edges first to last - 1 go through facets of body b of this rank: -(the lowest), and the
+   highest part of their length; unchanged without one. */
+static PetscErrorCode find_crossings(SbMesh mesh, const PetscReal x[], PetscInt b, PetscInt first,
+                                     PetscInt last, const Edge edge[], PetscReal low[],
+                                     PetscReal high[])
+{
+  PetscInt ncell = 0;
+  PetscInt ntri = 0;
+  PetscInt *cell, *tri;
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  PetscCall(list_body(mesh, b, &ncell, &cell, &ntri, &tri));
+  PetscCall(SbBoxTreeCreateTriangles(ntri, tri, x, &tree));
+  for (PetscInt i = first; i < last; i++) {
+    const PetscReal *p = edge[i].x[0];
+    const PetscReal *q = edge[i].x[1];
+    PetscReal box[6];
+    SbBoxNearest nearest;
+    PetscInt at;
+
+    SbBoxClear(box);
+    SbBoxAdd(box, p);
+    SbBoxAdd(box, q);
+    for (SbBoxNearestBegin(&tree, box, 0, &nearest); SbBoxNearestNext(&nearest, &at);) {
+      const PetscReal *const corner[3] = {x + 3 * tri[3 * at], x + 3 * tri[3 * at + 1],
+                                          x + 3 * tri[3 * at + 2]};
+      PetscReal a[3], c[3], n[3], to_p[3], to_q[3];
+      PetscReal above, below;
+
+      if (!SbSegmentMeetsTriangle(p, q, corner))
+        continue;
+      SbSubtract(corner[1], corner[0], a);
+      SbSubtract(corner[2], corner[0], c);
+      SbCross(a, c, n);
+      SbSubtract(p, corner[0], to_p);
+      SbSubtract(q, corner[0], to_q);
+      above = SbDot3(n, to_p);
+      below = SbDot3(n, to_q);
+      if (above == below)
+        continue; /* in the plane of the facet */
+      low[i] = PetscMax(low[i], -above / (above - below));
+      high[i] = PetscMax(high[i], above / (above - below));
+    }
+  }
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree2(cell, tri));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends to sample[n] the middles between the crossings of edges with the other body of each pair.
+   Collective. */
+static PetscErrorCode add_crossings(SbMesh mesh, const PetscReal x[], PetscInt npair,
+                                    const Pair pair[], PetscInt *n, Sample **sample)
+{
+  Edge *mine, *edge;
+  Sample *all;
+  PetscReal *place;
+  PetscInt m = 0;
+  PetscInt room = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(2 * npair * (SAMPLES + 1), &mine));
+  for (PetscInt k = 0; k < 2 * npair; k++) {
+    const Pair *p = &pair[k / 2];
+    const PetscInt count = list_edges(mesh, x, p, k / 2, k % 2, 1, NULL);
+
+    m += list_edges(mesh, x, p, k / 2, k % 2, 1 + count / SAMPLES, mine + m);
+  }
+  PetscCall(
+    SbAllgatherv(mesh->comm, MPI_BYTE, m * (PetscInt)sizeof(*mine), mine, &room, &edge, NULL));
+  PetscCall(PetscFree(mine));
+  m = room / (PetscInt)sizeof(*edge);
+  PetscCall(SbSortByKeys(m, sizeof(*edge), 2, edge));
+  PetscCall(PetscMalloc1(2 * m, &place));
+  for (PetscInt i = 0; i < 2 * m; i++)
+    place[i] = -2.;
+  for (PetscInt i = 0, end; i < m; i = end) {
+    for (end = i + 1; end < m && edge[end].pair == edge[i].pair && edge[end].side == edge[i].side;)
+      end++;
+    PetscCall(find_crossings(mesh, x, pair[edge[i].pair].body[1 - edge[i].side], i, end, edge,
+                             place, place + m));
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, place, (PetscMPIInt)(2 * m), MPIU_REAL, MPI_MAX, mesh->comm));
+
+  PetscCall(PetscMalloc1(*n + m, &all));
+  PetscCall(PetscArraycpy(all, *sample, *n));
+  for (PetscInt i = 0; i < m; i++) {
+    const PetscReal middle = 0.5 * (place[m + i] - place[i]);
+
+    if (!(place[m + i] > -place[i]))
+      continue;
+    all[*n] = (Sample){.pair = edge[i].pair, .side = edge[i].side};
+    for (int k = 0; k < 3; k++)
+      all[*n].x[k] = edge[i].x[0][k] + middle * (edge[i].x[1][k] - edge[i].x[0][k]);
+    ++*n;
+  }
+  PetscCall(PetscFree(*sample));
+  *sample = all;
+  PetscCall(PetscFree(place));
+  PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,6 +460,7 @@ PetscErrorCode SbSceneWarnOverlap(SbRun run, const char *when, PetscBool *found)
       SbAllgatherv(m->comm, MPI_BYTE, n * (PetscInt)sizeof(*mine), mine, &room, &sample, NULL));
     PetscCall(PetscFree(mine));
     n = room / (PetscInt)sizeof(*sample);
+    PetscCall(add_crossings(mesh, x, npair, pair, &n, &sample));
     PetscCall(SbSortByKeys(n, sizeof(*sample), 2, sample));
 
     // depth of each in the other body

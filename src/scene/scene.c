@@ -31,7 +31,8 @@ const SbOption SbRunRows[] = {
 };
 const SbOption SbBodyRows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
-   "mesh of tetrahedra: a file (.msh .mesh .vtk .vtu .unv .inp .bdf .ele .vol .h5 and others: "
+   "mesh of tetrahedra: a file (.msh .mesh .vtk .vtu .unv .inp .bdf .feb .med .exo .cgns .ele .vol "
+   ".h5 and others: "
    "docs/reference/meshes.md), a closed surface to fill (.stl .obj .off .ply .poly .smesh), or "
    "box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
   {"mesh_step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",

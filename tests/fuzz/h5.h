@@ -122,9 +122,9 @@ static inline void fuzz_h5_values(FuzzBytes *b, hid_t set, int kind, hsize_t n)
     (void)H5Dwrite(set, H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, whole);
 }
 
-static inline void fuzz_h5_array(FuzzBytes *b, hid_t file)
+/* Puts an array of this name into a file, in place of one that is there. */
+static inline void fuzz_h5_put(FuzzBytes *b, hid_t file, const char *name)
 {
-  const char *name = fuzz_h5_names[fuzz_byte(b) % FUZZ_H5_NAMES];
   const int kind = fuzz_byte(b) % 16;
   const int ndim = fuzz_byte(b) % 4;
   const hid_t links = H5Pcreate(H5P_LINK_CREATE);
@@ -189,7 +189,7 @@ static inline int fuzz_h5_write(const char *path, const char *data, size_t n)
   if (file < 0)
     return step;
   while (b.at < b.end)
-    fuzz_h5_array(&b, file);
+    fuzz_h5_put(&b, file, fuzz_h5_names[fuzz_byte(&b) % FUZZ_H5_NAMES]);
   if (layout & 1) {
     const int version = 1 + (layout >> 1) % 4;
     const hid_t space = H5Screate(H5S_SCALAR);

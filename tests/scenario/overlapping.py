@@ -26,6 +26,12 @@ for i, (options, ranks, when, depth) in enumerate((
     ("-body_b_translate 0.0999999,0,0", 1, "", 0),
     ("-body_b_translate 0.1,0.05,0.02", 1, "", 0),
     ("-body_b_rotate 0,0,1,45 -body_b_translate 0.16,0.08,0", 1, "", 0),
+    # bars of five tets that cross without a vertex or centroid in each other: halfway, one through the other, at 45 degrees; one on the other
+    ("-body_a_mesh box:1,0.1,0.1:1,1,1 -body_b_mesh box:0.1,1,0.1:1,1,1 -body_b_translate 0.85,-0.05,0.05", 1, "start", 0.05),
+    ("-body_a_mesh box:1,0.1,0.1:1,1,1 -body_b_mesh box:0.1,1,0.1:1,1,1 -body_b_translate 0.85,-0.05,0.05", 3, "start", 0.05),
+    ("-body_a_mesh box:1,0.02,0.02:1,1,1 -body_b_mesh box:0.1,1,0.1:1,1,1 -body_b_translate 0.8,-0.05,-0.04", 2, "start", 0.043),
+    ("-body_a_mesh box:1,0.1,0.1:1,1,1 -body_b_mesh box:1,0.1,0.1:1,1,1 -body_b_rotate 0,0,1,45 -body_b_translate 0.8,-0.1,0.06", 2, "start", 0.04),
+    ("-body_a_mesh box:1,0.1,0.1:1,1,1 -body_b_mesh box:0.1,1,0.1:1,1,1 -body_b_translate 0.8,-0.05,0.1", 2, "", 0),
     (f"-body_b_translate 0.05,0,0 {MEET}", 1, "", 0),
     (f"-body_b_translate 0.05,0,0 {MEET} -effect_meet_on a,b", 1, "", 0),
     (f"-body_b_translate 0.05,0,0 {MEET} -effect_meet_obstacle plane:0,0,1,-1", 1, "start", 0.05),

@@ -42,6 +42,16 @@ static const Case cases[] = {
    1,
    {1, 1, 1},
    ""},
+  /* of contact pairs, and what joins nodes, is said */
+  {NODE TET "*TIE, NAME=t\na,b\n*STEP\n*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\na,b\n",
+   4,
+   1,
+   1,
+   "e",
+   3,
+   1,
+   {1, 1, 1},
+   "*TIE (1), *MODEL CHANGE (1)"},
   /* shifted; axes x -> z, y -> x */
   {"*SYSTEM\n5,0,0\n" NODE TET, 4, 1, 1, "e", 3, 1, {6, 1, 1}, ""},
   {"*SYSTEM\n0,0,2,0,0,3\n7,0,2\n*NODE\n1,0,0,0\n2,3,0,0\n3,0,2,0\n4,0,0,1\n" TET,
@@ -231,6 +241,9 @@ static PetscErrorCode test_refused(void)
 {
   static const char *const bad[][2] = {
     {"*NODE, SYSTEM=X\n1,0,0,0\n", "line 1|SYSTEM=X"},
+    {NODE TET "*STEP\n*STATIC\n*MODEL CHANGE, REMOVE\ne\n", "line 10|*MODEL CHANGE with REMOVE"},
+    {NODE TET "*STEP\n*MODEL CHANGE, TYPE=ELEMENT, ADD\ne\n", "line 9|*MODEL CHANGE with ADD"},
+    {NODE TET "*REFINE MESH, LIMIT=50\n", "line 8|*REFINE MESH"},
     {NODE "*NGEN, LINE=C\n1,2,1\n", "line 6|*NGEN with LINE"},
     {NODE "*NGEN\n1,9,1\n", "line 7|node 9"},
     {NODE "*NGEN\n1,2,0\n", "line 7|*NGEN"},

@@ -1,6 +1,6 @@
 // One mesh in every format gives the same tets, regions and surfaces. Files of tests/data are from
-// gmsh 4.8 (two_cubes.*), VTK 9.7 (two_cubes_*.vtu, _51.vtk), TetGen 1.5 and Netgen 6; the other
-// files are written here. @ranks 1
+// gmsh 4.8 (two_cubes.*; .med and .cgns of 4.15), netCDF 4.9 (.exo), VTK 9.7 (two_cubes_*.vtu,
+// _51.vtk), TetGen 1.5 and Netgen 6; the other files are written here. @ranks 1
 #include "../file.h"
 #include "mesh_test.h"
 
@@ -122,6 +122,19 @@ static PetscErrorCode test_foreign(const SbImport *reference)
   static const Same entities[] = {{3, "volume_1", "left"},   {2, "surface_1", "wall"},
                                   {2, "surface_2", "inner"}, {2, "surface_7", "surface_77"},
                                   {1, "curve_1", "edge"},    {0, NULL, NULL}};
+  static const Same med[] = {
+    {3, "left", "left"},           {3, "all", "all"},       {2, "wall", "wall"},
+    {2, "both ends", "both ends"}, {2, "inner", "inner"},   {2, "G_2D_77", "surface_77"},
+    {1, "edge", "edge"},           {0, "corner", "corner"}, {0, NULL, NULL}};
+  static const Same cgns[] = {{3, "left", "left"},           {3, "all", "all"},
+                              {3, "5_V_1", "left"},          {2, "wall", "wall"},
+                              {2, "both ends", "both ends"}, {2, "inner", "inner"},
+                              {2, "77", "surface_77"},       {1, "edge", "edge"},
+                              {0, "corner", "corner"},       {0, NULL, NULL}};
+  static const Same exodus[] = {
+    {3, "left", "left"},           {3, "all", "all"},       {2, "wall", "wall"},
+    {2, "both ends", "both ends"}, {2, "inner", "inner"},   {2, "surface_77", "surface_77"},
+    {1, "edge", "edge"},           {0, "corner", "corner"}, {0, NULL, NULL}};
   static const Same cell_data[] = {{3, "volume_1", "left"},
                                    {2, "surface_3", "wall"},
                                    {2, "surface_5", "inner"},
@@ -138,6 +151,12 @@ static PetscErrorCode test_foreign(const SbImport *reference)
     {DATA "two_cubes.inp", sets},
     {DATA "two_cubes.unv", sets},
     {DATA "two_cubes.unv", entities},
+    {DATA "two_cubes.med", med},
+    {DATA "two_cubes.cgns", cgns},
+    {DATA "two_cubes.exo", exodus},
+    {DATA "two_cubes_64bit.exo", exodus},
+    {DATA "two_cubes_cdf5.exo", exodus},
+    {DATA "two_cubes_hdf5.exo", exodus},
     {DATA "two_cubes.mesh", entities},
     {DATA "two_cubes.bdf", entities},
     {DATA "two_cubes.vtk", cell_data},

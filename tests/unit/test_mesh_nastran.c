@@ -65,6 +65,10 @@ static const struct {
    {2, 1, 3},
    ""},
   /* elements that a mesh does not need */
+  {GRIDS "CTETRA,1,1,1,2,3,4\nPLOTEL,7,1,2\nCTRIAX6,8,1,1,2,3\n",
+   1,
+   {1, 1, 1},
+   "PLOTEL (1), CTRIAX6 (1)"},
   {GRIDS "CTETRA,1,1,1,2,3,4\nCELAS1,7,1,1,1,2,1\nCONM2,8,1,,1.\n", 1, {1, 1, 1}, "CELAS1 (1)"},
 };
 
@@ -106,6 +110,9 @@ static PetscErrorCode test_refused(void)
     {GRIDS "=,*(1),=,*(1.),==\n", "line 5|replication"},
     {GRIDS "GRIDG,9,,1.,1.,1.\n", "line 5|GRIDG"},
     {GRIDS "CHEX20,1,1,1,2,3,4\n", "line 5|CHEX20"},
+    {GRIDS "CTETFD,1,1,1,2,3,4\n", "line 5|CTETFD"},
+    {GRIDS "CIFHEX,1,1,1,2,3,4\n", "line 5|CIFHEX"},
+    {GRIDS "SEMPLN,1,PLANE,1,2,3\n", "line 5|SEMPLN"},
     {GRIDS "BEGIN SUPER=1\n", "line 5|BEGIN"},
     {"CORD2R,5,5,5.,0.,0.,6.,0.,0.,\n,5.,1.,0.\nGRID,1,5,0.,0.,0.\n", "line 1|system 5"},
     {"CORD2R,5,,5.,0.,0.,6.,0.,0.,\n,7.,0.,0.\nGRID,1,5,0.,0.,0.\n", "line 1|system 5|on a line"},

@@ -129,7 +129,7 @@ static const struct {
 /* Files that would be read as something else, or of another kind. */
 static const char *const bad[][3] = {
   {"c.neu", "        CONTROL INFO 2.4.6\n", "GAMBIT"},
-  {"c.vtk", "<?xml version=\"1.0\"?>\n<febio_spec version=\"3.0\">\n", "FEBio"},
+  {"c.vtk", "<?xml version=\"1.0\"?>\n<febio_spec version=\"3.0\">\n", "line 3|febio_spec"},
   {"c.unv", UNODE UEND "    -1\n   780\n 1 111 1 1 1 1 7 4\n 1 2 3 4\n" UEND, "line 13|780|2412"},
   {"c.unv", UNODE UEND "    -1\n  2412\n 1 117 2 1 7 2\n 1 2\n" UEND, "line 14|kind 117"},
   {"c.unv",
