@@ -415,7 +415,7 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
   PetscInt *start = NULL;
   PetscInt *adjacent = NULL;
   const PetscInt *point;
-  PetscBool in_place, weights;
+  PetscBool in_place, weights, graph;
   PetscSF forest = NULL;
   PetscSection section;
   IS points;
@@ -436,7 +436,8 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscObjectTypeCompare((PetscObject)partitioner, SB_PARTITIONER_BISECTION, &in_place));
-  PetscCheck(!in_place || !partitioner->viewGraph, comm, PETSC_ERR_USER_INPUT,
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-petscpartitioner_view_graph", &graph));
+  PetscCheck(!in_place || !graph, comm, PETSC_ERR_USER_INPUT,
              "-petscpartitioner_view_graph: the type bisection has no graph; metis has one");
   if (in_place)
     partitioner->data = (void *)w;
