@@ -33,6 +33,10 @@
   quadratic. A dependence on the current state would have to be differentiated: jumps would add a
   spurious pressure.
 
+  A follower pressure on the body (src/effect/pressure.c) works on the volume of its cells with a
+  part p of itself, -p dV: that part of the load has the second variation which the stress -p cof F
+  lacks, and P_i is taken of P + p cof F.
+
   In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that
   keeps the energy of a face when kappa1 changes at the start of a step. With r = 0 every change of
   kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r
@@ -206,9 +210,10 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 }
 
 /* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
-   stiffness of twist modes; keep: m may not decrease. Returns whether some m changed. */
-static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal factor,
-                              PetscBool keep)
+   stiffness of twist modes under the pressure `even` of loads; keep: m may not decrease. Returns
+   whether some m changed. */
+static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal even,
+                              PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
   const PetscReal mu = SbMaterialShearModulus(m);
@@ -227,6 +232,14 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
+  for (PetscInt l = 0; l < n && even != 0.; l++) {
+    PetscReal one[9], cofactor[9];
+
+    SbPackGet(9, (const SbPack *)F, (int)l, one);
+    SbMatCofactor(one, cofactor);
+    for (int k = 0; k < 9; k++)
+      P[k][l] += even * cofactor[k];
+  }
 
   /* skip most batches: sums of two principal stresses are at most sqrt(2) |P| */
   for (PetscInt l = 0; l < n; l++) {
@@ -398,7 +411,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
 
 /* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets
    r. */
-static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
+static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
   PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
@@ -407,7 +420,8 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
   for (PetscInt b = 0; b < s->nbatch; b++) {
     if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear)
       continue;
-    if (follow_batch(s, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED)))
+    if (follow_batch(s, b, x, even ? even[s->batch_region[b]->body] : 0., factor,
+                     (PetscBool)(steps == SB_STEPS_UNDAMPED)))
       any = PETSC_TRUE;
   }
   return any;
@@ -451,7 +465,8 @@ void SbJumpSumTerms(SbSpace s)
   }
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbStepsOf steps,
+                                  PetscBool *changed)
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
@@ -469,9 +484,9 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *
   first = (PetscBool)(in_time && !s->jump->began);
   if (in_time)
     s->jump->began = PETSC_TRUE;
-  if (first && follow(s, x, SB_STEPS_OF_LOAD))
+  if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
     PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
-  any = follow(s, x, steps);
+  any = follow(s, x, even, steps);
   if (any)
     PetscCall(renew(s, in_time ? x : NULL, first, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
