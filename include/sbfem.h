@@ -194,6 +194,9 @@ typedef enum {
 } SbStepsOf;
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, const PetscReal even[], SbStepsOf steps,
                                   PetscBool *changed);
+/* Warns of bodies of CR and DG with many tets of shapes for which the penalty on jumps is not
+   verified. Collective. */
+PetscErrorCode SbSpaceWarnShapes(SbSpace space);
 /* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness
    of the full jump at U that has the face's energy, N/m, 0: no such face; and the stress that the
    penalty depends on, Pa. Set: the same, before SbSpaceFollowJumps(). Collective. */

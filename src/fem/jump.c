@@ -57,6 +57,11 @@
   2. /* further one in time steps: the secant of a growing penalty is about half its tangent */
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define NEEDLE 3.8 /* 1 for the narrowest face of a cube cut into six tets */
+#define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
+#define FLAT \
+  2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
+#define MANY 0.1     /* part of the tets of a body, likewise: few slivers do no harm */
 #define RENEWED 0.01 /* relative change of a penalty that is reported */
 #define SAME 1e-12   /* relative change that is rounding */
 
@@ -351,6 +356,90 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, Pet
         j->r[9 * b + k][l] = (1. - held) * J[k];
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A face as its sides see it. */
+typedef struct {
+  PetscReal area;        /* m^2 */
+  PetscReal length[2];   /* of the face over its width or the height of the cell */
+  PetscReal flatness[2]; /* the shorter extent of the face over the height of the cell */
+} FaceShape;
+
+static FaceShape face_shape(SbSpace s, SbJump j, const Face *face)
+{
+  const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
+  const PetscInt f = face->face[0];
+  const PetscReal *x = s->mesh->x;
+  const PetscReal *corner = x + 3 * v[(f + 1) % 4];
+  PetscReal p[3], q[3], r[3], n[3], trace, largest;
+  FaceShape shape;
+
+  SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
+  SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
+  SbSubtract(p, q, r);
+  SbCross(p, q, n);
+  shape.area = 0.5 * PetscSqrtReal(SbDot3(n, n));
+
+  /* eigenvalues of the mean of (x - centroid) (x - centroid)^T: their product is area^2 / 108 */
+  trace = (SbDot3(p, p) + SbDot3(q, q) + SbDot3(r, r)) / 36.;
+  largest =
+    trace / 2. + PetscSqrtReal(PetscMax(0., PetscSqr(trace / 2.) - PetscSqr(shape.area) / 108.));
+  for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
+    const PetscReal h = 3. * j->V[face->cell[side]] / shape.area;
+    const PetscReal square = PetscMax(NEEDLE * (trace - largest), PetscSqr(h) / 12.) / largest;
+
+    shape.length[side] = 1. / PetscSqrtReal(square);
+    shape.flatness[side] = PetscSqrtReal(12. * (trace - largest)) / h;
+  }
+  return shape;
+}
+
+PetscErrorCode SbSpaceWarnShapes(SbSpace s)
+{
+  const SbJump j = s->jump;
+  const SbMesh mesh = s->mesh;
+  PetscReal *worst; /* [nbody][2] length and flatness */
+  PetscInt *count;  /* [nbody][2] tets out of range, tets */
+  uint8_t *out;     /* [ncell] */
+
+  PetscFunctionBeginUser;
+  if (!j)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc3(2 * mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const FaceShape shape = face_shape(s, j, &j->face[i]);
+
+      for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
+        PetscReal *most = worst + 2 * j->body[b];
+
+        most[0] = PetscMax(most[0], shape.length[side]);
+        most[1] = PetscMax(most[1], shape.flatness[side]);
+        if (shape.length[side] > LONG || shape.flatness[side] > FLAT)
+          out[j->face[i].cell[side]] = 1;
+      }
+    }
+  }
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    count[2 * mesh->cell_body[c]] += out[c];
+    count[2 * mesh->cell_body[c] + 1]++;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, (PetscMPIInt)(2 * mesh->nbody), MPIU_REAL,
+                             MPI_MAX, s->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, s->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    if ((PetscReal)count[2 * b] > MANY * (PetscReal)count[2 * b + 1])
+      PetscCall(SbWarning(
+        s->comm,
+        "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
+        " tets are long or flat (up to %.2g times as long as wide, %.2g times as wide as high), "
+        "beyond what is verified: it may be far too stiff. Take p2, or tets of equal "
+        "edges (docs/reference/theory.md)",
+        mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
+        (double)worst[2 * b], (double)worst[2 * b + 1]));
+  PetscCall(PetscFree3(worst, count, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -140,6 +140,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
         m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
+  PetscCall(SbSpaceWarnShapes(m->space));
   m->load = 1.;
   m->linear = m->space->linear;
 
