@@ -41,6 +41,9 @@ typedef struct {
      communication; not with constraints beside the matrix */
   PetscErrorCode (*nonsymmetric)(SbEffect e, SbSpace space, const SbStage *stage,
                                  const PetscReal x[], PetscReal y[]);
+  /* * pressure[nbody] += the pressure of a load on the volume of all cells of a body, by
+     SbSpaceAddVolume(), Pa, at t */
+  PetscErrorCode (*volume_pressure)(SbEffect e, PetscReal t, PetscReal pressure[]);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: history variables as n records of `nstate` numbers each, which identify

@@ -185,13 +185,18 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace space, Vec U, Vec step, PetscReal 
    with the energies of full jumps; time steps, where the energy of each face at U is kept within
    bounds; time steps without damping, where no penalty falls. changed (or NULL): some penalty did,
    for load steps by a percent or more. Until the next call the face terms are constant; at first
-   they are those of the rest state. Collective. */
+   they are those of the rest state. even[nbody], Pa: pressure of loads that work on the volume of
+   all cells, which balances as much of their stress; NULL: none. Collective. */
 typedef enum {
   SB_STEPS_OF_LOAD,
   SB_STEPS_IN_TIME,
   SB_STEPS_UNDAMPED
 } SbStepsOf;
-PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBool *changed);
+PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, const PetscReal even[], SbStepsOf steps,
+                                  PetscBool *changed);
+/* Warns of bodies of CR and DG with many tets of shapes for which the penalty on jumps is not
+   verified. Collective. */
+PetscErrorCode SbSpaceWarnShapes(SbSpace space);
 /* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness
    of the full jump at U that has the face's energy, N/m, 0: no such face; and the stress that the
    penalty depends on, Pa. Set: the same, before SbSpaceFollowJumps(). Collective. */
@@ -245,6 +250,9 @@ PetscErrorCode SbSpaceAddCoupling(SbSpace space, Mat A, PetscInt number, const P
    A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
 PetscErrorCode SbSpaceAddVolume(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                                 PetscReal f[], Mat A);
+/* This rank's part of that volume of a body with linear elements, m^3; u NULL: at rest. Not
+   collective. */
+PetscReal SbSpaceVolume(SbSpace space, PetscInt body, const PetscReal u[]);
 
 /* prescribed unknowns */
 
@@ -318,8 +326,8 @@ static inline PetscInt SbSpaceCellNode(SbSpace space, PetscInt cell, PetscInt a)
 {
   return a < 4 ? space->cell_node[4 * cell + a] : space->edge_node[6 * cell + a - 4];
 }
-/* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here;
-   PetscFree. */
+/* All local boundary facets (of owned and ghost cells) in set k of the mesh, -1: in any or none.
+   Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);
 /* Index of a set by name; -1 and an error if there is none (where = option, for the message). */
 PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);

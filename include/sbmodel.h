@@ -54,8 +54,8 @@ struct _p_SbModel {
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it; all of them lie in
      `lists` */
-  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory;
-  SbEffect *lists, *prescribe, *force, *tangent, *nonsymmetric, *accept, *history;
+  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, nvolume_pressure, naccept, nhistory;
+  SbEffect *lists, *prescribe, *force, *tangent, *nonsymmetric, *volume_pressure, *accept, *history;
   SbContactSet contacts; /* those effects that are contacts */
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
@@ -84,6 +84,10 @@ PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, Pet
 /* Y = the part of the tangent at U that the matrix lacks, not symmetric, times X. U, X: [nnode][3]
    m; Y: N, zero on prescribed unknowns; all from SbSpaceCreateVec(). Collective. */
 PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
+/* SbSpaceFollowJumps() with the pressures of loads at t, the load factor in a static run.
+   Collective. */
+PetscErrorCode SbModelFollowJumps(SbModel model, PetscReal t, Vec U, SbStepsOf steps,
+                                  PetscBool *changed);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /* Initial displacements and velocities of bodies, with their angular velocity. Collective. */

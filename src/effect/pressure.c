@@ -28,14 +28,30 @@
   Integrals are exact: one point for linear elements, a rule of degree 5 for P2 (polynomials of
   degree 4).
 
-  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not
-  quite add up to zero. Where the pressure acts on the whole surface of such a body, it is taken as
-  -p dV/du of the volume inside (src/fem/body_volume.c): at rest that is the same, and force and
-  moment vanish for every displacement. On part of the surface small gaps remain, which vanish with
-  mesh refinement. There contributions of facets do not cancel: with CR the force acts at the
-  facet's own node, while X and Y depend on the other three of the cell, so the derivative is far
-  from symmetric. Newton's method with its symmetric part stalls near p = mu. So the operator of the
-  linear solver applies the derivative exactly, facet by facet, and the matrix, without it, is the
+  The facets of CR and DG bodies do not meet at their edges, and stretch with the centre of their
+  cell instead of the wall: with forces facet by facet a bar in a fluid becomes stiffer by h p /
+  (mu H). Their pressure has two parts,
+
+    f = -p s dV/du - p sum_F (c_F - s) dV_F,   c_F = 1 on facets under pressure, else 0,
+
+  V the volume of the body's cells (src/fem/body_volume.c), V_F the part of a facet in the volume
+  inside the continuous surface of mean_surface.c, with the prism between it and the facet's node at
+  x: with a triangle X, Y of that surface, its area vector A = X x Y / 2 and its centre z,
+
+    V_F = A . z / 3 + A . (x - z),   dV_F = A . dx + (dX x Y + X x dY) / 2 . (x - z).
+
+  Where strains are even x = z, and each facet's force acts at its node, which equilibrates the even
+  stress. The second term of dV_F makes the potential: it is left out where the surface is open, and
+  there is none. Facets whose support prescribes the normal
+  displacement count as if they were under pressure, as no work is done there: their second part is
+  only added to the reaction. s is the part of the other facets, by area, that are under pressure,
+  if at least half of them are, else 0; it is 1 where all of them are. Then the first part alone is
+  left, which the even stress P = -p cof F balances exactly in each cell, so that pressure all
+  around does not bend or stiffen anything. The pressure on a patch has no force far inside. On a
+  closed surface both parts have a potential, and force and moment vanish.
+
+  The matrix has the derivative of the first part; that of the second one, which couples nodes that
+  share no cell, is applied by the operator of the linear solver, and the matrix is the
   preconditioner.
 
   The header of a run says of each pressure whether its surface is closed, and the volume inside, or
@@ -44,9 +60,11 @@
   With follower = no the pressure acts on the rest area and normal, as small strains have it: no
   tangent.
 */
-#include "effect_impl.h"
+#include "mean_surface.h"
 #include "sbgeometry.h"
 
+#define MOST \
+  0.5 /* least part of the surface for which s is not zero: else the matrix is positive */
 #define STRAIGHT \
   1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
@@ -61,11 +79,18 @@ typedef struct {
   PetscBool follower;
   PetscInt nfacet, nedge;
   PetscReal sign; /* of a closed surface: -1 around a cavity, else 1 */
-  PetscInt nall;  /* with those of whole bodies, which follow the others */
-  SbFacet *facet; /* [nall] of owned and ghost cells */
+  PetscInt nall;  /* with those of bodies with nodes at faces, which follow the others */
+  SbFacet *facet; /* [nall] of owned and ghost cells; the first nfacet act facet by facet */
   RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
-  PetscBool
-    *whole; /* [nbody] pressure on the whole body, by its volume: its facets are not in the list */
+
+  /* bodies with nodes at faces */
+  PetscReal *share;       /* [nbody] s above; 0 for other bodies */
+  SbMeanSurface *surface; /* of these bodies; NULL: there are none */
+  PetscReal *weight;      /* [surface->nfacet] c - s */
+  PetscBool prisms;       /* the surface is closed, or facets go on behind its rim that are held */
+  PetscBool some;         /* some facet that is not held has a weight, on some rank */
+  PetscReal volume;       /* that history adds, so that the geometric volume results at rest, m^3 */
+  PetscReal *vertex[3];   /* [nvert][3] work arrays */
 } Pressure;
 
 static const SbOption rows[] = {
@@ -91,11 +116,11 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
     PetscFunctionReturn(PETSC_SUCCESS);
   e->ops.tangent = NULL;
   e->ops.nonsymmetric = NULL;
+  e->ops.volume_pressure = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the
-   matrix. */
+/* Whether it does not share edges with other facets (CR, DG). */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
   return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
@@ -183,40 +208,57 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, the
-   middle of the first one by original numbers, m. */
-static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt *nrim, PetscReal at[3])
+/* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, and of
+   those that no facet of a body with nodes at faces goes on behind which is held in its normal
+   direction; the middle of the first one by original numbers, m. */
+static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt nrim[2], PetscReal at[3])
 {
+  PetscInt n = p->nall; /* facets under pressure, then held ones */
+  const SbFacet **facet;
   SbKey *edge;                /* slot 3 facet + side */
   uint64_t mine = UINT64_MAX; /* the first edge here: its original vertices */
   uint64_t first;
 
   PetscFunctionBeginUser;
-  *nrim = 0;
+  nrim[0] = nrim[1] = 0;
   at[0] = at[1] = at[2] = 0;
-  PetscCall(PetscMalloc1(3 * p->nall, &edge));
-  for (PetscInt i = 0; i < 3 * p->nall; i++) {
-    const PetscInt *v = p->facet[i / 3].vertex;
+  PetscCall(PetscMalloc1(n + (p->surface ? p->surface->nfacet : 0), &facet));
+  for (PetscInt i = 0; i < n; i++)
+    facet[i] = &p->facet[i];
+  for (PetscInt i = 0; p->surface && i < p->surface->nfacet; i++)
+    if (p->weight[i] + p->share[mesh->cell_body[p->surface->facet[i].cell]] < 0.5 &&
+        SbMeanSurfaceHeld(p->surface, i))
+      facet[n++] = &p->surface->facet[i];
+  PetscCall(PetscMalloc1(3 * n, &edge));
+  for (PetscInt i = 0; i < 3 * n; i++) {
+    const PetscInt *v = facet[i / 3]->vertex;
 
     edge[i] = (SbKey){SbKeyOfPair(mesh->gvert[v[i % 3]], mesh->gvert[v[(i + 1) % 3]]), i};
   }
-  SbKeysSort(3 * p->nall, edge);
-  for (PetscInt i = 0, m; i < 3 * p->nall; i += m) {
+  SbKeysSort(3 * n, edge);
+  for (PetscInt i = 0, m; i < 3 * n; i += m) {
     PetscInt ways = 0; /* from the lower vertex to the higher one, less those back */
+    PetscInt all = 0;  /* with those of held facets */
     PetscInt v[2];
     uint64_t original;
 
-    m = SbKeysAlike(3 * p->nall, edge, i);
+    m = SbKeysAlike(3 * n, edge, i);
     for (PetscInt k = i; k < i + m; k++) {
+      const PetscInt *corner = facet[edge[k].slot / 3]->vertex;
+      int way;
+
       for (int a = 0; a < 2; a++)
-        v[a] = p->facet[edge[k].slot / 3].vertex[(edge[k].slot + a) % 3];
-      ways += mesh->gvert[v[0]] < mesh->gvert[v[1]] ? 1 : -1;
+        v[a] = corner[(edge[k].slot + a) % 3];
+      way = mesh->gvert[v[0]] < mesh->gvert[v[1]] ? 1 : -1;
+      all += way;
+      ways += edge[k].slot / 3 < p->nall ? way : 0;
     }
 
     // all facets at an owned vertex are here; the rank of the lower one counts the edge
     if (!ways || v[mesh->gvert[v[0]] > mesh->gvert[v[1]]] >= mesh->nvert_owned)
       continue;
-    (*nrim)++;
+    nrim[0]++;
+    nrim[1] += all != 0;
     original = SbKeyOfPair(mesh->vert_orig[v[0]], mesh->vert_orig[v[1]]);
     if (original >= mine)
       continue;
@@ -224,8 +266,9 @@ static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt *nrim
     for (int k = 0; k < 3; k++)
       at[k] = 0.5 * (mesh->x[3 * v[0] + k] + mesh->x[3 * v[1] + k]);
   }
+  PetscCall(PetscFree(facet));
   PetscCall(PetscFree(edge));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, nrim, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, nrim, 2, MPIU_INT, MPI_SUM, mesh->comm));
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_UINT64_T, MPI_MIN, mesh->comm));
   for (int k = 0; k < 3 && mine != first; k++)
     at[k] = 0;
@@ -304,6 +347,42 @@ static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3]
       f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
 }
 
+/* Facet i of a mean surface with its vertices at y[nvert][3]: sides X and Y, and the vector from
+   its centre to the node on the facet, which is at u[3], plus rest[3] unless that is NULL. */
+typedef struct {
+  PetscReal X[3], Y[3], gap[3];
+} MeanFacet;
+
+static MeanFacet mean_facet(const SbMeanSurface *surface, PetscInt i, const PetscReal y[],
+                            const PetscReal rest[], const PetscReal u[])
+{
+  const PetscInt *v = surface->facet[i].vertex;
+  const PetscInt node = surface->node[i];
+  MeanFacet m;
+
+  SbSubtract(y + 3 * v[1], y + 3 * v[0], m.X);
+  SbSubtract(y + 3 * v[2], y + 3 * v[0], m.Y);
+  for (int c = 0; c < 3; c++)
+    m.gap[c] = (rest ? rest[3 * node + c] : 0) + (u ? u[3 * node + c] : 0) -
+               (y[3 * v[0] + c] + y[3 * v[1] + c] + y[3 * v[2] + c]) / 3;
+  return m;
+}
+
+/* g += factor times the derivative of gap . (X x Y) / 2 by the vertices v, the gap fixed. */
+static void add_prism(const PetscInt v[3], PetscReal factor, const PetscReal X[3],
+                      const PetscReal Y[3], const PetscReal gap[3], PetscReal g[])
+{
+  PetscReal one[3], two[3];
+
+  SbCross(Y, gap, one);
+  SbCross(gap, X, two);
+  for (int c = 0; c < 3; c++) {
+    g[3 * v[1] + c] += factor / 2 * one[c];
+    g[3 * v[2] + c] += factor / 2 * two[c];
+    g[3 * v[0] + c] -= factor / 2 * (one[c] + two[c]);
+  }
+}
+
 /* This rank's part of the volume inside the surface at the displacements u, m^3; negative in a
    cavity. */
 static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const PetscReal u[],
@@ -311,7 +390,7 @@ static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const P
 {
   PetscFunctionBeginUser;
   *inside = 0;
-  for (PetscInt k = 0; k < load->nall; k++) {
+  for (PetscInt k = 0; k < load->nfacet; k++) {
     if (load->facet[k].cell >= space->mesh->ncell_owned)
       continue;
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
@@ -330,7 +409,90 @@ static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const P
       *inside += at.weight * SbDot3(x, N) / 3;
     }
   }
+  if (!load->surface)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* of bodies with nodes at faces the volume on which the pressure works */
+  PetscCall(SbMeanSurfaceMove(load->surface, PETSC_FALSE, u, load->vertex[0]));
+  for (PetscInt i = 0; i < load->surface->nfacet; i++) {
+    PetscReal N[3];
+    MeanFacet m;
+
+    if (load->surface->facet[i].cell >= space->mesh->ncell_owned ||
+        SbMeanSurfaceHeld(load->surface, i))
+      continue;
+    m = mean_facet(load->surface, i, load->vertex[0], space->node_x, u);
+    SbCross(m.X, m.Y, N);
+    *inside +=
+      load->weight[i] / 2 *
+      (SbDot3(load->vertex[0] + 3 * load->surface->facet[i].vertex[0], N) / 3 + SbDot3(m.gap, N));
+  }
+  for (PetscInt b = 0; b < space->mesh->nbody; b++)
+    if (load->share[b] > 0)
+      *inside += load->share[b] * SbSpaceVolume(space, b, u);
+  *inside += load->volume;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The surface of bodies with nodes at faces, and s and the weights of facets there. Collective. */
+static PetscErrorCode setup_surface(Pressure *p, SbSpace space)
+{
+  const SbMesh mesh = space->mesh;
+  PetscBool *in;       /* [nbody] */
+  uint8_t *loaded;     /* [ncell][4] */
+  PetscReal(*area)[3]; /* [nbody] under pressure, not, number of the latter facets */
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc3(mesh->nbody, &in, 4 * mesh->ncell, &loaded, mesh->nbody, &area));
+  for (PetscInt k = p->nfacet; k < p->nall; k++) {
+    in[mesh->cell_body[p->facet[k].cell]] = PETSC_TRUE;
+    loaded[4 * p->facet[k].cell + p->facet[k].face] = 1;
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, in, (PetscMPIInt)mesh->nbody, SB_MPI_BOOL, MPI_LOR, space->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    any = (PetscBool)(any || in[b]);
+  if (any) {
+    PetscCall(SbMeanSurfaceCreate(space, in, &p->surface));
+    PetscCall(PetscMalloc1(p->surface->nfacet, &p->weight));
+    for (int k = 0; k < 3; k++)
+      PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &p->vertex[k]));
+    for (PetscInt i = 0; i < p->surface->nfacet; i++) {
+      const SbFacet *facet = &p->surface->facet[i];
+      PetscReal *sum = area[mesh->cell_body[facet->cell]];
+
+      p->weight[i] = loaded[4 * facet->cell + facet->face];
+      if (facet->cell >= mesh->ncell_owned || SbMeanSurfaceHeld(p->surface, i))
+        continue;
+      sum[p->weight[i] > 0 ? 0 : 1] += facet->area;
+      sum[2] += p->weight[i] > 0 ? 0 : 1;
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, area, (PetscMPIInt)(3 * mesh->nbody), MPIU_REAL,
+                               MPI_SUM, space->comm));
+    for (PetscInt b = 0; b < mesh->nbody; b++) {
+      if (area[b][0] > 0)
+        p->share[b] = area[b][2] > 0 ? area[b][0] / (area[b][0] + area[b][1]) : 1;
+      if (p->share[b] < MOST)
+        p->share[b] = 0;
+      p->some = (PetscBool)(p->some || (in[b] && area[b][0] > 0 && area[b][2] > 0));
+    }
+    for (PetscInt i = 0; i < p->surface->nfacet; i++)
+      p->weight[i] -= p->share[mesh->cell_body[p->surface->facet[i].cell]];
+  }
+  PetscCall(PetscFree3(in, loaded, area));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The part of the volume inside the surface, at rest, of bodies with nodes at faces here, m^3. */
+static PetscReal volume_at_rest(const Pressure *p, SbMesh mesh)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt k = p->nfacet; k < p->nall; k++)
+    if (p->facet[k].cell < mesh->ncell_owned)
+      sum += p->facet[k].area / 3 * SbDot3(mesh->x + 3 * p->facet[k].vertex[0], p->facet[k].normal);
+  return sum;
 }
 
 static PetscErrorCode history_pressure(SbEffect e, SbSpace space, const SbStage *stage,
@@ -349,56 +511,49 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
   const SbMesh mesh = space->mesh;
-  PetscInt *count, nrim;
+  PetscInt nrim[2];
   PetscInt n = 0;
   PetscReal value = 1.;
-  PetscReal at[3], inside;
+  PetscReal at[3], inside, work_inside;
+  SbMeanSurface *surface;
   PetscBool some, free;
-  SbFacet *whole;
+  SbFacet *others;
 
   PetscFunctionBeginUser;
   if (e->steady)
     PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
-  PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
-  PetscCall(PetscCalloc1(mesh->nbody, &count));
+  PetscCall(PetscCalloc1(mesh->nbody, &p->share));
 
-  /* bodies with nodes at faces whose every boundary facet is in the list: their facets leave it */
-  for (PetscInt k = 0; k < p->nfacet; k++)
-    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    p->whole[b] = (PetscBool)(p->follower && !space->element[b]->nodes_per[0] &&
-                              count[b] == mesh->body[b].nfacet);
-  PetscCall(PetscMalloc1(p->nfacet, &whole));
+  /* those of bodies with nodes at faces behind the others */
+  PetscCall(PetscMalloc1(p->nfacet, &others));
   p->nall = p->nfacet;
   for (PetscInt k = 0; k < p->nall; k++)
-    if (p->whole[mesh->cell_body[p->facet[k].cell]])
-      whole[k - n] = p->facet[k];
+    if (p->follower && apart(space, &p->facet[k]))
+      others[k - n] = p->facet[k];
     else
       p->facet[n++] = p->facet[k];
-  PetscCall(PetscArraycpy(p->facet + n, whole, p->nall - n));
+  PetscCall(PetscArraycpy(p->facet + n, others, p->nall - n));
   p->nfacet = n;
-  PetscCall(PetscFree(whole));
-  PetscCall(PetscFree(count));
+  PetscCall(PetscFree(others));
+  if (p->follower && space->faces)
+    PetscCall(setup_surface(p, space));
+  if (!p->surface)
+    e->ops.volume_pressure = NULL;
   if (p->follower && value != 0)
     PetscCall(find_rim(p, space));
 
-  /* the remainder of bodies with nodes at faces, and free rims */
-  some = (PetscBool)(p->nedge > 0);
-  for (PetscInt k = 0; k < p->nfacet && !some; k++)
-    some = apart(space, &p->facet[k]);
+  /* the second part on bodies with nodes at faces, and free rims */
+  some = (PetscBool)(p->nedge > 0 || p->some);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
   if (!some)
     e->ops.nonsymmetric = NULL;
 
   /* what the surface is, in words; a free rim is known of nodes at vertices only */
-  PetscCall(measure_rim(p, mesh, &nrim, at));
-  if (nrim) {
-    free = (PetscBool)(p->nedge > 0);
-    for (PetscInt k = 0; k < p->nfacet && p->follower && !free; k++)
-      free = apart(space, &p->facet[k]);
+  PetscCall(measure_rim(p, mesh, nrim, at));
+  p->prisms = (PetscBool)!nrim[1];
+  if (nrim[0]) {
+    free = (PetscBool)(p->nedge > 0 || (p->some && !p->prisms));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &free, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
     e->no_potential = free;
     e->ops.history = NULL;
@@ -406,17 +561,105 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
     SbFormat(sizeof(e->note), e->note,
              "on an open surface: its rim has %" PetscInt_FMT
              " edges, the first at (%.4g, %.4g, %.4g)%s",
-             nrim, (double)at[0], (double)at[1], (double)at[2],
+             nrim[0], (double)at[0], (double)at[1], (double)at[2],
              !p->follower ? ""
              : free       ? "; it has no potential"
                           : "; supports hold the rim, or symmetry");
   } else {
+    /* bodies with nodes at faces have the geometric volume at rest; this rank's parts */
+    surface = p->surface;
+    p->surface = NULL;
     PetscCall(volume_inside(p, space, NULL, &inside));
+    inside += volume_at_rest(p, mesh);
+    p->surface = surface;
+    PetscCall(volume_inside(p, space, NULL, &work_inside));
+    p->volume = inside - work_inside;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &inside, 1, MPIU_REAL, MPI_SUM, space->comm));
     p->sign = inside < 0 ? -1 : 1;
     SbFormat(sizeof(e->note), e->note, "on a closed surface, %s %.6g m^3",
              inside < 0 ? "a cavity of" : "around", (double)PetscAbsReal(inside));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f += factor dV_F times the weights of facets, and on held ones what supports bear. */
+static PetscErrorCode add_surface(const Pressure *load, SbSpace space, PetscReal factor,
+                                  const PetscReal u[], PetscReal f[])
+{
+  const SbMeanSurface *surface = load->surface;
+  PetscReal *y = load->vertex[0];
+  PetscReal *g = load->vertex[1];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeanSurfaceMove(surface, PETSC_FALSE, u, y));
+  PetscCall(PetscArrayzero(g, 3 * space->mesh->nvert));
+  for (PetscInt i = 0; i < surface->nfacet; i++) {
+    const PetscInt node = surface->node[i];
+    const PetscReal weight = factor * load->weight[i];
+    const PetscBool held = SbMeanSurfaceHeld(surface, i);
+    PetscReal N[3];
+    MeanFacet m;
+
+    if (weight == 0)
+      continue;
+    m = mean_facet(surface, i, y, space->node_x, u);
+    SbCross(m.X, m.Y, N);
+    for (int c = 0; c < 3; c++)
+      if (!held || space->fixed[node] >> c & 1)
+        f[3 * node + c] += weight / 2 * N[c];
+    if (!held && load->prisms)
+      add_prism(surface->facet[i].vertex, weight, m.X, m.Y, m.gap, g);
+  }
+  PetscCall(SbMeanSurfaceForces(surface, g, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivative of add_surface() along x, without held facets. */
+static PetscErrorCode add_surface_derivative(const Pressure *load, SbSpace space, PetscReal factor,
+                                             const PetscReal u[], const PetscReal x[],
+                                             PetscReal f[])
+{
+  const SbMeanSurface *surface = load->surface;
+  PetscReal *y = load->vertex[0];
+  PetscReal *g = load->vertex[1];
+  PetscReal *w = load->vertex[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeanSurfaceMove(surface, PETSC_FALSE, u, y));
+  PetscCall(SbMeanSurfaceMove(surface, PETSC_TRUE, x, w));
+  PetscCall(PetscArrayzero(g, 3 * space->mesh->nvert));
+  for (PetscInt i = 0; i < surface->nfacet; i++) {
+    const PetscInt *v = surface->facet[i].vertex;
+    const PetscReal weight = factor * load->weight[i];
+    PetscReal one[3], two[3];
+    MeanFacet m, d;
+
+    if (weight == 0 || SbMeanSurfaceHeld(surface, i))
+      continue;
+    m = mean_facet(surface, i, y, space->node_x, u);
+    d = mean_facet(surface, i, w, NULL, x);
+    SbCross(d.X, m.Y, one);
+    SbCross(m.X, d.Y, two);
+    for (int c = 0; c < 3; c++)
+      f[3 * surface->node[i] + c] += weight / 2 * (one[c] + two[c]);
+    if (!load->prisms)
+      continue;
+    add_prism(v, weight, d.X, d.Y, m.gap, g);
+    add_prism(v, weight, m.X, m.Y, d.gap, g);
+  }
+  PetscCall(SbMeanSurfaceForces(surface, g, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode volume_pressure(SbEffect e, PetscReal t, PetscReal pressure[])
+{
+  const Pressure *load = (const Pressure *)e->data;
+  PetscReal p;
+
+  PetscFunctionBeginUser;
+  PetscCall(pressure_at(e, t, &p));
+  for (PetscInt b = 0; b < load->surface->space->mesh->nbody; b++)
+    pressure[b] += p * load->share[b];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -429,8 +672,10 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionBeginUser;
   PetscCall(pressure_at(e, stage->t, &p));
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b])
-      PetscCall(SbSpaceAddVolume(space, b, u, -p, f, NULL));
+    if (load->share[b] > 0)
+      PetscCall(SbSpaceAddVolume(space, b, u, -p * load->share[b], f, NULL));
+  if (load->surface)
+    PetscCall(add_surface(load, space, -p, u, f));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
       PetscReal side[2][3] = {{0}};
@@ -459,14 +704,12 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   if (p == 0)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    if (load->whole[b])
-      PetscCall(SbSpaceAddVolume(space, b, stage->u, p, NULL, A));
+    if (load->share[b] > 0)
+      PetscCall(SbSpaceAddVolume(space, b, stage->u, p * load->share[b], NULL, A));
   for (PetscInt k = 0; k < load->nfacet; k++) {
     PetscReal c[SB_CELL_NODES][SB_CELL_NODES][3] = {{{0}}};
     FacetPoint at;
 
-    if (apart(space, &load->facet[k]))
-      continue;
     for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
       PetscReal side[2][3] = {{0}};
 
@@ -541,23 +784,8 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
   PetscFunctionBeginUser;
   PetscCall(pressure_at(e, stage->t, &p));
   p *= stage->shift_k;
-  for (PetscInt k = 0; k < load->nfacet; k++) {
-    PetscReal side[2][3] = {{0}};
-    PetscReal w[2][3] = {{0}};
-    PetscReal one[3], two[3];
-    FacetPoint at;
-
-    if (!apart(space, &load->facet[k]))
-      continue;
-    facet_point(space, &load->facet[k], SbRuleFacet.n - 1, &at);
-    add_sides(&at, space->node_x, side);
-    add_sides(&at, stage->u, side);
-    add_sides(&at, x, w);
-    SbCross(w[0], side[1], one);
-    SbCross(side[0], w[1], two);
-    add_area(&at, p, one, y);
-    add_area(&at, p, two, y);
-  }
+  if (load->some)
+    PetscCall(add_surface_derivative(load, space, p, stage->u, x, y));
   for (PetscInt k = 0; k < load->nedge; k++)
     add_rim(space, &load->rim[k], 0.5 * p, stage->u, x, y);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -570,7 +798,11 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   PetscFunctionBeginUser;
   PetscCall(PetscFree(p->facet));
   PetscCall(PetscFree(p->rim));
-  PetscCall(PetscFree(p->whole));
+  PetscCall(PetscFree(p->share));
+  PetscCall(PetscFree(p->weight));
+  for (int k = 0; k < 3; k++)
+    PetscCall(PetscFree(p->vertex[k]));
+  PetscCall(SbMeanSurfaceDestroy(&p->surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -588,6 +820,7 @@ const SbEffectType SbEffectPressure = {
           .force = force_pressure,
           .tangent = tangent_pressure,
           .nonsymmetric = unsymmetric_pressure,
+          .volume_pressure = volume_pressure,
           .history = history_pressure,
           .destroy = destroy_pressure},
 };

@@ -51,3 +51,23 @@ PetscErrorCode SbSpaceAddVolume(SbSpace s, PetscInt body, const PetscReal x[], P
     PetscCall(SbMatRestoreBlocks(&values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscReal SbSpaceVolume(SbSpace s, PetscInt body, const PetscReal x[])
+{
+  PetscReal volume = 0.;
+
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    SbPack U[30], F[SB_POINTS][9];
+
+    if (s->batch_region[b]->body != body)
+      continue;
+    SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
+    for (int l = 0; l < SB_BATCH; l++) {
+      PetscReal one[9];
+
+      SbPackGet(9, (const SbPack *)F[0], l, one);
+      volume += s->batch_V[b][l] * SbMatDet(one);
+    }
+  }
+  return volume;
+}

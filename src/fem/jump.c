@@ -33,6 +33,10 @@
   quadratic. A dependence on the current state would have to be differentiated: jumps would add a
   spurious pressure.
 
+  A follower pressure on the body (src/effect/pressure.c) works on the volume of its cells with a
+  part p of itself, -p dV: that part of the load has the second variation which the stress -p cof F
+  lacks, and P_i is taken of P + p cof F.
+
   In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that
   keeps the energy of a face when kappa1 changes at the start of a step. With r = 0 every change of
   kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r
@@ -53,6 +57,11 @@
   2. /* further one in time steps: the secant of a growing penalty is about half its tangent */
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define NEEDLE 3.8 /* 1 for the narrowest face of a cube cut into six tets */
+#define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
+#define FLAT \
+  2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
+#define MANY 0.1     /* part of the tets of a body, likewise: few slivers do no harm */
 #define RENEWED 0.01 /* relative change of a penalty that is reported */
 #define SAME 1e-12   /* relative change that is rounding */
 
@@ -206,9 +215,10 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 }
 
 /* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
-   stiffness of twist modes; keep: m may not decrease. Returns whether some m changed. */
-static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal factor,
-                              PetscBool keep)
+   stiffness of twist modes under the pressure `even` of loads; keep: m may not decrease. Returns
+   whether some m changed. */
+static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal even,
+                              PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
   const PetscReal mu = SbMaterialShearModulus(m);
@@ -227,6 +237,14 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
+  for (PetscInt l = 0; l < n && even != 0.; l++) {
+    PetscReal one[9], cofactor[9];
+
+    SbPackGet(9, (const SbPack *)F, (int)l, one);
+    SbMatCofactor(one, cofactor);
+    for (int k = 0; k < 9; k++)
+      P[k][l] += even * cofactor[k];
+  }
 
   /* skip most batches: sums of two principal stresses are at most sqrt(2) |P| */
   for (PetscInt l = 0; l < n; l++) {
@@ -341,6 +359,90 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A face as its sides see it. */
+typedef struct {
+  PetscReal area;        /* m^2 */
+  PetscReal length[2];   /* of the face over its width or the height of the cell */
+  PetscReal flatness[2]; /* the shorter extent of the face over the height of the cell */
+} FaceShape;
+
+static FaceShape face_shape(SbSpace s, SbJump j, const Face *face)
+{
+  const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
+  const PetscInt f = face->face[0];
+  const PetscReal *x = s->mesh->x;
+  const PetscReal *corner = x + 3 * v[(f + 1) % 4];
+  PetscReal p[3], q[3], r[3], n[3], trace, largest;
+  FaceShape shape;
+
+  SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
+  SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
+  SbSubtract(p, q, r);
+  SbCross(p, q, n);
+  shape.area = 0.5 * PetscSqrtReal(SbDot3(n, n));
+
+  /* eigenvalues of the mean of (x - centroid) (x - centroid)^T: their product is area^2 / 108 */
+  trace = (SbDot3(p, p) + SbDot3(q, q) + SbDot3(r, r)) / 36.;
+  largest =
+    trace / 2. + PetscSqrtReal(PetscMax(0., PetscSqr(trace / 2.) - PetscSqr(shape.area) / 108.));
+  for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
+    const PetscReal h = 3. * j->V[face->cell[side]] / shape.area;
+    const PetscReal square = PetscMax(NEEDLE * (trace - largest), PetscSqr(h) / 12.) / largest;
+
+    shape.length[side] = 1. / PetscSqrtReal(square);
+    shape.flatness[side] = PetscSqrtReal(12. * (trace - largest)) / h;
+  }
+  return shape;
+}
+
+PetscErrorCode SbSpaceWarnShapes(SbSpace s)
+{
+  const SbJump j = s->jump;
+  const SbMesh mesh = s->mesh;
+  PetscReal *worst; /* [nbody][2] length and flatness */
+  PetscInt *count;  /* [nbody][2] tets out of range, tets */
+  uint8_t *out;     /* [ncell] */
+
+  PetscFunctionBeginUser;
+  if (!j)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc3(2 * mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const FaceShape shape = face_shape(s, j, &j->face[i]);
+
+      for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
+        PetscReal *most = worst + 2 * j->body[b];
+
+        most[0] = PetscMax(most[0], shape.length[side]);
+        most[1] = PetscMax(most[1], shape.flatness[side]);
+        if (shape.length[side] > LONG || shape.flatness[side] > FLAT)
+          out[j->face[i].cell[side]] = 1;
+      }
+    }
+  }
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    count[2 * mesh->cell_body[c]] += out[c];
+    count[2 * mesh->cell_body[c] + 1]++;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, (PetscMPIInt)(2 * mesh->nbody), MPIU_REAL,
+                             MPI_MAX, s->comm));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, s->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    if ((PetscReal)count[2 * b] > MANY * (PetscReal)count[2 * b + 1])
+      PetscCall(SbWarning(
+        s->comm,
+        "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
+        " tets are long or flat (up to %.2g times as long as wide, %.2g times as wide as high), "
+        "beyond what is verified: it may be far too stiff. Take p2, or tets of equal "
+        "edges (docs/reference/theory.md)",
+        mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
+        (double)worst[2 * b], (double)worst[2 * b + 1]));
+  PetscCall(PetscFree3(worst, count, out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
 {
   const SbJump j = s->jump;
@@ -398,7 +500,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
 
 /* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets
    r. */
-static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
+static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
   PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
@@ -407,7 +509,8 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
   for (PetscInt b = 0; b < s->nbatch; b++) {
     if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear)
       continue;
-    if (follow_batch(s, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED)))
+    if (follow_batch(s, b, x, even ? even[s->batch_region[b]->body] : 0., factor,
+                     (PetscBool)(steps == SB_STEPS_UNDAMPED)))
       any = PETSC_TRUE;
   }
   return any;
@@ -451,7 +554,8 @@ void SbJumpSumTerms(SbSpace s)
   }
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbStepsOf steps,
+                                  PetscBool *changed)
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
@@ -469,9 +573,9 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *
   first = (PetscBool)(in_time && !s->jump->began);
   if (in_time)
     s->jump->began = PETSC_TRUE;
-  if (first && follow(s, x, SB_STEPS_OF_LOAD))
+  if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
     PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
-  any = follow(s, x, steps);
+  any = follow(s, x, even, steps);
   if (any)
     PetscCall(renew(s, in_time ? x : NULL, first, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));

@@ -365,7 +365,7 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
 
 PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)
 {
-  const uint64_t want = SB_SET_BIT(k) | SB_ON_BOUNDARY;
+  const uint64_t want = SB_ON_BOUNDARY | (k < 0 ? 0 : SB_SET_BIT(k));
   const SbMesh mesh = s->mesh;
   PetscInt count = 0;
 

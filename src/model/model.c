@@ -91,7 +91,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 
 /* Lists of the effects that have an operation, in scenario order, one after the other in
    m->lists. */
-#define NLIST 6
+#define NLIST 7
 #define SORT_INTO_LIST(m, op)                                        \
   do {                                                               \
     PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST"); \
@@ -140,6 +140,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
         m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
+  PetscCall(SbSpaceWarnShapes(m->space));
   m->load = 1.;
   m->linear = m->space->linear;
 
@@ -171,6 +172,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, nonsymmetric);
+  SORT_INTO_LIST(m, volume_pressure);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
   PetscCall(SbContactSetCreate(m->space, m->neffect, m->effect, &m->contacts));
@@ -343,6 +345,31 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
   PetscCall(SbEvaluationEnd(m, &e));
   PetscCall(SbSpaceProjectAdmissible(m->space, Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps,
+                                  PetscBool *changed)
+{
+  PetscReal *even = NULL;
+  PetscReal *all;
+
+  PetscFunctionBeginUser;
+  if (m->nvolume_pressure && m->space->jump)
+    PetscCall(PetscCalloc1(2 * m->nbody, &even));
+  all = even ? even + m->nbody : NULL;
+  for (PetscInt k = 0; k < m->nvolume_pressure && even; k++) {
+    const SbEffect effect = m->volume_pressure[k];
+
+    if (!SbEffectActs(effect, t))
+      continue;
+    PetscCall(PetscArrayzero(even, m->nbody));
+    SbEffectCall(effect, volume_pressure, t, even);
+    for (PetscInt b = 0; b < m->nbody; b++)
+      all[b] += (effect->steady && !m->dynamic ? t : 1.) * even[b];
+  }
+  PetscCall(SbSpaceFollowJumps(m->space, U, all, steps, changed));
+  PetscCall(PetscFree(even));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -346,8 +346,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 
   // penalty of CR and DG for the new state, before accelerations and energies are computed
   if (run->solve.J && s.model->dynamic && run->solve.preset != SB_TIME_ALPHA2)
-    PetscCall(SbSpaceFollowJumps(
-      s.model->space, run->state.U,
+    PetscCall(SbModelFollowJumps(
+      s.model, run->clock.t, run->state.U,
       run->solve.preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME, NULL));
   PetscCall(SbRunRestartAcceleration(run));
 

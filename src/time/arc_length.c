@@ -226,7 +226,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscReal norm, along;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, run->state.U, SB_STEPS_OF_LOAD, NULL));
+  PetscCall(SbModelFollowJumps(run->model, p->factor, run->state.U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
   if (!*ok)

@@ -27,7 +27,7 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
     steps = SB_STEPS_UNDAMPED;
   if (!m->dynamic)
     steps = SB_STEPS_OF_LOAD;
-  PetscCall(SbSpaceFollowJumps(m->space, run->state.U, steps, changed));
+  PetscCall(SbModelFollowJumps(m, run->clock.t, run->state.U, steps, changed));
   if (!m->dynamic || !*changed)
     PetscFunctionReturn(PETSC_SUCCESS);
 
@@ -67,7 +67,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
   PetscFunctionBeginUser;
   if (!m->dynamic)
-    PetscCall(SbSpaceFollowJumps(m->space, step->U0, SB_STEPS_OF_LOAD, NULL));
+    PetscCall(SbModelFollowJumps(m, step->t, step->U0, SB_STEPS_OF_LOAD, NULL));
   for (int solves = 0; again; solves++) {
     /* begin: effects move, surfaces are updated, candidates of contact are found; a guess */
     PetscCall(SbRunBeginSolve(run, a, warm));
@@ -82,7 +82,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
     if (*ok && !m->dynamic && !warm) {
-      PetscCall(SbSpaceFollowJumps(m->space, step->U, SB_STEPS_OF_LOAD, &warm));
+      PetscCall(SbModelFollowJumps(m, step->t + step->dt, step->U, SB_STEPS_OF_LOAD, &warm));
       if (warm)
         continue;
     }

@@ -251,8 +251,8 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
 
-  // P1 and P2: the boundary term is outside the matrix; CR and DG, whose facets do not meet at
-  // edges: the whole tangent of an open surface is.
+  // P1 and P2: the boundary term is outside the matrix; CR and DG: that of the continuous surface
+  // is, whose nodes share no cell.
   SB_CHECK(!closed->ops.nonsymmetric && open->ops.nonsymmetric, "what is beside the matrix");
   PetscCall(check_taylor(x, open, A, PETSC_FALSE));
   PetscCall(check_taylor(x, open, A, PETSC_TRUE));

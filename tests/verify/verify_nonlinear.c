@@ -63,9 +63,8 @@ static PetscErrorCode check_order(const char *element, const char *law, const ch
 
 /*
   All materials and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not,
-  and get a stiffer bar. Their pressure has a fixed direction: follower pressure on a surface with
-  gaps has a nonsymmetric tangent, of which the matrix has the symmetric part
-  (src/effect/pressure.c).
+  and get a stiffer bar. Their pressure has a fixed direction: of the tangent of a follower pressure
+  on part of the surface the matrix has a part only (src/effect/pressure.c).
 */
 static PetscErrorCode check_orders(const char *element)
 {
