@@ -356,7 +356,8 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
   SbSpaceAssembleConstraints(). SbModelPrescribe(), residuals, tangents and solves follow.
 */
 
-/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation. */
+/* Treatment of constraints outside K: iterations in the null space of exact ones, or a
+   factorisation. */
 typedef enum {
   SB_SADDLE_NONE,
   SB_SADDLE_DIRECT
@@ -397,6 +398,8 @@ struct _p_SbConstraints {
   PC
     factored; /* factorisation of the system, owned; NULL before the first solve with SB_SADDLE_DIRECT */
   PetscInt factored_version, factored_matrix; /* version and matrix then */
+  PetscBool factored_symmetric;               /* it is one of a symmetric matrix */
+  PetscBool definite;                         /* K is, but for rounding, where it is symmetric */
   PCFailedReason failed;                      /* of this factorisation */
   PetscBool general;                          /* FGMRES replaces a method for symmetric systems */
   char method[SB_NAME_MAX];
@@ -416,7 +419,7 @@ static inline PetscBool SbConstraintsFactored(SbSpace space)
 {
   const SbConstraints c = space->constraints;
 
-  return (PetscBool)(c && c->saddle == SB_SADDLE_DIRECT && c->nexact);
+  return (PetscBool)(c && c->saddle == SB_SADDLE_DIRECT && c->ntotal);
 }
 
 /* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs

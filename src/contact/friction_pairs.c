@@ -181,7 +181,7 @@ PetscErrorCode SbContactUpdateFriction_Surfaces(SbContact contact, SbSpace s, co
 
   /* in a static run overlaps are separated within the step */
   if (parts && b->friction.nlag < PARTINGS) {
-    PetscCall(SbSurfacesSeparate(e, s, 0., PETSC_FALSE));
+    PetscCall(SbSurfacesSeparate(e, s, 0., PETSC_FALSE, PETSC_FALSE));
     b->separation.parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }

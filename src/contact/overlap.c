@@ -13,6 +13,10 @@
   collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the
   inner part counts as inside. The depth is the distance to the surface along the direction.
 
+  Surfaces that are in each other by rounding, or by less than the width of a barrier, touch: no
+  point inside is farther from the surface. A vertex inside is joined by edges that intersect
+  nothing to other ones inside; where rounding hides an intersection, the winding number decides.
+
   For a half-space, bowl, sphere and capsule, they follow from the distance.
 
   Each rank tests its own edges against the triangles near them. Only if some rank finds a
@@ -20,6 +24,7 @@
 */
 #include "pairs.h"
 #include "sbgeometry.h"
+#include "sbsurface.h"
 
 #define CANCEL 1e-3 /* relative length below which a sum of directions counts as zero */
 #define TINY 1e-12  /* of the bodies' size: a vertex nearer to a surface counts as on it */
@@ -570,6 +575,155 @@ static PetscErrorCode find_behind(SbContactSurface m, const PetscReal x[], SbCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The triangle of `part` whose closest point to `goal` is nearer than limit, m, -1: none; the
+   weights of its vertices there. */
+static PetscInt find_closest(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
+                             PetscInt part, const PetscReal goal[3], PetscReal limit,
+                             PetscReal best[3])
+{
+  PetscReal box[6];
+  PetscInt t;
+  PetscInt closest = -1;
+  SbBoxNearest near;
+
+  SbBoxClear(box);
+  SbBoxAdd(box, goal);
+  for (SbBoxNearestBegin(tree, box,
+                         limit < m->farthest + m->size ? PetscSqr(limit) : PETSC_MAX_REAL, &near);
+       SbBoxNearestNext(&near, &t);) {
+    const PetscInt *v = m->triangle + 3 * t;
+    const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+    PetscReal weight[3], d2;
+
+    if (m->part[v[0]] != part)
+      continue;
+    (void)SbTriangleClosestPoint(goal, at, weight, &d2);
+    if (d2 >= near.limit2)
+      continue;
+    near.limit2 = d2;
+    closest = t;
+    for (int i = 0; i < 3; i++)
+      best[i] = weight[i];
+  }
+  return closest;
+}
+
+/* way = from p to the point of a triangle with these weights; returns its length, m. */
+static PetscReal towards(SbContactSurface m, const PetscReal x[], PetscInt t,
+                         const PetscReal weight[3], const PetscReal p[3], PetscReal way[3])
+{
+  for (int i = 0; i < 3; i++) {
+    way[i] = -p[i];
+    for (int k = 0; k < 3; k++)
+      way[i] += weight[k] * x[3 * m->triangle[3 * t + k] + i];
+  }
+  return SbNormalise(way);
+}
+
+/* Winding number of the surface of `part` about p. */
+static PetscReal winding_about(SbContactSurface m, const PetscReal x[], PetscInt part,
+                               const PetscReal p[3])
+{
+  PetscReal sum = 0.;
+
+  for (PetscInt t = 0; t < m->ntriangle; t++)
+    if (m->part[m->triangle[3 * t]] == part)
+      sum += SbTriangleSolidAngle(x, m->triangle + 3 * t, p) / (4. * PETSC_PI);
+  return PetscAbsReal(sum);
+}
+
+/* Whether p, which may be inside `part`, is so by less than o->touch, or not at all; near: it is
+   that close to the surface. Raises o->farthest. */
+static PetscBool is_near(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
+                         PetscInt part, const PetscReal p[3], PetscBool *near, SbContactOverlap *o)
+{
+  PetscReal best[3], way[3];
+  const PetscInt t = find_closest(m, x, tree, part, p, o->touch, best);
+
+  const PetscReal d = t >= 0 ? towards(m, x, t, best, p, way) : PETSC_MAX_REAL;
+  PetscBool inside;
+
+  /* rounding may lead to vertices outside: only some need to be looked at */
+  *near = (PetscBool)(t >= 0);
+  if (d <= o->farthest)
+    return PETSC_TRUE;
+  inside = (PetscBool)(winding_about(m, x, part, p) > 0.5);
+  if (*near && inside)
+    o->farthest = d;
+  return (PetscBool)(*near || !inside);
+}
+
+/* o->touches: nothing is inside another part by o->touch or more, by the intersections hit[n][2] of
+   edges and triangles. */
+static PetscErrorCode find_touching(SbContactSurface m, const PetscReal x[], PetscInt n,
+                                    const PetscInt hit[], SbContactOverlap *o)
+{
+  PetscInt nlist = 0;
+  PetscInt *list, *in, *start, *edge;
+  uint8_t *through;
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc3(m->nvertex, &list, m->nvertex, &in, m->nedge, &through));
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
+  PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &start, &edge));
+  o->touches = PETSC_TRUE;
+  for (PetscInt v = 0; v < m->nvertex; v++)
+    in[v] = -1;
+  for (PetscInt i = 0; i < n; i++)
+    through[hit[2 * i]] = 1;
+
+  /* the inner part of each edge: to its inner end, or to where it leaves again */
+  for (PetscInt i = 0; i < n && o->touches; i++) {
+    const PetscInt *ends = m->edge + 2 * hit[2 * i];
+    const PetscInt part = m->part[m->triangle[3 * hit[2 * i + 1]]];
+    PetscReal normal[3], first, unused, p[3];
+    PetscReal s = pierce(m, x, hit[2 * i], hit[2 * i + 1], normal, &first);
+    PetscInt other = i;
+    PetscBool near;
+
+    o->touching[part] |= SB_TOUCH_ONCE;
+    o->touching[m->part[ends[0]]] |= SB_TOUCH_ONCE;
+    for (PetscInt k = i - 1; k >= 0 && hit[2 * k] == hit[2 * i]; k--)
+      other = m->part[m->triangle[3 * hit[2 * k + 1]]] == part ? k : other;
+    for (PetscInt k = i + 1; other == i && k < n && hit[2 * k] == hit[2 * i]; k++)
+      other = m->part[m->triangle[3 * hit[2 * k + 1]]] == part ? k : other;
+    if (other != i)
+      s = 0.5 * (s + pierce(m, x, hit[2 * i], hit[2 * other + 1], normal, &unused));
+    else
+      s = first < 0. ? 0. : 1.;
+    for (int k = 0; k < 3; k++)
+      p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k];
+    o->touches = (PetscBool)(m->part[ends[0]] != part && is_near(m, x, &tree, part, p, &near, o));
+    if (other != i || in[ends[first < 0. ? 0 : 1]] >= 0)
+      continue;
+    in[ends[first < 0. ? 0 : 1]] = part;
+    list[nlist++] = ends[first < 0. ? 0 : 1];
+  }
+
+  /* vertices joined to one inside by edges that intersect nothing */
+  for (PetscInt k = 0; k < nlist && o->touches; k++) {
+    const PetscInt v = list[k];
+    PetscBool near;
+
+    o->touches = is_near(m, x, &tree, in[v], x + 3 * v, &near, o);
+    for (PetscInt j = start[v]; near && j < start[v + 1]; j++) {
+      const PetscInt *e = m->edge + 2 * (edge[j] / 2);
+      const PetscInt to = e[0] == v ? e[1] : e[0];
+
+      if (through[edge[j] / 2] || in[to] >= 0)
+        continue;
+      in[to] = in[v];
+      list[nlist++] = to;
+    }
+  }
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(edge));
+  PetscCall(PetscFree3(list, in, through));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The same of the whole surface, on every rank. */
 static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                    SbContactOverlap *o)
@@ -579,9 +733,12 @@ static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], Pets
   PetscFunctionBeginUser;
   PetscCall(find_crossings(m, x, &n, &hit));
 
+  if (n && o->touch > 0. && !inside)
+    PetscCall(find_touching(m, x, n, hit, o));
+
   /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every
      run */
-  if (n || inside) {
+  if ((n || inside) && !o->touches) {
     PetscInt nmoved, *other;
     PetscReal *moved;
 
@@ -605,7 +762,20 @@ static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], Pets
     PetscCall(PetscFree(moved));
   }
   PetscCall(find_behind(m, x, o));
+  if (o->touch > 0. && !inside && o->n && !n) {
+    o->touches = PETSC_TRUE;
+    for (PetscInt i = 0; i < o->n; i++) {
+      const SbPenetration *p = &o->point[i];
+
+      o->touching[m->part[p->v[0]]] |= SB_TOUCH_ONCE;
+      o->touching[m->space->mesh->nbody] |= SB_TOUCH_ONCE;
+      o->farthest = PetscMax(o->farthest, p->depth);
+      o->touches = (PetscBool)(o->touches && p->depth < o->touch);
+    }
+  }
   o->ncrossing = n ? n : o->n;
+  if (o->touches)
+    o->n = 0;
 
   /* the first intersection, and the largest depth */
   if (o->ncrossing) {
@@ -704,9 +874,12 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
 
   PetscFunctionBeginUser;
   o->n = o->npoint = o->ncrossing = 0;
-  o->deepest = 0.;
-  if (!o->near)
+  o->deepest = o->farthest = 0.;
+  o->touches = PETSC_FALSE;
+  if (!o->near) {
     PetscCall(PetscMalloc1(N, &o->near));
+    PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
+  }
   PetscCall(PetscArrayzero(o->near, N));
   if (!m->sf) {
     PetscCall(find_overlap(m, x, inside, o));
@@ -724,6 +897,15 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
   PetscCall(PetscFree(y));
   PetscCall(SbContactSurfaceDestroy(&whole));
   PetscCall(take_points(m, o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactOverlapFree(SbContactOverlap *o)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(o->point));
+  PetscCall(PetscFree(o->near));
+  PetscCall(PetscFree(o->touching));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

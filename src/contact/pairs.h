@@ -239,7 +239,14 @@ enum {
   SB_OVERLAP_INTERSECTED,
   SB_OVERLAP_INSIDE
 };
-/* Start with {0}; release with PetscFree(point) and PetscFree(near). The same on every rank but for
+/* Of a part: its surface touched another one face to face when the run began; it does now; some
+   vertex and triangle do. */
+enum {
+  SB_TOUCH_ONCE = 1,
+  SB_TOUCH_NOW = 2,
+  SB_TOUCH_VERTICES = 4
+};
+/* Start with {0}; release with SbContactOverlapFree(). The same on every rank but for
    the points, of which a rank has those with nodes of it. */
 typedef struct {
   PetscInt
@@ -249,11 +256,19 @@ typedef struct {
   PetscInt npoint, n, size;    /* of all ranks, of this one */
   SbPenetration *point;        /* [n] with a separation direction */
   uint8_t *near; /* by number, of all ranks: SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
+
+  /* Surfaces of different parts that are in each other by less than the distance `touch`, m, which
+     the caller sets (0: none are), only touch: they get no points. */
+  PetscReal touch;
+  PetscBool touches;  /* there are intersections, and all of them are of such surfaces */
+  PetscReal farthest; /* if so: largest distance of what is inside from the surface, m */
+  uint8_t *touching;  /* [nbody+1] SB_TOUCH_... of the part, kept from search to search */
 } SbContactOverlap;
 /* Penetration at x, which may move (SbContactSurfaceReach()); `inside`: there is some, even if no
    edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
+PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
    a tet of body[0] is within the surface of body[1] at x. Slow: for the start of a run.
    Collective. */

@@ -5,6 +5,9 @@
   A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below a goal; each step has
   new ones.
 
+  Surfaces that are in each other by less than the width of the barrier when a run begins only
+  touch: they are moved apart rigidly (initial_contacts.c).
+
   Overlap. Each penetrating point (overlap.c) is moved out by a part of its depth in
   each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width of the
   barrier at least, and in a static run at once. Springs that reach less than half of that get
@@ -13,9 +16,8 @@
 */
 #include "surfaces.h"
 
-#define STIFF 10.     /* static run: stiffness over that of the barrier */
-#define SAME 1e-5     /* of the bodies' size: positions this close coincide */
-#define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
+#define STIFF 10. /* static run: stiffness over that of the barrier */
+#define SAME 1e-5 /* of the bodies' size: positions this close coincide */
 
 /* Whether two bodies coincide: then no separation direction exists. */
 static PetscErrorCode same_place(const Surfaces *b, const PetscInt body[2], PetscBool *same)
@@ -40,7 +42,8 @@ static PetscErrorCode same_place(const Surfaces *b, const PetscInt body[2], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
+PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first,
+                                  PetscBool touch)
 {
   Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
@@ -51,6 +54,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
 
   PetscFunctionBeginUser;
   b->springs.n = 0;
+  o->touch = touch && !b->separation.overlapping ? SB_TOUCH * b->contact.base.width : 0.;
   if (first && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
   PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
@@ -62,11 +66,11 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
              "-body_%s_translate",
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name,
              s->mesh->body[body[0]].name);
-  b->separation.overlapping =
-    (PetscBool)(o->ncrossing > 0 && (!first || !o->npoint || o->deepest > ROUNDING * m->size));
+  b->separation.overlapping = (PetscBool)(o->ncrossing > 0 && !o->touches);
+  b->separation.sunk = PetscMax(b->separation.sunk, o->farthest);
 
   /* a body wholly inside the obstacle has no separation direction */
-  if (first && b->contact.partner.obstacle && !b->separation.overlapping) {
+  if (first && b->contact.partner.obstacle && !o->ncrossing) {
     PetscReal place[4] = {-1., PETSC_MIN_REAL, PETSC_MIN_REAL, PETSC_MIN_REAL}; /* body, x */
     PetscInt lowest[2] = {PETSC_MAX_INT, PETSC_MAX_INT}; /* number of all ranks, of this one */
     SbPose pose;

@@ -21,9 +21,10 @@
   closest points of the last solution until friction changes by less than a tolerance
   (friction_pairs.c), and reported.
 
-  Initial contact. Bodies that touch when a run begins are moved apart rigidly
-  (initial_contacts.c), by the width or, in a static run, half of it; where that fails, by their
-  vertices. Bodies that intersect are separated by penalty springs (separation.c).
+  Initial contact. Bodies that touch when a run begins, or are in each other by less than the width,
+  are moved apart rigidly (initial_contacts.c), by the width or, in a static run, half of it; where
+  that fails, by their vertices. Bodies that intersect by more are separated by penalty springs
+  (separation.c).
 */
 #include "surfaces.h"
 
@@ -37,6 +38,9 @@
 #define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
 #define STIFFEST 11.     /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
 #define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define ON 1e-9    /* of the bodies' size: a distance below which it has no direction */
+#define ALONG 0.9  /* cosine of a distance and the normal of surfaces in each other, if it counts */
+#define NEXT 0.1   /* of the width: faces that are nearer touch */
 #define SUMS 4     /* in the first record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
@@ -154,6 +158,98 @@ static PetscBool facing(const Surfaces *b, const SbContactPair *pair, const Pets
   return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
 }
 
+/* SB_TOUCH_... of both parts of a pair; 0 in self-contact. */
+static inline uint8_t how_they_touch(const Surfaces *b, const SbContactPair *pair)
+{
+  const PetscInt one = b->surface->part[pair->v[0]];
+  const PetscInt two = b->surface->part[pair->v[SbContactPairSplit(pair)]];
+  const uint8_t *touching = b->separation.overlap.touching;
+
+  return one == two ? 0 : touching[one] & touching[two];
+}
+
+/* Whether the surfaces of a pair face each other along its distance: n, their common normal, and
+   the signed gap along it, m, negative if they are in each other. */
+static PetscBool face_to_face(const Surfaces *b, const SbContactPair *pair,
+                              const PetscReal normal[], const SbDistance *d, PetscReal n[3],
+                              PetscReal *gap)
+{
+  if (!facing(b, pair, normal, n) ||
+      (d->d >= ON * b->surface->size && PetscAbsReal(SbDot3(n, d->n)) < ALONG))
+    return PETSC_FALSE;
+  *gap = 0.;
+  for (int k = 0; k < 4; k++)
+    *gap += d->weight[k] * SbDot3(n, b->motion.x + 3 * pair->v[k]);
+  return PETSC_TRUE;
+}
+
+/* How a pair stands when a run begins: its gap, m, and d->n, the direction to open it. Of parts
+   whose surfaces touch face to face only such pairs count at first, of vertices if there are any:
+   the distances of others have no direction, or a wrong one. Returns whether the pair counts. */
+static PetscBool initial_gap(const Surfaces *b, const SbContactPair *pair, const PetscReal normal[],
+                             SbDistance *d, PetscReal *gap)
+{
+  const SbContactSurface m = b->surface;
+  const uint8_t both = how_they_touch(b, pair);
+  PetscReal n[3];
+
+  *gap = SbContactPairGap(m, pair, b->motion.x, d);
+  if (pair->side || SbContactPairRadius(m, pair) > 0. ||
+      (!(both & SB_TOUCH_NOW) && d->d >= ON * m->size))
+    return PETSC_TRUE;
+  if ((both & SB_TOUCH_VERTICES && pair->kind == SB_PAIR_EDGE_EDGE) ||
+      !face_to_face(b, pair, normal, d, n, gap))
+    return PETSC_FALSE;
+  for (int i = 0; i < 3; i++)
+    d->n[i] = n[i];
+  return PETSC_TRUE;
+}
+
+/* Parts that touch face to face, or are in each other by less than SB_TOUCH of the width; the
+   latter also where rounding hides that an edge goes through a triangle. Collective. */
+static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
+{
+  const SbContactSurface m = b->surface;
+  uint8_t *touching = b->separation.overlap.touching;
+  const PetscInt nbody = m->space->mesh->nbody;
+  PetscReal sunk = b->separation.sunk;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k <= nbody; k++)
+    touching[k] &= SB_TOUCH_ONCE;
+  for (PetscInt i = 0; i < b->pairs->n && !b->separation.overlapping; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    const PetscReal w = of_pair(b, b->widths.w, pair);
+    const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
+    PetscReal n[3], gap;
+    SbDistance d;
+
+    if (one == two || pair->side || !counts(b, pair) || SbContactPairRadius(m, pair) > 0. ||
+        SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, SB_TOUCH * w) ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= SB_TOUCH * w ||
+        !face_to_face(b, pair, normal, &d, n, &gap) || gap >= (edges ? 0. : NEXT * w))
+      continue;
+    touching[one] |= SB_TOUCH_ONCE | SB_TOUCH_NOW | (edges ? 0 : SB_TOUCH_VERTICES);
+    touching[two] |= SB_TOUCH_ONCE | SB_TOUCH_NOW | (edges ? 0 : SB_TOUCH_VERTICES);
+    sunk = PetscMax(sunk, -gap);
+  }
+  PetscCallMPI(MPI_Allreduce(&sunk, &b->separation.sunk, 1, MPIU_REAL, MPI_MAX, m->space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, touching, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR,
+                             m->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The gap to which a pair is opened when a run begins, m: `share` of the width, less for surfaces
+   that were in each other, so that nothing moves farther than the width. */
+static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair, PetscReal share)
+{
+  const PetscReal w = of_pair(b, b->widths.w, pair);
+
+  return PetscMin(share * w, how_they_touch(b, pair) ? w - b->separation.sunk : w);
+}
+
 static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
                                                 PetscReal dt, const PetscReal u[], PetscBool *first,
                                                 SbInitialContacts *list)
@@ -161,7 +257,6 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   Surfaces *b = (Surfaces *)contact;
   const SbEffect e = contact->effect;
   const SbContactSurface m = b->surface;
-  const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal;
 
   PetscFunctionBeginUser;
@@ -171,30 +266,30 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   PetscCall(find_path(b, t, dt));
   PetscCall(SbContactSurfaceMarkDriven(m));
   PetscCall(SbSurfacesPlace(b, u, 0., b->motion.x));
-  PetscCall(SbSurfacesSeparate(e, s, dt, (PetscBool)!b->separation.searched));
+  PetscCall(SbSurfacesSeparate(e, s, dt, (PetscBool)!b->separation.searched, PETSC_TRUE));
   b->separation.searched = PETSC_TRUE;
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
   PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
+  PetscCall(find_touching(b, normal));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
     const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
     SbInitialContact touch = {.body = {one, two},
-                              .to = (e->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair)};
+                              .to = initial_target(b, pair, e->dynamic ? 1. : APART)};
     SbDistance d;
 
     if (one == two || !counts(b, pair))
       continue;
-    if (SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, NEARBY * touch.to))
+    if (SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x,
+                                NEARBY * of_pair(b, b->widths.w, pair)))
       continue;
-    touch.gap = SbContactPairGap(m, pair, b->motion.x, &d);
-    if (touch.gap > NEARBY * touch.to)
+    if (!initial_gap(b, pair, normal, &d, &touch.gap) ||
+        touch.gap > NEARBY * of_pair(b, b->widths.w, pair))
       continue;
     for (int k = 0; k < 3; k++)
       touch.n[k] = d.n[k];
-    if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n))
-      continue;
     PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
     list->touch[list->n++] = touch;
   }
@@ -210,9 +305,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 {
   Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
-  const PetscReal tiny = 1e-9 * m->size;
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
-
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   for (int pass = 0; pass < PASSES; pass++) {
@@ -222,19 +315,22 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
     PetscCall(PetscCalloc2(4 * m->nvertex, &push, 3 * m->nvertex, &normal));
     PetscCall(SbContactSurfaceNormals(m, b->motion.x, normal));
+    PetscCall(find_touching(b, normal));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
-      const PetscReal goal = APART * of_pair(b, b->widths.w, pair);
+      const PetscReal goal = initial_target(b, pair, APART);
       PetscReal gap;
       PetscReal sum = 0.;
       SbDistance d;
 
       if (!counts(b, pair))
         continue;
-      gap = SbContactPairGap(m, pair, b->motion.x, &d);
+      if (!initial_gap(b, pair, normal, &d, &gap) && d.d >= ON * m->size)
+        continue;
       if (gap >= 0.9 * goal)
         continue;
-      if (!pair->side && d.d < tiny) { /* along the outward normal of the second side */
+      if (!pair->side && d.d < ON * m->size && !facing(b, pair, normal, d.n)) {
+        /* along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
           d.n[k] = 0.;
           for (int v = SbContactPairSplit(pair); v < 4; v++)
@@ -363,12 +459,15 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
     PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
     PetscCall(SbSurfacesSeparate(
-      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.)));
+      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.),
+      (PetscBool)(!b->motion.begun && t == 0.)));
   }
   if (!b->motion.begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, &moved));
-    if (moved)
-      PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE));
+    if (moved || b->separation.overlap.touches) {
+      PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
+      PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE, PETSC_FALSE));
+    }
   }
   b->motion.begun = PETSC_TRUE;
   PetscCall(SbSurfacesUpdate(b, u0));
@@ -605,8 +704,7 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
   PetscCall(PetscFree(b->blocks.block));
   PetscCall(PetscFree(b->blocks.slot));
   PetscCall(PetscFree(b->springs.spring));
-  PetscCall(PetscFree(b->separation.overlap.point));
-  PetscCall(PetscFree(b->separation.overlap.near));
+  PetscCall(SbContactOverlapFree(&b->separation.overlap));
   PetscCall(SbPartnerDestroy(&b->contact.partner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -116,12 +116,15 @@ typedef struct {
   PetscReal loss;      /* since the start, this rank's, J */
 } PairFriction;
 
+#define SB_TOUCH 0.9 /* of the width: surfaces less deep in each other only touch at the start */
+
 /* Overlap of surfaces, and how it is separated. */
 typedef struct {
   PetscBool overlapping; /* there is some */
   PetscBool parted;      /* there was some at the start of this load step */
   PetscBool searched;    /* it was searched for when the run began */
   PetscBool announced;   /* the warning was given */
+  PetscReal sunk;        /* largest depth of surfaces that only touch, at the start, m */
   PetscReal stiffer; /* factor on the stiffness of springs, by their success in the last steps */
   SbContactOverlap overlap;
 } Separation;
@@ -296,8 +299,10 @@ void SbSurfacesSwapFriction(Surfaces *b);
 /* Computes `lag` (friction_pairs.c), and `next` at the end of the step. Collective. */
 PetscErrorCode SbSurfacesLag(Surfaces *b);
 /* Finds overlaps at the current positions, and the springs that separate them in a step of length
-   dt, s; `first` of a run: errors where they cannot. Collective. */
-PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
+   dt, s; `first` of a run: errors where they cannot; touch: those below the barrier's width only
+   touch, and get no springs. Collective. */
+PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first,
+                                  PetscBool touch);
 /* normal . sum weight x of a spring at the current positions, m. */
 static inline PetscReal SbSpringPlace(const Surfaces *b, const Spring *spring)
 {

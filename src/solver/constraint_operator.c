@@ -56,6 +56,7 @@ PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBoo
   s->constraints->K = K;
   s->constraints->whole = whole;
   s->constraints->saddle = saddle;
+  s->constraints->definite = (PetscBool)!singular;
   if (singular && saddle != SB_SADDLE_DIRECT)
     PetscCall(PetscCalloc1(n, &s->constraints->added));
   PetscFunctionReturn(PETSC_SUCCESS);

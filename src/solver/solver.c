@@ -99,9 +99,9 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
     PetscCall(
       SbOptionsSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
-    PetscCall(KSPSetNormType(ksp, s->constraints->norm));
-    PetscCall(KSPSetPCSide(ksp, s->constraints->side));
+  if (s->constraints && s->constraints->general) { /* norm and side were those of FGMRES */
+    PetscCall(KSPSetNormType(ksp, KSP_NORM_DEFAULT));
+    PetscCall(KSPSetPCSide(ksp, PC_SIDE_DEFAULT));
     s->constraints->general = PETSC_FALSE;
   }
   PetscCall(KSPGetPC(ksp, &pc));

@@ -165,6 +165,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     if (constrained || round > 1)
       PetscCall(set_tolerances(run, &tol, rough));
     PetscCall(SbSolverUpdateSymmetry(tol.ksp, m->space));
+    PetscCall(SbSolverListBeginSolve(run));
     PetscCall(solve(run, U, reason));
     if (*reason <= 0)
       break;

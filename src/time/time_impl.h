@@ -98,6 +98,9 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBoo
 /* solver_list.c, after SbSolverFinish(): solvers of run->solve.snes that fail are replaced from
    here on. */
 PetscErrorCode SbSolverListCreate(SbRun run);
+/* Before each solve: limits iterations while contact has constraints outside the matrix. Not
+   collective. */
+PetscErrorCode SbSolverListBeginSolve(SbRun run);
 /* Message after a failed linear solve: solvers tried, with reasons, likely causes, advice.
    Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);

@@ -139,11 +139,104 @@ static PetscErrorCode check_ring(const char *element)
   VERIFY_MORE(o.npoint, 8, "points that know the way out");
   VERIFY_MORE(radial, 0.5, "mean part of the ways along the radius");
   VERIFY_LESS(o.deepest, 0.11, "depth, m");
-  PetscCall(PetscFree(o.point));
-  PetscCall(PetscFree(o.near));
+  PetscCall(SbContactOverlapFree(&o));
   PetscCall(PetscFree(facet));
   PetscCall(SbContactSurfaceDestroy(&m));
   PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two cubes in each other by 0.05 m down to 1e-17 m, turned at random or aligned: whether they only
+   touch, and how deep. */
+static PetscErrorCode check_touch_depths(void)
+{
+  const PetscReal size = 0.1 * PetscSqrtReal(3.);
+  SbContactOverlap o = {0};
+  PetscReal *x;
+  PetscRandom random;
+  SbContactSurface m;
+  SbFacet *facet;
+  PetscInt nfacet, set;
+  PetscInt ntouch = 0;
+  SbSpace s;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  verify_case("depth of what touches");
+  PetscCall(test_open(&t, "-bodies a,b " MEET "-ts_dt 1e-3" SOFT("a", "box:0.1,0.1,0.1:3")
+                            SOFT("b", "box:0.1,0.1,0.1:2")));
+  s = t.run->model->space;
+  PetscCall(SbSpaceFindSet(s, "boundary", "the test", &set));
+  PetscCall(SbSpaceGetSetFacets(s, set, &nfacet, &facet));
+  PetscCall(SbContactSurfaceCreate(s, nfacet, facet, NULL, &m));
+  PetscCall(SbContactSurfaceCreateArray(m, &x));
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
+  PetscCall(PetscRandomSetSeed(random, 7));
+  PetscCall(PetscRandomSeed(random));
+  for (int k = 0; k < 136; k++) {
+    const PetscReal depth = 0.05 * PetscPowReal(10., -(k / 8));
+    const PetscBool aligned = (PetscBool)(k % 4 == 3);
+    PetscReal r[4], turn, shift[2];
+
+    for (int i = 0; i < 4; i++)
+      PetscCall(PetscRandomGetValueReal(random, &r[i]));
+    turn = aligned ? 0. : 2. * PETSC_PI * r[0];
+    for (int i = 0; i < 2; i++)
+      shift[i] = aligned && k % 8 == 3 ? 0. : 0.08 * (r[1 + i] - 0.5);
+    for (PetscInt v = 0; v < m->nvertex; v++) {
+      const PetscReal X[3] = {m->X[3 * v] - 0.05, m->X[3 * v + 1] - 0.05, m->X[3 * v + 2]};
+      const PetscBool upper = (PetscBool)(m->part[v] == 1);
+
+      x[3 * v] = upper ? PetscCosReal(turn) * X[0] - PetscSinReal(turn) * X[1] + shift[0] : X[0];
+      x[3 * v + 1] =
+        upper ? PetscSinReal(turn) * X[0] + PetscCosReal(turn) * X[1] + shift[1] : X[1];
+      x[3 * v + 2] = X[2] + (upper ? 0.1 - depth : 0.);
+    }
+    o.touch = 1e-3 * size;
+    PetscCall(SbContactOverlapFind(m, x, PETSC_FALSE, &o));
+    SB_CHECK(!o.ncrossing || o.touches == (depth < o.touch), "%g m in each other: %s",
+             (double)depth, o.touches ? "only touch" : "do not only touch");
+    SB_CHECK(!o.touches || o.farthest <= depth + 1e-15, "%g m in each other, touching by %g m",
+             (double)depth, (double)o.farthest);
+    ntouch += o.touches;
+  }
+  VERIFY_MORE(ntouch, 20, "overlaps that only touch");
+  PetscCall(PetscRandomDestroy(&random));
+  PetscCall(SbContactOverlapFree(&o));
+  PetscCall(PetscFree(facet));
+  PetscCall(SbContactSurfaceDestroy(&m));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A cube on another one, in it or above it by less than the width of the barrier, as parts from
+   files are: both are moved apart by that width at most, and stay there. */
+static PetscErrorCode check_touching(const char *response, PetscReal depth, const char *turn)
+{
+  const PetscReal width = 1e-3 * 0.1 * PetscSqrtReal(3.);
+  const PetscReal angle = turn[0] ? PETSC_PI / 18. : 0.;
+  const PetscReal shift = 0.5 * (0.013 + 0.05 * (PetscCosReal(angle) - PetscSinReal(angle)) -
+                                 0.05); /* of the centre, m */
+  PetscReal most;
+  Record r = {0};
+
+  PetscFunctionBeginUser;
+  verify_case("touching, %s, %g m, %s", response, (double)depth, turn);
+  PetscCall(record_run(
+    &r,
+    MEET STEPPING "-bodies a,b -body_b_translate 0.013,0.007,%.17g %s -effect_meet_response %s "
+                  "-effects meet,held -effect_held_type fixed -effect_held_on a.zmin" SOFT(
+                    "a", "box:0.1,0.1,0.1:2") SOFT("b", "box:0.1,0.1,0.1:3"),
+    0.01, 0.1, (double)(0.1 - depth), turn, response));
+  most = PetscMax(0., depth) / 0.01;
+  VERIFY_NEAR(record_max(&r, "meet_unguarded"), 0, 0, "edges through triangles");
+  VERIFY_LESS(2. * PetscAbsReal(record_at(&r, "centre_z", 1) - 0.1 + 0.5 * depth),
+              1.01 * (width + most * 0.01), "displacement upwards in a step, m");
+  VERIFY_LESS(2. * PetscAbsReal(record_at(&r, "centre_x", 1) - 0.05 - shift), 0.01 * width,
+              "displacement to the side, m");
+  VERIFY_LESS(record_max(&r, "speed"), 2. * most + 1e-9, "speed, m/s");
+  VERIFY_LESS(record_max(&r, "strain"), 1e5 * 0.1 * PetscSqr(most * 0.01) + 1e-15,
+              "strain energy, J");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,6 +249,17 @@ int main(int argc, char **argv)
   Record r = {0};
 
   SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_touch_depths());
+  for (int k = 0; k < 5; k++) {
+    static const char *const responses[] = {"barrier", "projected", "multiplier", "augmented",
+                                            "penalty"};
+
+    PetscCall(check_touching(responses[k], 1e-9, ""));
+    PetscCall(check_touching(responses[k], 1e-6, "-body_b_rotate 0,0,1,10"));
+  }
+  PetscCall(check_touching("barrier", -1e-9, ""));
+  PetscCall(check_touching("barrier", 1e-17, ""));
+  PetscCall(check_touching("barrier", 1e-4, "-body_b_rotate 0,0,1,10"));
   PetscCall(check_bodies("cubes",
                          "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
                            SOFT("b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.05,0.003,0.004",
