@@ -341,6 +341,20 @@ static PetscErrorCode scale_width_surfaces(SbContact contact, PetscReal factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Springs whose forces become multipliers resist the inertia of a layer of cells as well, so that
+   these settle as soon in short steps, dt, s, as in long ones. */
+static void stiffen(Surfaces *b, PetscReal dt)
+{
+  const SbContactSurface m = b->surface;
+
+  for (PetscInt i = 0; i < m->space->mesh->nbody && has_multipliers(b); i++)
+    b->widths.k[i] =
+      b->widths.spring[i] +
+      (b->contact.base.effect->dynamic
+         ? b->options.stiffness * m->space->material[i]->density * m->mean_edge / PetscSqr(dt)
+         : 0.);
+}
+
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
                                           PetscReal speed, PetscReal u0[])
 {
@@ -354,6 +368,7 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   PetscFunctionBeginUser;
   PetscCall(find_path(b, t, dt));
   b->contact.base.progress = 0.;
+  stiffen(b, dt);
   PetscCall(SbMultipliersRestore(b));
   b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;
   SbContactPairsForget(b->pairs);

@@ -14,17 +14,18 @@
   Barriers. The first iterate is free of intersections (approach.c), and a step is at most as long
   as collision detection allows. Stiff gaps dominate the residual, so that the length of the last
   step decides; but in light contact short steps are large forces, so that these have to be in
-  balance as well, within rounding. Friction is lagged: in each of the first iterations it takes the normal forces of
-  the iterate, then at the solution, and the method goes on from there until they stay.
+  balance as well, within rounding. Friction is lagged: in each of the first iterations it takes the
+  normal forces of the iterate, then at the solution, and the method goes on from there until they
+  stay.
 */
 #include "newton_impl.h"
 
 #define STAGNANT 0.05    /* fraction of a step that counts as stagnation */
 #define STAGNANT_STEPS 5 /* such steps in a row after which a load step is halved */
-#define BALANCE 1e-2 /* barriers: largest residual of a solution, over the forces of contact */
+#define BALANCE 1e-2     /* barriers: largest residual of a solution, over the forces of contact */
 #define BALANCING \
   5 /* steps in a row that are short enough after which the residual is taken for rounding */
-#define PATIENCE 50      /* barriers: iterations between checks of progress */
+#define PATIENCE 50 /* barriers: iterations between checks of progress */
 #define WORTH \
   0.01          /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
 #define SLOW 15 /* iterations after which a load step that may be shortened is given up, */
@@ -97,8 +98,7 @@ static PetscErrorCode begin(SNES snes)
 
   PetscFunctionBeginUser;
   snes->reason = SNES_CONVERGED_ITERATING;
-  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = n->nshort =
-    0;
+  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = n->nshort = 0;
   n->known = n->full = n->unstable = n->filtered = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = n->fall = n->fall_checked = 0.;
