@@ -471,6 +471,9 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
       continue;
     (void)SbPairSlip(b, pair, u);
     b->friction.loss += factor * SbDot3(q, u);
+    if (b->options.sticks) /* less what its spring stores */
+      b->friction.loss -= (PetscSqr(factor) * SbDot3(q, q) - SbDot3(pair->tangent, pair->tangent)) /
+                          (2. * pair->stiffness);
     for (int k = 0; k < 12; k++) {
       const PetscInt v = pair->on.pair.v[k / 3];
       const PetscInt c = 3 * v + k % 3;

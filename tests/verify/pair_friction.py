@@ -76,6 +76,16 @@ def check_light():
         check(gain < 1e-12 and "warning" not in text, f"light-{response}: energy rises by {gain:.3g} of the weight times 5 cm\n{text}")
 
 
+def check_loss():
+    """What the springs of sticking pairs store is no loss: with a coefficient of a million, a block with a speed stops, swings and is at rest."""
+    for response in "projected", "augmented", "barrier", "penalty":
+        for friction in 0.7, 1e6:
+            found, _ = run(f"loss-{response}", response, friction, STEPS + "-ts_max_time 0.15" + (" -body_b_velocity 0.3,0,0" if friction > 1 else ""))
+            loss = found["meet_friction_loss"]
+            check(loss.max() > 0 and numpy.diff(loss).min() >= -1e-12 * loss.max(),
+                  f"loss-{response}, {friction}: the loss of {loss.max():.3g} J falls by {-numpy.diff(loss).min():.3g} J")
+
+
 def check_smooth():
     """The smoothed friction that creeps is there as well."""
     found, _ = run("smooth", "barrier", 0.7, STEPS + "-ts_max_time 0.2 -effect_meet_sticking smooth")
@@ -121,6 +131,7 @@ def check_restart():
 
 check_time()
 check_light()
+check_loss()
 check_smooth()
 check_static()
 check_ranks()
