@@ -36,10 +36,11 @@
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
 #define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
 #define STIFFEST 11.     /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
-#define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
-#define SUMS 4     /* in the first record of a checkpoint */
-#define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
-#define PASSES 200 /* sweeps over all pairs for that */
+#define APART 0.5 /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define WIDTH_ROUNDING 1e-6 /* of a gap that is meant to be w, over w */
+#define SUMS 4              /* in the first record of a checkpoint */
+#define NEARBY 5.           /* search distance over w for gaps that moving apart may close */
+#define PASSES 200          /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
@@ -341,6 +342,29 @@ static PetscErrorCode scale_width_surfaces(SbContact contact, PetscReal factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A static run begins: surfaces that are apart by w, as far as positions tell, are to touch, so
+   that w becomes larger by as little. Without it the barrier there has no stiffness to begin
+   with. */
+static PetscErrorCode touch_at_width(SbEffect e)
+{
+  Surfaces *b = (Surfaces *)e->data;
+  PetscReal least = PETSC_MAX_REAL; /* over w */
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    SbDistance d;
+    const PetscReal gap = SbContactPairGap(b->surface, pair, b->motion.x, &d);
+
+    least = PetscMin(least, gap / of_pair(b, b->widths.w, pair));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, b->surface->space->comm));
+  if (PetscAbsReal(least - 1.) < WIDTH_ROUNDING)
+    set_scale(e, (1. + 2. * WIDTH_ROUNDING) * b->widths.scale);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Springs whose forces become multipliers resist the inertia of a layer of cells as well, so that
    these settle as soon in short steps, dt, s, as in long ones. */
 static void stiffen(Surfaces *b, PetscReal dt)
@@ -384,6 +408,8 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
     PetscCall(part_touching(e, s, u0, &moved));
     if (moved)
       PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE));
+    if (!e->dynamic)
+      PetscCall(touch_at_width(e));
   }
   b->motion.begun = PETSC_TRUE;
   PetscCall(SbSurfacesUpdate(b, u0));

@@ -95,11 +95,12 @@ def check_smooth():
 def check_static():
     """Held by friction alone: the force into and along the slope is the weight; beyond Coulomb's limit nothing holds."""
     for response in "projected", "multiplier", "augmented", "barrier", "penalty":
-        found, _ = run(f"static-{response}", response, 0.7, "-time static -body_b_translate 0.05,0.05,0.0501")
-        for axis, g in (("x", G[0]), ("z", -G[1])):
-            reaction = found[f"hold_reaction_{axis}"][-1]
-            weight = 1000 * (0.4 * 0.2 * 0.05 + 0.1 * 0.1 * 0.05) * g
-            check(abs(abs(reaction / weight) - 1) < 1e-6, f"static-{response}: reaction {reaction} N for {weight} N")
+        for gap in "1", "1.5":  # 1e-4 m; the latter is the width
+            found, _ = run(f"static-{response}", response, 0.7, f"-time static -body_b_translate 0.05,0.05,0.050{gap.replace('.', '')}")
+            for axis, g in (("x", G[0]), ("z", -G[1])):
+                reaction = found[f"hold_reaction_{axis}"][-1]
+                weight = 1000 * (0.4 * 0.2 * 0.05 + 0.1 * 0.1 * 0.05) * g
+                check(abs(abs(reaction / weight) - 1) < 1e-6, f"static-{response}, gap {gap}e-4 m: reaction {reaction} N for {weight} N")
     _, text = run("static-slides", "projected", 0.5, "-time static", code=1)
     check("body b against moving along" in text, f"static-slides: not said what slides\n{text}")
 
