@@ -136,6 +136,7 @@ struct _p_SbContact {
   PetscReal progress;      /* of a potential: obstacles are at this fraction of their path */
   PetscReal width;         /* the smallest gap below which surfaces repel, m */
   PetscReal work;          /* on the bodies in the last accepted step, this rank's, J */
+  char unsettled[512];     /* why the solution of this step is none, in words; "": it is one */
 };
 
 /* The contacts of a scene. All zero: there is none. */
@@ -229,6 +230,9 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
                                           PetscBool *again);
 /* The rows of exact constraints that are active at X, where contacts->nexact > 0; collective. */
 PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
+/* Why the solution of a step is none though Newton's method has converged, in words; "": it is one.
+   Not collective, the same on all ranks. */
+const char *SbContactSetUnsettled(const SbContactSet *contacts);
 /* Work of potentials on the bodies in the last accepted step, this rank's, J. */
 PetscReal SbContactSetWork(const SbContactSet *contacts);
 

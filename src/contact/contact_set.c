@@ -201,6 +201,14 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char *SbContactSetUnsettled(const SbContactSet *contacts)
+{
+  for (PetscInt k = 0; k < contacts->n; k++)
+    if (contacts->contact[k]->unsettled[0])
+      return contacts->contact[k]->unsettled;
+  return "";
+}
+
 PetscReal SbContactSetWork(const SbContactSet *contacts)
 {
   PetscReal work = 0.;

@@ -82,8 +82,10 @@ PetscErrorCode SbSurfacesFindFriction(Surfaces *b, PetscBool end)
       continue;
     friction.stiffness = friction.force / b->friction.slip;
     if (b->options.sticks) {
-      friction.stiffness = (is_exact(b) ? STIFFER : 1.) *
-                           of_pair(b, b->widths.spring, &friction.on.pair) * friction.on.pair.area;
+      friction.stiffness =
+        (is_exact(b) ? STIFFER : 1.) *
+        of_pair(b, is_barrier(b) ? b->widths.spring : b->widths.k, &friction.on.pair) *
+        friction.on.pair.area;
       find_tangent(b, &friction);
     }
     if (b->contact.partner.obstacle)

@@ -21,9 +21,9 @@
 #define EXACT 1e-10      /* the same of exact constraints in static runs */
 #define EXACT_STEPS 1e-5 /* and in time steps */
 #define UPDATES 100      /* most updates of multipliers in a step */
+#define LOOSE 0.1        /* then the tolerance, for a step to be accepted all the same */
 #define FALLS 0.9        /* the worst gap falls to this part in ... */
-#define STUCK 3          /* ... updates; else it settles no further */
-#define LOOSE 0.1        /* then the tolerance without a warning */
+#define STUCK 3          /* ... updates; else a loose one settles no further */
 
 /* What multipliers are wrong by, over the width, and where. */
 typedef struct {
@@ -58,16 +58,19 @@ static PetscErrorCode find_forces(const Surfaces *b, PetscInt *n, PairForce **mi
   for (PetscInt i = 0; i < b->active.n; i++) {
     const Active *a = &b->active.pair[i];
     const SbPairLaw law = SbPairLawOf(b, a);
-    PetscReal d[3];
+    SbPairLaw constraint = law; /* without what bears a pair that is pressed together */
+    PetscReal d[3], c[3];
 
     if (!counts(b, &a->pair))
       continue;
     SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
     if (d[1] == 0. && a->force == 0.)
       continue;
+    constraint.guard = 0.;
+    SbPairLawEvaluate(&constraint, a->gap, a->pair.area, c);
     if (has_multipliers(b))
       find_worse(b, &a->pair,
-                 PetscAbsReal(d[1] + a->force) / (law.stiffness * a->pair.area * law.width), worst);
+                 PetscAbsReal(c[1] + a->force) / (law.stiffness * a->pair.area * law.width), worst);
     if (d[1] >= 0.)
       continue;
     list[*n] = (PairForce){.force = -d[1]};
@@ -118,7 +121,9 @@ static PetscErrorCode share(const Surfaces *b, PetscInt n, const PairForce mine[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode warn(const Surfaces *b, const Wrong *worst)
+/* Forces that are not settled: a step with multipliers of gaps fails, for others of friction alone
+   it goes on with a warning. */
+static PetscErrorCode complain(Surfaces *b, const Wrong *worst)
 {
   const SbSpace s = b->surface->space;
   const SbEffect e = b->contact.base.effect;
@@ -128,20 +133,28 @@ static PetscErrorCode warn(const Surfaces *b, const Wrong *worst)
   } most = {worst->by, s->rank};
   Wrong at = *worst;
   const char *name[2];
+  char text[384];
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE_INT, MPI_MAXLOC, s->comm));
   PetscCallMPI(MPI_Bcast(&at, (PetscMPIInt)sizeof(at), MPI_BYTE, most.rank, s->comm));
   for (int k = 0; k < 2; k++)
     name[k] = at.body[k] < s->mesh->nbody ? s->mesh->body[at.body[k]].name : "the obstacle";
-  PetscCall(SbWarning(s->comm,
-                      "effect %s: after %" PetscInt_FMT
-                      " updates of its multipliers gaps are wrong by %.2g of the width of %.3g m, "
-                      "most of %s with %s near (%g, %g, %g) m; said once: a larger "
-                      "-effect_%s_stiffness settles sooner, the response barrier needs none",
-                      e->name, b->multipliers.updates, (double)at.by, (double)b->widths.w[0],
-                      name[0], name[1], (double)at.x[0], (double)at.x[1], (double)at.x[2],
-                      e->name));
+  SbFormat(sizeof(text), text,
+           "effect %s: after %" PetscInt_FMT
+           " updates the multipliers of %s with %s near (%g, %g, %g) m are wrong by %.2g of the "
+           "width of %.3g m",
+           e->name, b->multipliers.updates, name[0], name[1], (double)at.x[0], (double)at.x[1],
+           (double)at.x[2], (double)at.by, (double)b->widths.w[0]);
+  if (has_multipliers(b))
+    SbFormat(sizeof(b->contact.base.unsettled), b->contact.base.unsettled,
+             "%s, and settle no further: -effect_%s_response barrier needs none; "
+             "-effect_%s_multiplier_tolerance %.1g goes on all the same",
+             text, e->name, e->name, 2. * (double)at.by);
+  else if (!b->multipliers.said) {
+    b->multipliers.said = PETSC_TRUE;
+    PetscCall(SbWarning(s->comm, "%s; said once", text));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,12 +165,14 @@ PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again)
   const PetscReal exact = b->contact.base.effect->dynamic ? EXACT_STEPS : EXACT;
   const PetscReal usual = is_exact(b) ? exact : SETTLED;
   const PetscReal tolerance = b->options.settled > 0. ? b->options.settled : usual;
+  const PetscReal loose = PetscMax(tolerance, LOOSE);
   PetscReal by;
   PairForce *mine;
   PetscInt n;
   Wrong worst;
 
   PetscFunctionBeginUser;
+  b->contact.base.unsettled[0] = 0;
   PetscCall(find_forces(b, &n, &mine, &worst));
   by = worst.by;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &by, 1, MPIU_REAL, MPI_MAX, comm));
@@ -169,17 +184,15 @@ PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again)
     m->stuck = 0;
   } else
     m->stuck++;
-  if (by > tolerance && m->stuck < STUCK && m->updates < UPDATES) {
+  if (by > tolerance && (by > loose || m->stuck < STUCK) && m->updates < UPDATES) {
     m->updates++;
     PetscCall(share(b, n, mine, &m->now));
     PetscCall(SbSurfacesFindFriction(b, PETSC_TRUE));
     SbSurfacesSwapFriction(b);
     b->motion.known = PETSC_FALSE;
     *again = PETSC_TRUE;
-  } else if (by > LOOSE && !m->said) {
-    m->said = PETSC_TRUE;
-    PetscCall(warn(b, &worst));
-  }
+  } else if (by > loose)
+    PetscCall(complain(b, &worst));
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -205,6 +218,7 @@ PetscErrorCode SbMultipliersRestore(Surfaces *b)
 
   PetscFunctionBeginUser;
   m->updates = 0;
+  b->contact.base.unsettled[0] = 0;
   m->now.n = m->kept.n;
   PetscCall(SbReserve(m->now.n, sizeof(*m->now.pair), &m->now.size, &m->now.pair));
   PetscCall(PetscArraycpy(m->now.pair, m->kept.pair, m->now.n));

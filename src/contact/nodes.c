@@ -21,6 +21,9 @@
   `separation_steps` steps. With springs that is the depth beyond their deflection. A static run
   resolves it at once.
 
+  Nodes are tested at the ends of steps. One that passed through a thin obstacle in a step, or
+  through one that jumped, is found afterwards, and a warning says so.
+
   Restitution: its law and energy are in restitution.c.
 */
 #include "nodes.h"
@@ -30,6 +33,7 @@
 #define LATE \
   1e-2 /* tolerance of friction after UPDATES solves of a step, with a warning; else it is halved */
 #define UPDATES 30
+#define WALK 100 /* most steps of a walk by the distance; it ends at a surface that it grazes */
 
 static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
 {
@@ -151,6 +155,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
     touch->spring.idle = (PetscBool)(c->contact.base.ends_step && !touch->was && !exact(c));
     touch->approach = 0;
     place(space, touch->node, u0, x0);
+    SbPoseInvert(&c->contact.partner.pose[0], x0, touch->from);
     gap0 = SbNodeGap(c, &c->contact.partner.pose[0], x0, n);
     if (c->contact.base.ends_step)
       touch->gap0 = gap0;
@@ -377,6 +382,66 @@ static PetscErrorCode update_nodes(SbContact contact, SbSpace space, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a node that is at `to` in the obstacle's rest frame passed through it in the step: it is
+   outside at both ends, on different sides, and a walk by the distance on the line between them
+   meets the surface. */
+static PetscBool passed_through(const Nodes *c, const ContactNode *touch, const PetscReal to[3])
+{
+  const SbObstacle obstacle = c->contact.partner.obstacle;
+  const PetscReal small = NODE_TOLERANCE * c->size;
+  const PetscReal way = PetscSqrtReal(SbDistance2(touch->from, to));
+  PetscReal n[2][3], x[3];
+  PetscReal gap = SbObstacleDistance(obstacle, touch->from, n[0]);
+  PetscReal along = 0.;
+
+  if (gap <= small || way <= gap || SbObstacleDistance(obstacle, to, n[1]) <= small ||
+      SbDot3(n[0], n[1]) >= 0.)
+    return PETSC_FALSE;
+  for (int k = 0; k < WALK && gap > small; k++) {
+    along += gap;
+    if (along >= way)
+      return PETSC_FALSE;
+    for (int i = 0; i < 3; i++)
+      x[i] = touch->from[i] + along / way * (to[i] - touch->from[i]);
+    gap = SbObstacleDistance(obstacle, x, n[1]);
+  }
+  return (PetscBool)(gap <= small);
+}
+
+/* The first warning of nodes that passed through the obstacle in the step that ended at t. */
+static PetscErrorCode warn_of_passing(Nodes *c, SbSpace space, PetscReal t, const SbPose *pose,
+                                      const PetscReal u[])
+{
+  struct {
+    int has, rank;
+  } first = {0, space->rank};
+  PetscReal at[3] = {0.};
+
+  PetscFunctionBeginUser;
+  if (c->passed || c->contact.partner.obstacle->shape == PLANE ||
+      c->contact.partner.obstacle->shape == BOWL)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < c->n && !first.has; i++) {
+    PetscReal X[3];
+
+    place(space, c->node[i].node, u, at);
+    SbPoseInvert(pose, at, X);
+    first.has = passed_through(c, &c->node[i], X);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_2INT, MPI_MAXLOC, space->comm));
+  if (!first.has)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  c->passed = PETSC_TRUE;
+  PetscCallMPI(MPI_Bcast(at, 3, MPIU_REAL, first.rank, space->comm));
+  PetscCall(SbWarning(space->comm,
+                      "effect %s: in the step to t = %g s a node passed through the obstacle, to "
+                      "(%g, %g, %g) m, as nodes are tested at the ends of steps only; said once: "
+                      "-effect_%s_response barrier, or shorter steps, keep it out",
+                      c->contact.base.effect->name, (double)t, (double)at[0], (double)at[1],
+                      (double)at[2], c->contact.base.effect->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Nodes *c = (Nodes *)e->data;
@@ -385,6 +450,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
 
   PetscFunctionBeginUser;
   PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
+  PetscCall(warn_of_passing(c, space, stage->t, &pose, stage->u));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);

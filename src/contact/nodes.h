@@ -60,6 +60,7 @@ typedef struct {
   PetscReal
     rest; /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
   PetscReal kept;     /* springs: the same at the end of the last step, m */
+  PetscReal from[3];  /* where it is when the step begins, in the obstacle's rest frame, m */
   PetscReal lambda;   /* multiplier of the last solve, N */
   PetscReal approach; /* restitution: speed of approach, m/s; 0: no rebound */
   NodeFacets facets;
@@ -74,6 +75,7 @@ typedef struct {
   PetscBool held;      /* active nodes are constrained; else force() acts on them */
   PetscBool mesh;      /* the obstacle has facets */
   PetscBool first;     /* the step has not been solved yet */
+  PetscBool passed;    /* the warning of nodes that passed through the obstacle was given */
   PetscReal impact;    /* fraction of the step at the first time of impact, 1: none */
   PetscReal size;      /* of the bodies, m */
   PetscInt n;

@@ -37,8 +37,9 @@
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
 #define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
 #define STIFFEST 11.     /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
-#define APART 0.5  /* initial gap over w where bodies cannot move apart by w, and in static runs */
-#define ON 1e-9    /* of the bodies' size: a distance below which it has no direction */
+#define APART 0.5 /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define WIDTH_ROUNDING 1e-6 /* of a gap that is meant to be w, over w */
+#define ON 1e-9             /* of the bodies' size: a distance below which it has no direction */
 #define ALONG 0.9  /* cosine of a distance and the normal of surfaces in each other, if it counts */
 #define NEXT 0.1   /* of the width: faces that are nearer touch */
 #define SUMS 4     /* in the first record of a checkpoint */
@@ -437,6 +438,43 @@ static PetscErrorCode scale_width_surfaces(SbContact contact, PetscReal factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A static run begins: surfaces that are apart by w, as far as positions tell, are to touch, so
+   that w becomes larger by as little. Without it the barrier there has no stiffness to begin
+   with. */
+static PetscErrorCode touch_at_width(SbEffect e)
+{
+  Surfaces *b = (Surfaces *)e->data;
+  PetscReal least = PETSC_MAX_REAL; /* over w */
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    SbDistance d;
+    const PetscReal gap = SbContactPairGap(b->surface, pair, b->motion.x, &d);
+
+    least = PetscMin(least, gap / of_pair(b, b->widths.w, pair));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, b->surface->space->comm));
+  if (PetscAbsReal(least - 1.) < WIDTH_ROUNDING)
+    set_scale(e, (1. + 2. * WIDTH_ROUNDING) * b->widths.scale);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Springs whose forces become multipliers resist the inertia of a layer of cells as well, so that
+   these settle as soon in short steps, dt, s, as in long ones. */
+static void stiffen(Surfaces *b, PetscReal dt)
+{
+  const SbContactSurface m = b->surface;
+
+  for (PetscInt i = 0; i < m->space->mesh->nbody && has_multipliers(b); i++)
+    b->widths.k[i] =
+      b->widths.spring[i] +
+      (b->contact.base.effect->dynamic
+         ? b->options.stiffness * m->space->material[i]->density * m->mean_edge / PetscSqr(dt)
+         : 0.);
+}
+
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
                                           PetscReal speed, PetscReal u0[])
 {
@@ -450,6 +488,7 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   PetscFunctionBeginUser;
   PetscCall(find_path(b, t, dt));
   b->contact.base.progress = 0.;
+  stiffen(b, dt);
   PetscCall(SbMultipliersRestore(b));
   b->friction.pairs.n = b->friction.next.n = b->springs.n = b->springs.nbounce = 0;
   SbContactPairsForget(b->pairs);
@@ -468,6 +507,8 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
       PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
       PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE, PETSC_FALSE));
     }
+    if (!e->dynamic)
+      PetscCall(touch_at_width(e));
   }
   b->motion.begun = PETSC_TRUE;
   PetscCall(SbSurfacesUpdate(b, u0));
@@ -555,6 +596,9 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
       continue;
     (void)SbPairSlip(b, pair, u);
     b->friction.loss += factor * SbDot3(q, u);
+    if (b->options.sticks) /* less what its spring stores */
+      b->friction.loss -= (PetscSqr(factor) * SbDot3(q, q) - SbDot3(pair->tangent, pair->tangent)) /
+                          (2. * pair->stiffness);
     for (int k = 0; k < 12; k++) {
       const PetscInt v = pair->on.pair.v[k / 3];
       const PetscInt c = 3 * v + k % 3;

@@ -13,14 +13,19 @@
 
   Barriers. The first iterate is free of intersections (approach.c), and a step is at most as long
   as collision detection allows. Stiff gaps dominate the residual, so that the length of the last
-  step decides. Friction is lagged: in each of the first iterations it takes the normal forces of
-  the iterate, then at the solution, and the method goes on from there until they stay.
+  step decides; but in light contact short steps are large forces, so that these have to be in
+  balance as well, within rounding. Friction is lagged: in each of the first iterations it takes the
+  normal forces of the iterate, then at the solution, and the method goes on from there until they
+  stay.
 */
 #include "newton_impl.h"
 
 #define STAGNANT 0.05    /* fraction of a step that counts as stagnation */
 #define STAGNANT_STEPS 5 /* such steps in a row after which a load step is halved */
-#define PATIENCE 50      /* barriers: iterations between checks of progress */
+#define BALANCE 1e-2     /* barriers: largest residual of a solution, over the forces of contact */
+#define BALANCING \
+  5 /* steps in a row that are short enough after which the residual is taken for rounding */
+#define PATIENCE 50 /* barriers: iterations between checks of progress */
 #define WORTH \
   0.01          /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
 #define SLOW 15 /* iterations after which a load step that may be shortened is given up, */
@@ -93,7 +98,7 @@ static PetscErrorCode begin(SNES snes)
 
   PetscFunctionBeginUser;
   snes->reason = SNES_CONVERGED_ITERATING;
-  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = 0;
+  snes->iter = n->provisional.n = n->nblock = n->branch = n->first = n->stagnant = n->nshort = 0;
   n->known = n->full = n->unstable = n->filtered = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = n->fall = n->fall_checked = 0.;
@@ -116,12 +121,13 @@ static PetscErrorCode begin(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the step s Y was the last: by the residual, or with barriers by its length. */
+/* Whether the step s Y was the last: by the residual; with barriers by its length, and the balance
+   of forces. */
 static PetscErrorCode check_convergence(SNES snes, PetscReal s)
 {
   Newton *n = (Newton *)snes->data;
   const SbNewtonProblem *p = n->problem;
-  PetscReal longest, enough;
+  PetscReal longest, enough, forces;
 
   PetscFunctionBeginUser;
   if (!n->nblock) {
@@ -137,8 +143,15 @@ static PetscErrorCode check_convergence(SNES snes, PetscReal s)
   PetscCall(PetscInfo(
     snes, "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
     snes->iter, (double)longest, (double)enough));
-  if (s >= 1. && longest <= enough)
-    snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  n->nshort = s >= 1. && longest <= enough ? n->nshort + 1 : 0;
+  if (!n->nshort)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(n->from.contact, NORM_2, &forces));
+  if (n->nshort < BALANCING &&
+      snes->norm > PetscMax(BALANCE * forces, PetscMax(snes->ttol, snes->abstol)))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  n->nshort = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -62,6 +62,7 @@ typedef struct {
   PetscReal fall, fall_checked; /* of E in this solve, and until the last check of progress, J */
   PetscInt first;               /* iteration at which friction's lag was updated last */
   PetscInt stagnant;            /* very short steps in a row */
+  PetscInt nshort;              /* barriers: steps in a row that are short enough to be the last */
 } Newton;
 
 /* direction.c: solves for Y, X - Y being the next iterate, and for the slope of E along -Y, J. Sets

@@ -263,12 +263,13 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
   const PetscReal h = ts->time_step;
+  const char *unsettled = SbContactSetUnsettled(&run->model->contacts);
 
   PetscFunctionBeginUser;
   if (ts->usessnes)
     PetscCall(end_state(ts, so->X1));
   PetscCall(is_finite(ts, ok));
-  *ok = (PetscBool)(*ok && reason > 0);
+  *ok = (PetscBool)(*ok && reason > 0 && !unsettled[0]);
   if (*ok && so->set.separate) {
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
@@ -301,17 +302,18 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
                 ts->steps + 1, (double)ts->ptime, (double)h));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     char why[512] = "";
+    const char *what = SNESConvergedReasons[reason];
 
-    if (reason == SNES_DIVERGED_LINEAR_SOLVE)
+    if (reason > 0)
+      what = unsettled[0] ? unsettled : "the solution is not finite, or beyond 1e15 m";
+    else if (reason == SNES_DIVERGED_LINEAR_SOLVE)
       PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else
       PetscCall(SbContactSetNearest(&run->model->contacts, sizeof(why), why));
     SbRunSuspects(run, sizeof(why), why);
     PetscCall(SbRunFail(run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
-                        ts->steps + 1, (double)ts->ptime, (double)h,
-                        reason > 0 ? "the solution is not finite, or beyond 1e15 m"
-                                   : SNESConvergedReasons[reason],
-                        why[0] ? "; " : "", why));
+                        ts->steps + 1, (double)ts->ptime, (double)h, what, why[0] ? "; " : "",
+                        why));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

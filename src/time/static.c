@@ -140,12 +140,13 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscBool far;
   PetscBool other = PETSC_FALSE;
   PetscBool found = PETSC_FALSE;
+  const char *unsettled = SbContactSetUnsettled(&l->run->model->contacts);
 
   PetscFunctionBeginUser;
   PetscCall(SbRunTooFar(l->run, l->X, &far));
   if (reason > 0 && !far)
     PetscCall(jumped(l, &other));
-  *ok = (PetscBool)(reason > 0 && !far && !other);
+  *ok = (PetscBool)(reason > 0 && !far && !other && !unsettled[0]);
   if (other)
     PetscCall(SbRunFail(l->run,
                         "load factor %g: contact was found at another equilibrium, with more "
@@ -157,6 +158,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     char why[512] = "use more -static_steps";
 
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_FALSE, &found));
+    if (found && unsettled[0])
+      SbAppend(sizeof(l->run->clock.stop_reason), l->run->clock.stop_reason, "; %s", unsettled);
     if (!found) {
       char near[512];
 
@@ -165,7 +168,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       PetscCall(SbContactSetNearest(&l->run->model->contacts, sizeof(near), near));
       SbRunSuspects(l->run, sizeof(near), near);
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
-                          SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
+                          reason > 0 && unsettled[0] ? unsettled : SNESConvergedReasons[reason],
+                          why, near[0] ? "; " : "", near));
     }
   }
 

@@ -2,7 +2,7 @@
 
 Patch test: two blocks, one on the other, with meshes that do not match and sides that cannot move outwards, are pressed with 1e4 Pa: the
 stress is uniform, exactly so for multiplier and projected. A cube flies into another: momentum stays, no energy is made, nothing passes
-through anything, and no pair pulls. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
+through anything, and no pair pulls. Multipliers that do not settle. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
 import csv
@@ -110,6 +110,23 @@ def check_fast():
         check(100 < energy < 200, f"fast-{response}: energy 200 to {energy} J")
 
 
+def check_unsettled():
+    """Multipliers that do not settle: a time step is cut, and said why; where it cannot be, that is an error with the pair, the place and what
+    helps; a looser tolerance goes on."""
+    fast = ("-bodies a,b " + BODY.format("a", "0.1,0.1,0.1:1", "0,0,0", "neohookean", "1e5", "0.3")
+            + BODY.format("b", "0.1,0.1,0.1:1", "0.02,0.03,0.11", "neohookean", "1e5", "0.3")
+            + "-body_b_velocity 0,0,-20 -effects meet -effect_meet_type contact -effect_meet_verify yes -ts_dt 0.001 -ts_max_time 0.005 "
+            "-effect_meet_response augmented -effect_meet_stiffness 1e-5 ")
+    words = r"effect meet: after 100 updates the multipliers of a with b near \(.*\) m are wrong by .* of the width .*response barrier"
+    for ranks in 1, 2:
+        text = run(f"cut-{ranks}", fast, ranks)
+        check(history(f"cut-{ranks}")["rejected"].max() > 0 and re.search(words, text), f"cut-{ranks}: not said why steps were cut\n{text}")
+    text = run("uncut", fast + "-time_max_halvings 0", code=1)
+    check(re.search("error: step .*" + words, text), f"uncut: no reason\n{text}")
+    text = run("loose", fast + "-effect_meet_multiplier_tolerance 1e3")
+    check("updates" not in text and history("loose")["rejected"].max() == 0, f"loose: {text}")
+
+
 def compare(name, one, other, tolerance):
     a, b = history(one), history(other)
     for column in ("kinetic", "strain", "max_displacement", "meet_normal_force", "meet_gap", "bottom_reaction_z"):
@@ -163,6 +180,7 @@ def check_refusals():
 check_patch()
 check_flight()
 check_fast()
+check_unsettled()
 check_ranks()
 check_restart()
 check_self()
