@@ -55,7 +55,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   PetscFunctionBeginUser;
   b->springs.n = 0;
   o->touch = touch && !b->separation.overlapping ? SB_TOUCH * b->contact.base.width : 0.;
-  if (first && !b->contact.partner.obstacle)
+  if (!b->motion.begun && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
   PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
   if (inside)

@@ -199,7 +199,8 @@ static PetscBool initial_gap(const Surfaces *b, const SbContactPair *pair, const
       (!(both & SB_TOUCH_NOW) && d->d >= ON * m->size))
     return PETSC_TRUE;
   if ((both & SB_TOUCH_VERTICES && pair->kind == SB_PAIR_EDGE_EDGE) ||
-      !face_to_face(b, pair, normal, d, n, gap))
+      !face_to_face(b, pair, normal, d, n, gap) ||
+      *gap < -SB_TOUCH * of_pair(b, b->widths.w, pair)) /* the other side of a body */
     return PETSC_FALSE;
   for (int i = 0; i < 3; i++)
     d->n[i] = n[i];
@@ -307,9 +308,16 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
+  PetscReal *begin;         /* u at the beginning */
+  PetscReal far = 0.;       /* farthest that a node has moved since, m */
+
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  for (int pass = 0; pass < PASSES; pass++) {
+  PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
+  PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
+
+  /* a node moves by the width at most: some pairs, as those beside an overlap, never open */
+  for (int pass = 0; pass < PASSES && far < b->contact.base.width; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbSurfacesPlace(b, u, 0., b->motion.x));
@@ -368,8 +376,12 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     PetscCall(PetscFree2(push, normal));
     if (!n)
       break;
+    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++)
+      far = PetscMax(far, PetscAbsReal(u[k] - begin[k]));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, s->comm));
     PetscCall(SbSpaceUpdateGhosts(s, u));
   }
+  PetscCall(PetscFree(begin));
   b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
