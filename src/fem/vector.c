@@ -26,7 +26,8 @@ PetscErrorCode SbSpaceViewDisplacement(SbSpace s, Vec U)
   if (!s->view_displacement)
     PetscFunctionReturn(PETSC_SUCCESS);
 
-  // a vector of the DM: PETSc's viewers take the mesh from it
+  // a vector of the DM: PETSc's viewers take the mesh from it, newer ones its (empty) DS as well
+  PetscCall(DMCreateDS(s->dm));
   PetscCall(DMCreateGlobalVector(s->dm, &X));
   PetscCall(PetscObjectSetName((PetscObject)X, "displacement"));
   PetscCall(VecCopy(U, X));
