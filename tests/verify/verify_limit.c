@@ -25,7 +25,7 @@
   "-effect_z_components z -effect_press_on zmax -time static "
 #define DEAD "-effect_press_type traction -effect_press_vector 0;0;%.17g "
 
-#define ARC "-static_control arc_length "
+#define ARC "-static_control arc_length -static_longest_step 10 "
 #define OUTPUT "-output_fields none -quiet -checkpoint_every_steps 1 -checkpoint_keep 100"
 
 static const PetscReal limit = 0.19245008972987526; /* of E */
