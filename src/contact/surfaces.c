@@ -45,6 +45,8 @@
 #define SUMS 4     /* in the first record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
+#define LEVER \
+  0.25 /* least sum of squared weights for that; all vertices of a free pair have a third each way */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
@@ -353,6 +355,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
           sum += PetscSqr(d.weight[k]);
       if (sum <= 0.)
         continue;
+      sum = PetscMax(sum, LEVER); /* prescribed vertices hold the pair nearly all by themselves */
       n++;
       for (int k = 0; k < 4; k++) {
         const PetscInt v = pair->v[k];

@@ -1,7 +1,7 @@
 """Invalid scenes with each of the five responses, of bodies with each other and with obstacles: an error or a warning that names what is
 wrong, or the correct motion.
 
-Bodies that overlap, that are in the same place, that touch; a thin body and a thin obstacle that are hit by more than their thickness in a
+Bodies that overlap, that are in the same place, that touch, also where both are held; a thin body and a thin obstacle that are hit by more than their thickness in a
 step; an obstacle with an open surface; one that jumps over a body.
 @ranks 1 2
 @cpu 120
@@ -56,6 +56,10 @@ for response in ALL:
     check(f"same {response}", code == 1 and "error: " in text and "body a" in text and "same place" in text, text)
     code, text, last = run("touch", TWO + BODY.format("b", "0.1,0.1,0.1:2", "0,0,0.1"), response)
     check(f"touch {response}", code == 0 and not text.strip() and last["kinetic"] < 1e-6, text)
+    held = TWO.replace("hold_on a.zmin", "hold_on a.zmin,b.zmin") + BODY.format("b", "0.1,0.1,0.1:2", "0.09999,0,0")
+    code, text, last = run("held", held, response)
+    bounded = last and last["strain"] + last["kinetic"] < 0.1  # J; their stiffness times their volume is 100 J
+    check(f"held {response}", bounded if code == 0 else "error: " in text, f"{last.get('strain')} J {text}")
     thin = (TWO.replace("0.05 ", "0.02 ") + BODY.format("b", "0.3,0.3,0.002:2,2,1", "-0.1,-0.1,0.11")).replace("hold_on a.zmin", "hold_on b.xmin,b.xmax")
     code, text, last = run("plate", thin + "-body_a_velocity 0,0,2", response)
     check(f"plate {response}", code == 0 and last["meet_contacts"] > 0, text)
