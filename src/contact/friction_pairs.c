@@ -187,8 +187,6 @@ PetscErrorCode SbContactUpdateFriction_Surfaces(SbContact contact, SbSpace s, co
     b->separation.parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (solved && has_multipliers(b))
-    PetscFunctionReturn(PETSC_SUCCESS); /* settled with them */
   PetscCall(needs_more(e, b, last, solved, &more));
   if (!more)
     PetscFunctionReturn(PETSC_SUCCESS);

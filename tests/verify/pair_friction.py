@@ -76,6 +76,18 @@ def check_light():
         check(gain < 1e-12 and "warning" not in text, f"light-{response}: energy rises by {gain:.3g} of the weight times 5 cm\n{text}")
 
 
+def check_stiff():
+    """Bodies of 1 GPa, in which a small slip has a large force: friction keeps Coulomb's law from the first step on."""
+    stiff = "-body_a_young 1e9 -body_b_young 1e9 -body_b_translate 0.05,0.05,0.05 "
+    for response in "projected", "multiplier", "augmented", "barrier", "penalty":
+        for name, more in ("static", "-time static -static_steps 1 "), ("moves", STEPS + "-ts_max_steps 6 -ts_max_time 0.03 "):
+            found, _ = run(f"stiff-{name}-{response}", response, 0.7 if name == "static" else 0.5, stiff + more)
+            ratio = found["meet_friction_force"][1:] / found["meet_normal_force"][1:]
+            print(f"  stiff-{name}-{response}: friction over the normal force {ratio.min():.4f} to {ratio.max():.4f}")
+            over = 1.06 if response == "augmented" else 1.03  # its normal force is of the solution before
+            check(ratio.max() < (0.7 if name == "static" else 0.5) * over, f"stiff-{name}-{response}: friction is {ratio.max():.4f} of the normal force")
+
+
 def check_loss():
     """What the springs of sticking pairs store is no loss: with a coefficient of a million, a block with a speed stops, swings and is at rest."""
     for response in "projected", "augmented", "barrier", "penalty":
@@ -132,6 +144,7 @@ def check_restart():
 
 check_time()
 check_light()
+check_stiff()
 check_loss()
 check_smooth()
 check_static()
