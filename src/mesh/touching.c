@@ -10,8 +10,8 @@
   the plane of the other to 1e-6 of their longest edges, and they overlap by more than a thousandth
   of the smaller area. Candidates are pairs of boxes in a tree. Curved facets are taken as flat.
 
-  Of a mesh in slabs every rank gets the boundary facets of all, and searches for those that lie on its
-  own ones: 96 bytes for each, a hundredth or so of the mesh where that is large.
+  Of a mesh in slabs every rank gets the boundary facets of all, and searches for those that lie on
+  its own ones: 96 bytes for each, a hundredth or so of the mesh where that is large.
 */
 #include "mesh_impl.h"
 #include "sbgeometry.h"
