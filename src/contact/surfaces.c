@@ -45,8 +45,7 @@
 #define SUMS 4     /* in the first record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
-#define LEVER \
-  0.25 /* least sum of squared weights for that; all vertices of a free pair have a third each way */
+#define LEVER 0.25 /* least sum of squared weights for that: of a free pair it is one or more */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
