@@ -11,11 +11,14 @@
   along edges that intersect nothing, so that neighbours separate to the same side (Heidelberger,
   Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
   collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the
-  inner part counts as inside. The depth is the distance to the surface along the direction.
+  inner part counts as inside. The depth of such a point is the distance to the surface along the
+  direction. Faces of two bodies in a common plane are on neither side of each other: directions
+  come from surfaces that are drawn in by 1e-8 or so, each body by a distance of its own.
 
-  Surfaces that are in each other by rounding, or by less than the width of a barrier, touch: no
-  point inside is farther from the surface. A vertex inside is joined by edges that intersect
-  nothing to other ones inside; where rounding hides an intersection, the winding number decides.
+  How deep bodies are in each other when a run begins is the largest distance of a point of one
+  surface, inside, from the other surface: no motion shorter than that separates them. Corners,
+  middles of edges and parts of triangles are probed. Surfaces that are in each other by rounding,
+  or by less than the width of a barrier, only touch.
 
   For a half-space, bowl, sphere and capsule, they follow from the distance.
 
@@ -30,8 +33,21 @@
 #define TINY 1e-12  /* of the bodies' size: a vertex nearer to a surface counts as on it */
 #define AGAINST \
   0.1 /* |cosine| beyond which separation direction and own outward normal agree or oppose */
-#define JITTER \
-  1e-7 /* of that size: perturbation of vertices, so that none lies on a triangle or an edge */
+#define JITTER 1e-7 /* of that size: largest distance by which surfaces are drawn in */
+#define RANDOM 0.05 /* of the difference between two parts: largest random displacement */
+#define FLAT 1e-7   /* of the trace: directions in which normals hardly differ */
+#define SPIKE 4.    /* largest displacement of a corner over that of its planes */
+#define COMMON 1.5  /* longest common way out over the longest of single points */
+#define KEPT \
+  0.5              /* of its way, for the direction of the steps before: bodies that are held deform
+                         meanwhile, and are let go of when it changes */
+#define ALONG 0.7  /* cosine of a common way and the descent of the volume: as good as 1 */
+#define ASTRAY 0.1 /* least one that counts */
+#define ALIKE 0.9999        /* cosine of directions that are not both tried */
+#define DIRECTIONS 64       /* most that are tried for a common way */
+#define SAME_DISTANCE 1e-10 /* relative: triangles that share the closest point */
+#define DEEPER 1.1  /* a part of a triangle that may be deeper by this factor is looked at */
+#define LEVELS 3    /* times that a triangle is cut in four for that */
 #define ROUNDING 64 /* rounding of a volume, in machine epsilons of its products */
 #define FAR 4.      /* ray length over depth; beyond it the closest point of the surface is taken */
 
@@ -307,12 +323,23 @@ static void spread_ways(SbContactSurface m, Ways *w, PetscInt n, PetscInt list[]
   }
 }
 
+/* A point inside `part`, before its other side is known. */
+typedef struct {
+  SbPenetration at; /* vertices and weights of the point itself, direction, area */
+  PetscInt part;
+  PetscReal depth, p[3]; /* expected along the direction; position, m */
+  PetscReal inside;      /* distance from the surface, m */
+} Point;
+
 /* Work of find_inside(): the directions, the list of vertices that have one so far, the tree of
-   triangles. */
+   triangles, the points. */
 typedef struct {
   Ways ways;
   PetscInt n, *list; /* [n] */
+  PetscInt *inner;   /* [nvertex] the part that it is inside, by intersections alone; -1: none */
   SbBoxTree tree;
+  PetscInt npoint, point_size;
+  Point *point; /* [npoint] */
 } Search;
 
 static PetscErrorCode begin_search(SbContactSurface m, const PetscReal x[], Search *search)
@@ -324,11 +351,11 @@ static PetscErrorCode begin_search(SbContactSurface m, const PetscReal x[], Sear
   PetscCall(PetscCalloc7(m->nvertex, &w->in, m->nvertex, &search->list, 3 * m->nvertex, &w->way,
                          m->nvertex, &w->depth, m->nvertex, &w->sum, m->nvertex, &w->layer,
                          m->nedge, &w->through));
-  PetscCall(PetscMalloc1(3 * m->nvertex, &w->normal));
+  PetscCall(PetscMalloc2(3 * m->nvertex, &w->normal, m->nvertex, &search->inner));
   PetscCall(SbContactSurfaceNormals(m, x, w->normal));
   for (PetscInt v = 0; v < m->nvertex; v++) {
     (void)SbNormalise(w->normal + 3 * v);
-    w->in[v] = -1;
+    w->in[v] = search->inner[v] = -1;
   }
   PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w->start, &w->edge));
   for (PetscInt k = 0; k < 2 * m->nedge; k++)
@@ -344,38 +371,50 @@ static PetscErrorCode end_search(Search *search)
   PetscFunctionBeginUser;
   PetscCall(SbBoxTreeDestroy(&search->tree));
   PetscCall(PetscFree7(w->in, search->list, w->way, w->depth, w->sum, w->layer, w->through));
-  PetscCall(PetscFree(w->normal));
+  PetscCall(PetscFree2(w->normal, search->inner));
   PetscCall(PetscFree(w->start));
   PetscCall(PetscFree(w->edge));
+  PetscCall(PetscFree(search->point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_point(const Point *point, Search *search)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(search->npoint + 1, sizeof(*point), &search->point_size, &search->point));
+  search->point[search->npoint++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* An edge enters a body at the triangle hit[0] and leaves it at hit[1]: the midpoint between both
    is inside. */
-static PetscErrorCode add_midpoint(SbContactSurface m, const Search *search, PetscInt e,
-                                   const PetscInt hit[2], SbContactOverlap *o)
+static PetscErrorCode add_midpoint(SbContactSurface m, PetscInt e, const PetscInt hit[2],
+                                   Search *search)
 {
   const PetscReal *x = search->ways.x;
   const PetscInt *ends = m->edge + 2 * e;
-  PetscReal normal[2][3], s[2], unused, p[3];
+  PetscReal normal[2][3], s[2], unused;
   PetscReal chord = 0.;
   PetscReal at;
-  SbPenetration point = {.n = 2, .v = {ends[0], ends[1]}, .area = m->edge_area[e]};
+  Point point = {.at = {.n = 2, .v = {ends[0], ends[1]}, .area = m->edge_area[e]},
+                 .part = m->part[m->triangle[3 * hit[0]]]};
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++)
     s[k] = pierce(m, x, e, hit[k], normal[k], &unused);
   at = 0.5 * (s[0] + s[1]);
-  point.weight[0] = 1. - at;
-  point.weight[1] = at;
+  point.at.weight[0] = 1. - at;
+  point.at.weight[1] = at;
   for (int k = 0; k < 3; k++) {
-    point.normal[k] = normal[0][k] + normal[1][k];
-    p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
+    point.at.normal[k] = normal[0][k] + normal[1][k];
+    point.p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
     chord += PetscSqr((s[1] - s[0]) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
   }
-  if (SbNormalise(point.normal) > CANCEL)
-    PetscCall(add_inside(m, x, &search->tree, m->part[m->triangle[3 * hit[0]]],
-                         PetscSqrtReal(chord), p, &point, o));
+  point.depth = PetscSqrtReal(chord);
+  if (SbNormalise(point.at.normal) <= CANCEL)
+    for (int k = 0; k < 3; k++)
+      point.at.normal[k] = 0.;
+  PetscCall(add_point(&point, search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -400,6 +439,7 @@ static void mark_end(SbContactSurface m, Search *search, PetscInt e, PetscInt t,
     search->list[search->n++] = v;
   }
   o->near[v] = SB_OVERLAP_INSIDE;
+  search->inner[v] = m->part[m->triangle[3 * t]];
 }
 
 /* What the intersections hit[n][2] of edges and triangles show: midpoints of edges, and ends of
@@ -431,7 +471,7 @@ static PetscErrorCode read_crossings(SbContactSurface m, PetscInt n, const Petsc
       j++;
     if (j < n && hit[2 * j] == e) {
       paired[j] = 1;
-      PetscCall(add_midpoint(m, search, e, (const PetscInt[2]){t, hit[2 * j + 1]}, o));
+      PetscCall(add_midpoint(m, e, (const PetscInt[2]){t, hit[2 * j + 1]}, search));
     } else
       mark_end(m, search, e, t, o);
   }
@@ -457,6 +497,7 @@ static void spread_inside(SbContactSurface m, Search *search, SbContactOverlap *
       if (w->through[w->edge[j]] || o->near[to] == SB_OVERLAP_INSIDE)
         continue;
       o->near[to] = SB_OVERLAP_INSIDE;
+      search->inner[to] = search->inner[list[k]];
       list[n++] = to;
     }
   }
@@ -481,12 +522,266 @@ static void keep_opposed(const PetscReal normal[], SbContactOverlap *o)
     o->n = nleading;
 }
 
+/* Distance of p from the surface of `part`, m, negative outside. At an edge or a corner the sign is
+   that of the triangle that p faces most; where no other triangle meets there the surface ends, and
+   p is outside. */
+static PetscReal depth_at(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
+                          PetscInt part, const PetscReal p[3])
+{
+  const PetscReal box[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};
+  PetscReal depth = -PETSC_MAX_REAL;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscReal facing = -1.;
+  PetscInt n = 0; /* triangles at that distance */
+  PetscInt t;
+  SbBoxNearest near;
+
+  for (SbBoxNearestBegin(tree, box, PETSC_MAX_REAL, &near); SbBoxNearestNext(&near, &t);) {
+    const PetscInt *v = m->triangle + 3 * t;
+    const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+    PetscReal weight[3], normal[3], r[3], d2, height;
+    PetscBool face;
+
+    if (m->part[v[0]] != part)
+      continue;
+    face = (PetscBool)(SbTriangleClosestPoint(p, at, weight, &d2) == SB_FEATURE_FACE);
+    if (d2 > (1. + SAME_DISTANCE) * least)
+      continue;
+    if (d2 < (1. - SAME_DISTANCE) * least) {
+      n = 0;
+      facing = -1.;
+    }
+    n += face ? 2 : 1;
+    least = PetscMin(least, d2);
+    near.limit2 = (1. + SAME_DISTANCE) * least;
+    (void)SbContactTriangleArea(x, v, normal);
+    (void)SbNormalise(normal);
+    SbSubtract(p, at[0], r);
+    height = SbDot3(normal, r);
+    if (PetscAbsReal(height) <= facing)
+      continue;
+    facing = PetscAbsReal(height);
+    depth = face ? -height : PetscSqrtReal(d2) * (height < 0. ? 1. : -1.);
+  }
+  return n > 1 ? depth : -PetscAbsReal(depth);
+}
+
+/* Length of the ray from p along n until it leaves the surface of `part`, m; limit: it does not
+   within that. */
+static PetscReal way_out(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
+                         PetscInt part, const PetscReal p[3], const PetscReal n[3], PetscReal limit)
+{
+  PetscReal box[6], end[3];
+  PetscReal least = limit;
+  PetscInt t;
+  SbBoxNearest query;
+
+  SbBoxClear(box);
+  SbBoxAdd(box, p);
+  for (int i = 0; i < 3; i++)
+    end[i] = p[i] + limit * n[i];
+  SbBoxAdd(box, end);
+  for (SbBoxNearestBegin(tree, box, 0, &query); SbBoxNearestNext(&query, &t);) {
+    const PetscInt *v = m->triangle + 3 * t;
+    const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+    PetscReal weight[3], length;
+    PetscBool out;
+
+    if (m->part[v[0]] == part && SbRayTriangle(p, n, at, &length, weight, &out) && out)
+      least = PetscMin(least, length);
+  }
+  return least;
+}
+
+/* Longest way out of the points of two parts in each other, those of part[0] along n and those of
+   part[1] against it, m; limit: it is not shorter. */
+static PetscReal longest_way(SbContactSurface m, const Search *search, const PetscInt part[2],
+                             const PetscReal n[3], PetscReal limit)
+{
+  const PetscReal back[3] = {-n[0], -n[1], -n[2]};
+  PetscReal most = 0.;
+
+  for (PetscInt i = 0; i < search->npoint && most < limit; i++) {
+    const Point *point = &search->point[i];
+    const PetscInt own = m->part[point->at.v[0]];
+    const PetscBool forth = (PetscBool)(own == part[0] && point->part == part[1]);
+
+    if (forth || (own == part[1] && point->part == part[0]))
+      most = PetscMax(most, way_out(m, search->ways.x, &search->tree, point->part, point->p,
+                                    forth ? n : back, limit));
+  }
+  return most;
+}
+
+/* The direction in which the volume that two parts share falls fastest, as seen by the points:
+   minus the sum of the areas of part[0] inside part[1], plus that of the other; 0: they cancel. */
+static void find_descent(SbContactSurface m, const Search *search, const PetscInt part[2],
+                         PetscReal way[3])
+{
+  PetscReal all = 0.;
+
+  for (int k = 0; k < 3; k++)
+    way[k] = 0.;
+  for (PetscInt i = 0; i < search->npoint; i++) {
+    const Point *p = &search->point[i];
+    const PetscInt own = m->part[p->at.v[0]];
+    const PetscBool forth = (PetscBool)(own == part[0] && p->part == part[1]);
+
+    if (!forth && (own != part[1] || p->part != part[0]))
+      continue;
+    all += p->at.area;
+    for (PetscInt j = 0; j < p->at.n; j++)
+      for (int k = 0; k < 3; k++)
+        way[k] += (forth ? -1. : 1.) * p->at.area * p->at.weight[j] *
+                  search->ways.normal[3 * p->at.v[j] + k];
+  }
+  if (SbNormalise(way) <= ASTRAY * all)
+    for (int k = 0; k < 3; k++)
+      way[k] = 0.;
+}
+
+/*
+  A direction n in which two parts separate as a whole: of the normals of their triangles that edges
+  go through, hit[n][2], their mean and find_descent(), the one with the shortest way for all points
+  over the cosine to the latter. So faces part along their normal, where edges that go through their
+  sides, too, would lead elsewhere, and a finger leaves through the hole that it made. `most`:
+  longest way of the points each along its own direction, m, or distance of one from the surface;
+  one that is much longer is of surfaces that wrap around each other. Returns the way, m; 0: there
+  is none.
+*/
+static PetscReal find_common_way(SbContactSurface m, const Search *search, PetscInt n,
+                                 const PetscInt hit[], const PetscInt part[2], PetscReal most,
+                                 const PetscReal before[3], PetscReal way[3])
+{
+  const PetscReal limit = COMMON * most;
+  PetscReal tried[DIRECTIONS][3];
+  PetscReal mean[3] = {0.};
+  PetscReal descent[3];
+  PetscReal least = limit * ALONG / ASTRAY;
+  PetscReal found = 0.;
+  int ntried = 0;
+
+  find_descent(m, search, part, descent);
+  for (PetscInt i = -1; i <= n + 1; i++) {
+    const PetscBool of_hit = (PetscBool)(i >= 0 && i < n);
+    const PetscInt t = of_hit ? hit[2 * i + 1] : -1;
+    const PetscInt inner = of_hit ? m->part[m->edge[2 * hit[2 * i]]] : part[0];
+    const PetscInt outer = of_hit ? m->part[m->triangle[3 * t]] : part[1];
+    const PetscReal sign = inner == part[0] && outer == part[1] ? 1. : -1.;
+    PetscReal normal[3], length, cosine;
+    PetscBool again = PETSC_FALSE;
+
+    if (inner != part[sign > 0. ? 0 : 1] || outer != part[sign > 0. ? 1 : 0])
+      continue;
+    if (of_hit)
+      (void)SbContactTriangleArea(search->ways.x, m->triangle + 3 * t, normal);
+    for (int k = 0; k < 3 && !of_hit; k++)
+      normal[k] = i < 0 ? before[k] : i == n ? mean[k] : descent[k];
+    if ((i == n + 1 && found > 0.) || SbNormalise(normal) <= 0.)
+      continue;
+    for (int k = 0; k < 3; k++) {
+      normal[k] *= sign;
+      mean[k] += of_hit ? normal[k] : 0.;
+    }
+    for (int k = 0; k < ntried; k++)
+      again = (PetscBool)(again || SbDot3(tried[k], normal) > ALIKE);
+    if (again || (of_hit && ntried == DIRECTIONS - 2))
+      continue;
+    for (int k = 0; k < 3; k++)
+      tried[ntried][k] = normal[k];
+    ntried++;
+    cosine = SbDot3(descent, descent) > 0.
+               ? PetscMin(1., PetscMax(SbDot3(descent, normal), ASTRAY) / ALONG)
+               : 1.;
+    length = longest_way(m, search, part, normal, PetscMin(limit, cosine * least));
+    if (length >= PetscMin(limit, cosine * least) || length <= 0.)
+      continue;
+    least = (i < 0 ? KEPT : 1.) * length / cosine;
+    found = length;
+    for (int k = 0; k < 3; k++)
+      way[k] = normal[k];
+  }
+  return found;
+}
+
+/* The points of two parts get one direction, if there is one. */
+static PetscErrorCode agree_on_way(SbContactSurface m, PetscInt n, const PetscInt hit[],
+                                   const PetscInt part[2], Search *search, SbContactOverlap *o)
+{
+  PetscReal most = 0.;
+  PetscReal way[3] = {0.};
+  PetscReal length;
+  PetscInt at = 0;
+
+  PetscFunctionBeginUser;
+  while (at < o->nway && (o->way[at].part[0] != part[0] || o->way[at].part[1] != part[1]))
+    at++;
+  if (at == o->nway) {
+    PetscCall(SbReserve(at + 1, sizeof(*o->way), &o->way_size, &o->way));
+    o->way[o->nway++] = (SbOverlapWay){.part = {part[0], part[1]}};
+  }
+  for (PetscInt i = 0; i < search->npoint; i++) {
+    const Point *p = &search->point[i];
+    const PetscInt own = m->part[p->at.v[0]];
+
+    if ((own != part[0] || p->part != part[1]) && (own != part[1] || p->part != part[0]))
+      continue;
+    most = PetscMax(most, p->inside);
+    most = PetscMax(most, SbDot3(p->at.normal, p->at.normal) > 0.
+                            ? way_out(m, search->ways.x, &search->tree, p->part, p->p, p->at.normal,
+                                      FAR * p->depth)
+                            : p->depth);
+  }
+  length = find_common_way(m, search, n, hit, part, most, o->way[at].n, way);
+  if (length > 0.)
+    PetscCall(PetscArraycpy(o->way[at].n, way, 3));
+  for (PetscInt i = 0; i < search->npoint && length > 0.; i++) {
+    Point *p = &search->point[i];
+    const PetscInt own = m->part[p->at.v[0]];
+    const PetscBool forth = (PetscBool)(own == part[0] && p->part == part[1]);
+
+    if (!forth && (own != part[1] || p->part != part[0]))
+      continue;
+    p->depth = length;
+    for (int k = 0; k < 3; k++)
+      p->at.normal[k] = forth ? way[k] : -way[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each two parts of which an edge of one goes through a triangle of the other. */
+static PetscErrorCode agree_on_ways(SbContactSurface m, PetscInt n, const PetscInt hit[],
+                                    Search *search, SbContactOverlap *o)
+{
+  PetscInt npair = 0;
+  PetscInt *pair;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(2 * n, &pair));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt one = m->part[m->edge[2 * hit[2 * i]]];
+    const PetscInt two = m->part[m->triangle[3 * hit[2 * i + 1]]];
+
+    if (one == two)
+      continue;
+    pair[2 * npair] = PetscMin(one, two);
+    pair[2 * npair++ + 1] = PetscMax(one, two);
+  }
+  PetscCall(SbSortByKeys(npair, 2 * sizeof(*pair), 2, pair));
+  for (PetscInt i = 0; i < npair; i++)
+    if (!i || pair[2 * i] != pair[2 * i - 2] || pair[2 * i + 1] != pair[2 * i - 1])
+      PetscCall(agree_on_way(m, n, hit, pair + 2 * i, search, o));
+  PetscCall(PetscFree(pair));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
 static PetscErrorCode find_inside(SbContactSurface m, const PetscReal x[], PetscInt n,
                                   const PetscInt hit[], SbContactOverlap *o)
 {
   Search search;
   const Ways *w = &search.ways;
+  PetscInt ninside = 0;
 
   PetscFunctionBeginUser;
   PetscCall(begin_search(m, x, &search));
@@ -494,16 +789,39 @@ static PetscErrorCode find_inside(SbContactSurface m, const PetscReal x[], Petsc
 
   /* directions and depths of the vertices inside */
   spread_ways(m, &search.ways, search.n, search.list);
+  spread_inside(m, &search, o);
   for (PetscInt v = 0; v < m->nvertex; v++) {
-    SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
+    Point point = {.at = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]},
+                   .part = w->layer[v] ? w->in[v] : search.inner[v],
+                   .depth = PetscMax(w->depth[v], 0.)};
 
-    if (!w->layer[v] || SbDot3(w->way + 3 * v, w->way + 3 * v) == 0. || w->depth[v] <= 0.)
+    if (point.part < 0)
       continue;
-    PetscCall(PetscArraycpy(point.normal, w->way + 3 * v, 3));
-    PetscCall(add_inside(m, x, &search.tree, w->in[v], w->depth[v], x + 3 * v, &point, o));
+    for (int k = 0; k < 3; k++) {
+      point.at.normal[k] = w->way[3 * v + k];
+      point.p[k] = x[3 * v + k];
+    }
+    PetscCall(add_point(&point, &search));
   }
 
-  spread_inside(m, &search, o);
+  /* an edge that goes through a rim twice has no part inside */
+  for (PetscInt i = 0; i < search.npoint; i++) {
+    Point p = search.point[i];
+
+    if (m->part[p.at.v[0]] != p.part)
+      p.inside = depth_at(m, x, &search.tree, p.part, p.p);
+    if (p.inside >= 0.)
+      search.point[ninside++] = p;
+  }
+  search.npoint = ninside;
+  PetscCall(agree_on_ways(m, n, hit, &search, o));
+  for (PetscInt i = 0; i < search.npoint; i++) {
+    Point *p = &search.point[i];
+
+    if (p->depth > 0. && SbDot3(p->at.normal, p->at.normal) > 0.)
+      PetscCall(add_inside(m, x, &search.tree, p->part, p->depth, p->p, &p->at, o));
+  }
+
   keep_opposed(w->normal, o);
   PetscCall(end_search(&search));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -575,139 +893,135 @@ static PetscErrorCode find_behind(SbContactSurface m, const PetscReal x[], SbCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The triangle of `part` whose closest point to `goal` is nearer than limit, m, -1: none; the
-   weights of its vertices there. */
-static PetscInt find_closest(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
-                             PetscInt part, const PetscReal goal[3], PetscReal limit,
-                             PetscReal best[3])
+/* The largest depth of points of surfaces that are in each other, and where it is. */
+typedef struct {
+  SbContactSurface m;
+  const PetscReal *x;
+  SbBoxTree tree;
+  PetscReal depth, place[3]; /* m */
+  PetscInt part[2];          /* of the surface with the point, of the one around it */
+} Deepest;
+
+/* A point p of the surface of part[0] that may be inside part[1]; returns its depth, m. */
+static PetscReal probe(Deepest *d, const PetscInt part[2], const PetscReal p[3])
 {
-  PetscReal box[6];
-  PetscInt t;
-  PetscInt closest = -1;
-  SbBoxNearest near;
+  const PetscReal depth = depth_at(d->m, d->x, &d->tree, part[1], p);
 
-  SbBoxClear(box);
-  SbBoxAdd(box, goal);
-  for (SbBoxNearestBegin(tree, box,
-                         limit < m->farthest + m->size ? PetscSqr(limit) : PETSC_MAX_REAL, &near);
-       SbBoxNearestNext(&near, &t);) {
-    const PetscInt *v = m->triangle + 3 * t;
-    const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
-    PetscReal weight[3], d2;
-
-    if (m->part[v[0]] != part)
-      continue;
-    (void)SbTriangleClosestPoint(goal, at, weight, &d2);
-    if (d2 >= near.limit2)
-      continue;
-    near.limit2 = d2;
-    closest = t;
+  if (depth > d->depth) {
+    d->depth = depth;
     for (int i = 0; i < 3; i++)
-      best[i] = weight[i];
+      d->place[i] = p[i];
+    for (int i = 0; i < 2; i++)
+      d->part[i] = part[i];
   }
-  return closest;
+  return depth;
 }
 
-/* way = from p to the point of a triangle with these weights; returns its length, m. */
-static PetscReal towards(SbContactSurface m, const PetscReal x[], PetscInt t,
-                         const PetscReal weight[3], const PetscReal p[3], PetscReal way[3])
+/* The centroid of a triangle with the corners c, then of its four parts, while they may be deeper:
+   depth changes by a distance at most. */
+static void probe_triangle(Deepest *d, const PetscInt part[2], const PetscReal c[9], int level)
 {
-  for (int i = 0; i < 3; i++) {
-    way[i] = -p[i];
-    for (int k = 0; k < 3; k++)
-      way[i] += weight[k] * x[3 * m->triangle[3 * t + k] + i];
+  PetscReal mid[9], centre[3], reach;
+  PetscReal far = 0.;
+
+  for (int i = 0; i < 3; i++)
+    centre[i] = (c[i] + c[3 + i] + c[6 + i]) / 3.;
+  for (int k = 0; k < 3; k++)
+    far = PetscMax(far, SbDistance2(centre, c + 3 * k));
+  reach = probe(d, part, centre) + PetscSqrtReal(far);
+  if (!level || reach <= DEEPER * d->depth)
+    return;
+  for (int k = 0; k < 9; k++)
+    mid[k] = 0.5 * (c[k] + c[(k + 3) % 9]);
+  probe_triangle(d, part, mid, level - 1);
+  for (int k = 0; k < 3; k++) {
+    PetscReal corner[9];
+
+    for (int i = 0; i < 3; i++) {
+      corner[i] = c[3 * k + i];
+      corner[3 + i] = mid[3 * k + i];
+      corner[6 + i] = mid[3 * ((k + 2) % 3) + i];
+    }
+    probe_triangle(d, part, corner, level - 1);
   }
-  return SbNormalise(way);
 }
 
-/* Winding number of the surface of `part` about p. */
-static PetscReal winding_about(SbContactSurface m, const PetscReal x[], PetscInt part,
-                               const PetscReal p[3])
-{
-  PetscReal sum = 0.;
+/* Surfaces near an overlap: list[n][2], triangles and the parts that they may be in. */
+typedef struct {
+  PetscInt n, size, *list;
+  PetscInt *start, *triangle; /* [nvertex+1], triangles of each vertex */
+} Inner;
 
-  for (PetscInt t = 0; t < m->ntriangle; t++)
-    if (m->part[m->triangle[3 * t]] == part)
-      sum += SbTriangleSolidAngle(x, m->triangle + 3 * t, p) / (4. * PETSC_PI);
-  return PetscAbsReal(sum);
+/* Adds the triangles around vertex v, if v2 >= 0 those with both. */
+static PetscErrorCode add_inner(SbContactSurface m, PetscInt v, PetscInt v2, PetscInt part,
+                                Inner *inner)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(inner->n + 2 * (inner->start[v + 1] - inner->start[v]), sizeof(*inner->list),
+                      &inner->size, &inner->list));
+  for (PetscInt j = inner->start[v]; j < inner->start[v + 1]; j++) {
+    const PetscInt *w = m->triangle + 3 * inner->triangle[j];
+
+    if (v2 >= 0 && w[0] != v2 && w[1] != v2 && w[2] != v2)
+      continue;
+    inner->list[inner->n++] = inner->triangle[j];
+    inner->list[inner->n++] = part;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether p, which may be inside `part`, is so by less than o->touch, or not at all; near: it is
-   that close to the surface. Raises o->farthest. */
-static PetscBool is_near(SbContactSurface m, const PetscReal x[], const SbBoxTree *tree,
-                         PetscInt part, const PetscReal p[3], PetscBool *near, SbContactOverlap *o)
+/* Where edges that go through triangles, hit[n][2], show surfaces that are in each other: middles
+   of edges that leave again are probed; ends inside, and vertices joined to them by edges that
+   intersect nothing, give the triangles around them. y: positions at which hit[] was found. self: a
+   surface intersects itself. */
+static PetscErrorCode find_inner(const PetscReal y[], PetscInt n, const PetscInt hit[], Deepest *d,
+                                 Inner *inner, PetscBool *self)
 {
-  PetscReal best[3], way[3];
-  const PetscInt t = find_closest(m, x, tree, part, p, o->touch, best);
-
-  const PetscReal d = t >= 0 ? towards(m, x, t, best, p, way) : PETSC_MAX_REAL;
-  PetscBool inside;
-
-  /* rounding may lead to vertices outside: only some need to be looked at */
-  *near = (PetscBool)(t >= 0);
-  if (d <= o->farthest)
-    return PETSC_TRUE;
-  inside = (PetscBool)(winding_about(m, x, part, p) > 0.5);
-  if (*near && inside)
-    o->farthest = d;
-  return (PetscBool)(*near || !inside);
-}
-
-/* o->touches: nothing is inside another part by o->touch or more, by the intersections hit[n][2] of
-   edges and triangles. */
-static PetscErrorCode find_touching(SbContactSurface m, const PetscReal x[], PetscInt n,
-                                    const PetscInt hit[], SbContactOverlap *o)
-{
+  const SbContactSurface m = d->m;
   PetscInt nlist = 0;
   PetscInt *list, *in, *start, *edge;
   uint8_t *through;
-  SbBoxTree tree;
 
   PetscFunctionBeginUser;
+  *self = PETSC_FALSE;
   PetscCall(PetscCalloc3(m->nvertex, &list, m->nvertex, &in, m->nedge, &through));
-  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
   PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &start, &edge));
-  o->touches = PETSC_TRUE;
   for (PetscInt v = 0; v < m->nvertex; v++)
     in[v] = -1;
   for (PetscInt i = 0; i < n; i++)
     through[hit[2 * i]] = 1;
-
-  /* the inner part of each edge: to its inner end, or to where it leaves again */
-  for (PetscInt i = 0; i < n && o->touches; i++) {
+  for (PetscInt i = 0; i < n; i++) {
     const PetscInt *ends = m->edge + 2 * hit[2 * i];
-    const PetscInt part = m->part[m->triangle[3 * hit[2 * i + 1]]];
+    const PetscInt *corner = m->triangle + 3 * hit[2 * i + 1];
+    const PetscInt part[2] = {m->part[ends[0]], m->part[corner[0]]};
     PetscReal normal[3], first, unused, p[3];
-    PetscReal s = pierce(m, x, hit[2 * i], hit[2 * i + 1], normal, &first);
-    PetscInt other = i;
-    PetscBool near;
+    const PetscReal s = pierce(m, y, hit[2 * i], hit[2 * i + 1], normal, &first);
+    const PetscInt v = ends[first < 0. ? 0 : 1];
+    PetscInt j = i + 1;
 
-    o->touching[part] |= SB_TOUCH_ONCE;
-    o->touching[m->part[ends[0]]] |= SB_TOUCH_ONCE;
-    for (PetscInt k = i - 1; k >= 0 && hit[2 * k] == hit[2 * i]; k--)
-      other = m->part[m->triangle[3 * hit[2 * k + 1]]] == part ? k : other;
-    for (PetscInt k = i + 1; other == i && k < n && hit[2 * k] == hit[2 * i]; k++)
-      other = m->part[m->triangle[3 * hit[2 * k + 1]]] == part ? k : other;
-    if (other != i)
-      s = 0.5 * (s + pierce(m, x, hit[2 * i], hit[2 * other + 1], normal, &unused));
-    else
-      s = first < 0. ? 0. : 1.;
-    for (int k = 0; k < 3; k++)
-      p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k];
-    o->touches = (PetscBool)(m->part[ends[0]] != part && is_near(m, x, &tree, part, p, &near, o));
-    if (other != i || in[ends[first < 0. ? 0 : 1]] >= 0)
+    if (part[0] == part[1]) {
+      *self = PETSC_TRUE;
       continue;
-    in[ends[first < 0. ? 0 : 1]] = part;
-    list[nlist++] = ends[first < 0. ? 0 : 1];
+    }
+    PetscCall(add_inner(m, ends[0], ends[1], part[1], inner));
+    PetscCall(add_inner(m, corner[0], corner[1], part[0], inner));
+    for (; j < n && hit[2 * j] == hit[2 * i]; j++) {
+      const PetscReal at = 0.5 * (s + pierce(m, y, hit[2 * i], hit[2 * j + 1], normal, &unused));
+
+      for (int k = 0; k < 3; k++)
+        p[k] = (1. - at) * d->x[3 * ends[0] + k] + at * d->x[3 * ends[1] + k];
+      (void)probe(d, part, p);
+    }
+    if (in[v] >= 0)
+      continue;
+    in[v] = part[1];
+    list[nlist++] = v;
   }
-
-  /* vertices joined to one inside by edges that intersect nothing */
-  for (PetscInt k = 0; k < nlist && o->touches; k++) {
+  for (PetscInt k = 0; k < nlist; k++) {
     const PetscInt v = list[k];
-    PetscBool near;
 
-    o->touches = is_near(m, x, &tree, in[v], x + 3 * v, &near, o);
-    for (PetscInt j = start[v]; near && j < start[v + 1]; j++) {
+    PetscCall(add_inner(m, v, -1, in[v], inner));
+    for (PetscInt j = start[v]; j < start[v + 1]; j++) {
       const PetscInt *e = m->edge + 2 * (edge[j] / 2);
       const PetscInt to = e[0] == v ? e[1] : e[0];
 
@@ -717,50 +1031,168 @@ static PetscErrorCode find_touching(SbContactSurface m, const PetscReal x[], Pet
       list[nlist++] = to;
     }
   }
-  PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(edge));
   PetscCall(PetscFree3(list, in, through));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same of the whole surface, on every rank. */
+/* o->farthest of surfaces of different parts, and where; o->touches: it is less than o->touch. */
+static PetscErrorCode find_depth(SbContactSurface m, const PetscReal x[], const PetscReal y[],
+                                 PetscInt n, const PetscInt hit[], SbContactOverlap *o)
+{
+  Deepest d = {.m = m, .x = x, .part = {-1, -1}};
+  Inner inner = {0};
+  PetscBool self;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &d.tree));
+  PetscCall(
+    SbBucketByKey(3 * m->ntriangle, m->triangle, m->nvertex, &inner.start, &inner.triangle));
+  for (PetscInt k = 0; k < 3 * m->ntriangle; k++)
+    inner.triangle[k] /= 3;
+  PetscCall(find_inner(y, n, hit, &d, &inner, &self));
+  inner.n /= 2;
+  PetscCall(SbSortByKeys(inner.n, 2 * sizeof(*inner.list), 2, inner.list));
+
+  /* corners first: what is deep tells which triangles need no closer look */
+  for (int level = -1; level <= LEVELS; level += LEVELS + 1) {
+    for (PetscInt i = 0; i < inner.n; i++) {
+      const PetscInt *v = m->triangle + 3 * inner.list[2 * i];
+      const PetscInt part[2] = {m->part[v[0]], inner.list[2 * i + 1]};
+      PetscReal c[9];
+
+      if (part[0] == part[1] || (i && inner.list[2 * i] == inner.list[2 * i - 2] &&
+                                 inner.list[2 * i + 1] == inner.list[2 * i - 1]))
+        continue;
+      for (int k = 0; k < 9; k++)
+        c[k] = x[3 * v[k / 3] + k % 3];
+      for (int k = 0; k < 3 && level < 0; k++)
+        (void)probe(&d, part, c + 3 * k);
+      if (level >= 0)
+        probe_triangle(&d, part, c, level);
+    }
+  }
+  o->farthest = d.depth;
+  if (d.part[0] >= 0) {
+    PetscCall(PetscArraycpy(o->part, d.part, 2));
+    PetscCall(PetscArraycpy(o->place, d.place, 3));
+  }
+  o->touches = (PetscBool)(!self && o->farthest < o->touch);
+  for (PetscInt i = 0; i < n && o->touches; i++) {
+    o->touching[m->part[m->edge[2 * hit[2 * i]]]] |= SB_TOUCH_ONCE;
+    o->touching[m->part[m->triangle[3 * hit[2 * i + 1]]]] |= SB_TOUCH_ONCE;
+  }
+  PetscCall(SbBoxTreeDestroy(&d.tree));
+  PetscCall(PetscFree(inner.start));
+  PetscCall(PetscFree(inner.triangle));
+  PetscCall(PetscFree(inner.list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves (A + e I) u = b, e a small part of the trace of the symmetric A. */
+static void solve_nearly(const PetscReal A[9], const PetscReal b[3], PetscReal u[3])
+{
+  PetscReal B[9], C[9];
+  PetscReal det;
+
+  for (int k = 0; k < 9; k++)
+    B[k] = A[k] + (k % 4 ? 0. : FLAT * (A[0] + A[4] + A[8]));
+  SbMatCofactor(B, C);
+  det = SbDot3(B, C);
+  for (int i = 0; i < 3; i++)
+    u[i] = det > 0. ? SbDot3(C + 3 * i, b) / det : 0.;
+}
+
+/*
+  y[nvertex][3] of SbContactSurfaceCreateArray(): x with all planes of a part's surface moved
+  inwards by the same distance, up to JITTER of the size, and vertices by a little more at random,
+  the same in every run. Distances of two parts differ, so that faces in a common plane are so no
+  longer: the sides of one part are wholly within those of the other, and only what really overlaps
+  intersects. Collective.
+*/
+static PetscErrorCode draw_in(SbContactSurface m, const PetscReal x[], PetscReal y[])
+{
+  const PetscReal unit = JITTER * m->size / (PetscReal)(m->space->mesh->nbody + 1);
+  PetscReal *sum; /* [nvertex][12] of n n^T and n of the triangles around */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(12 * m->nvertex, &sum));
+  for (PetscInt t = 0; t < m->ntriangle; t++) {
+    PetscReal n[3];
+
+    (void)SbContactTriangleArea(x, m->triangle + 3 * t, n);
+    if (SbNormalise(n) <= 0.)
+      continue;
+    for (int k = 0; k < 3; k++) {
+      PetscReal *to = sum + 12 * m->triangle[3 * t + k];
+
+      for (int i = 0; i < 9; i++)
+        to[i] += n[i / 3] * n[i % 3];
+      for (int i = 0; i < 3; i++)
+        to[9 + i] += n[i];
+    }
+  }
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    PetscReal way[3], length;
+
+    solve_nearly(sum + 12 * v, sum + 12 * v + 9, way);
+    length = PetscSqrtReal(SbDot3(way, way));
+    for (int i = 0; i < 3; i++) {
+      uint32_t h = (uint32_t)(3 * SbContactNumber(m, v) + i + 1) * 2654435761u;
+
+      h = (h ^ (h >> 15)) * 2246822519u;
+      h = (h ^ (h >> 13)) * 3266489917u;
+      y[3 * v + i] = x[3 * v + i] -
+                     unit * (PetscReal)(m->part[v] + 1) * way[i] / PetscMax(1., length / SPIKE) +
+                     RANDOM * unit * (2. * ((PetscReal)(h ^ (h >> 16)) / 4294967296.) - 1.);
+    }
+  }
+  PetscCall(PetscFree(sum));
+  PetscCall(SbContactSurfaceUpdate(m, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Penetrations of the whole surface, on every rank. */
 static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                    SbContactOverlap *o)
 {
-  PetscInt n, *hit;
+  PetscInt n, nmoved, *hit, *other;
+  PetscReal *moved = NULL;
+  const PetscReal *at = x; /* positions of what is taken */
 
   PetscFunctionBeginUser;
   PetscCall(find_crossings(m, x, &n, &hit));
 
-  if (n && o->touch > 0. && !inside)
-    PetscCall(find_touching(m, x, n, hit, o));
-
-  /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every
-     run */
-  if ((n || inside) && !o->touches) {
-    PetscInt nmoved, *other;
-    PetscReal *moved;
-
+  /* vertices exactly on a surface are on neither side, nor are faces in a common plane */
+  if (n || inside || o->coplanar) {
     PetscCall(PetscMalloc1(3 * m->nvertex, &moved));
-    for (PetscInt k = 0; k < 3 * m->nvertex; k++) {
-      uint32_t h = (uint32_t)(k + 1) * 2654435761u;
-
-      h = (h ^ (h >> 15)) * 2246822519u;
-      h = (h ^ (h >> 13)) * 3266489917u;
-      moved[k] = x[k] + JITTER * m->size * (2. * ((PetscReal)(h ^ (h >> 16)) / 4294967296.) - 1.);
-    }
+    PetscCall(draw_in(m, x, moved));
     PetscCall(find_crossings(m, moved, &nmoved, &other));
     if (nmoved) {
       PetscCall(PetscFree(hit));
       n = nmoved;
       hit = other;
+      at = moved;
     } else
       PetscCall(PetscFree(other));
-    if (n)
-      PetscCall(find_inside(m, nmoved ? moved : x, n, hit, o));
-    PetscCall(PetscFree(moved));
   }
+  if (n) {
+    o->part[0] = m->part[m->edge[2 * hit[0]]];
+    o->part[1] = m->part[m->triangle[3 * hit[1]]];
+    PetscCall(PetscArraycpy(o->place, x + 3 * m->edge[2 * hit[0]], 3));
+    if (o->touch > 0.)
+      PetscCall(find_depth(m, x, at, n, hit, o));
+    if (!o->touches || inside) {
+      o->touches = PETSC_FALSE;
+      PetscCall(find_inside(m, at, n, hit, o));
+    }
+    for (PetscInt i = 0; i < n && !o->touches; i++) {
+      o->touching[m->part[m->edge[2 * hit[2 * i]]]] |= SB_TOUCH_OVERLAP;
+      o->touching[m->part[m->triangle[3 * hit[2 * i + 1]]]] |= SB_TOUCH_OVERLAP;
+    }
+  }
+  PetscCall(PetscFree(moved));
   PetscCall(find_behind(m, x, o));
   if (o->touch > 0. && !inside && o->n && !n) {
     o->touches = PETSC_TRUE;
@@ -777,13 +1209,10 @@ static PetscErrorCode find_overlap(SbContactSurface m, const PetscReal x[], Pets
   if (o->touches)
     o->n = 0;
 
-  /* the first intersection, and the largest depth */
-  if (o->ncrossing) {
-    const PetscInt v = n ? m->edge[2 * hit[0]] : o->point[0].v[0];
-
-    o->part[0] = m->part[v];
-    o->part[1] = n ? m->part[m->triangle[3 * hit[1]]] : m->space->mesh->nbody;
-    PetscCall(PetscArraycpy(o->place, x + 3 * v, 3));
+  if (o->ncrossing && !n) {
+    o->part[0] = m->part[o->point[0].v[0]];
+    o->part[1] = m->space->mesh->nbody;
+    PetscCall(PetscArraycpy(o->place, x + 3 * o->point[0].v[0], 3));
   }
   PetscCall(PetscFree(hit));
   o->npoint = o->n;
@@ -881,6 +1310,8 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
     PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
   }
   PetscCall(PetscArrayzero(o->near, N));
+  for (PetscInt k = 0; k <= m->space->mesh->nbody; k++)
+    o->touching[k] &= ~SB_TOUCH_OVERLAP;
   if (!m->sf) {
     PetscCall(find_overlap(m, x, inside, o));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -888,6 +1319,14 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
   PetscCall(SbContactSurfaceReach(m, 0., x, x));
   x = m->halo ? *follow : x;
   PetscCall(is_crossed(m, x, o, &found));
+  if (!found && o->coplanar) {
+    PetscReal *moved;
+
+    PetscCall(PetscMalloc1(3 * m->nvertex, &moved));
+    PetscCall(draw_in(m, x, moved));
+    PetscCall(is_crossed(m, moved, o, &found));
+    PetscCall(PetscFree(moved));
+  }
   o->n = 0;
   PetscCall(PetscArrayzero(o->near, N));
   if (!found && !inside)
@@ -906,6 +1345,7 @@ PetscErrorCode SbContactOverlapFree(SbContactOverlap *o)
   PetscCall(PetscFree(o->point));
   PetscCall(PetscFree(o->near));
   PetscCall(PetscFree(o->touching));
+  PetscCall(PetscFree(o->way));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

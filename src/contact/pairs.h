@@ -240,28 +240,42 @@ enum {
   SB_OVERLAP_INSIDE
 };
 /* Of a part: its surface touched another one face to face when the run began; it does now; some
-   vertex and triangle do. */
+   vertex and triangle do; it overlaps another part; it did, and is not yet apart by the width. */
 enum {
   SB_TOUCH_ONCE = 1,
   SB_TOUCH_NOW = 2,
-  SB_TOUCH_VERTICES = 4
+  SB_TOUCH_VERTICES = 4,
+  SB_TOUCH_OVERLAP = 8,
+  SB_TOUCH_PARTED = 16
 };
+/* The direction in which two parts separate as a whole, the lower one along n; 0: none. */
+typedef struct {
+  PetscInt part[2];
+  PetscReal n[3];
+} SbOverlapWay;
 /* Start with {0}; release with SbContactOverlapFree(). The same on every rank but for
    the points, of which a rank has those with nodes of it. */
 typedef struct {
   PetscInt
     ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
-  PetscInt part[2];            /* of the first of them: body, or nbody for the obstacle */
-  PetscReal place[3], deepest; /* position of it; largest penetration, m */
+  PetscBool coplanar; /* set by the caller: also overlaps whose sides lie in common planes, which
+                         hide that an edge goes through a triangle */
+  PetscInt part[2];   /* of the first of them, or of the largest depth: body, or nbody for the
+                       obstacle */
+  PetscReal place[3], deepest; /* position of it; largest depth of a point along its direction, m */
   PetscInt npoint, n, size;    /* of all ranks, of this one */
   SbPenetration *point;        /* [n] with a separation direction */
   uint8_t *near; /* by number, of all ranks: SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
+
+  PetscInt nway, way_size; /* directions of the last search, which the next one prefers */
+  SbOverlapWay *way;
 
   /* Surfaces of different parts that are in each other by less than the distance `touch`, m, which
      the caller sets (0: none are), only touch: they get no points. */
   PetscReal touch;
   PetscBool touches;  /* there are intersections, and all of them are of such surfaces */
-  PetscReal farthest; /* if so: largest distance of what is inside from the surface, m */
+  PetscReal farthest; /* with `touch`: largest depth of parts in each other, m: their surfaces'
+                         distance, by less than which no motion separates them */
   uint8_t *touching;  /* [nbody+1] SB_TOUCH_... of the part, kept from search to search */
 } SbContactOverlap;
 /* Penetration at x, which may move (SbContactSurfaceReach()); `inside`: there is some, even if no

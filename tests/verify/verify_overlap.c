@@ -12,7 +12,9 @@
 
 #define DEPTH 0.05
 #define STEP 0.004
-#define STEPS 30 /* of separation */
+#define STEPS 30    /* of separation */
+#define PAIRS 192   /* of convex bodies */
+#define SHALLOW 0.5 /* least depth that is reported over the true one: edges that cross */
 #define MEET "-effects meet -effect_meet_type contact -effect_meet_verify yes "
 #define STEPPING "-time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-9 "
 #define SOFT(b, mesh) VERIFY_BODY(b, mesh, "corotated", "1e5", "0.3")
@@ -209,6 +211,215 @@ static PetscErrorCode check_touch_depths(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A rotation by random angles, R[9] row by row, times a random shear and stretch of up to
+   `bend`. */
+static PetscErrorCode random_map(PetscRandom random, PetscReal bend, PetscReal R[9])
+{
+  PetscReal q[4], r[9], B[9];
+  PetscReal length = 0.;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 4; i++) {
+    PetscCall(PetscRandomGetValueReal(random, &q[i]));
+    q[i] = 2. * q[i] - 1.;
+    length += q[i] * q[i];
+  }
+  for (int i = 0; i < 4; i++)
+    q[i] /= PetscSqrtReal(length);
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      const int k = 3 - i - j;
+
+      r[3 * i + j] = i == j ? 1. - 2. * (SbDot3(q, q) - q[i] * q[i])
+                            : 2. * q[i] * q[j] + ((j - i + 3) % 3 == 1 ? -2. : 2.) * q[k] * q[3];
+    }
+  }
+  for (int i = 0; i < 9; i++) {
+    PetscReal value;
+
+    PetscCall(PetscRandomGetValueReal(random, &value));
+    B[i] = (i % 4 ? 0. : 1.) + bend * (2. * value - 1.);
+  }
+  for (int i = 0; i < 9; i++)
+    R[i] =
+      r[i / 3 * 3] * B[i % 3] + r[i / 3 * 3 + 1] * B[3 + i % 3] + r[i / 3 * 3 + 2] * B[6 + i % 3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A pair of convex bodies: boxes, spheres of facets or parallelepipeds about the origin, the second
+   one moved by `way`. */
+typedef struct {
+  PetscBool round[2];
+  PetscReal R[2][9], way[3];
+} Convex;
+
+static void place_convex(const Convex *c, int part, const PetscReal X[3], PetscReal x[3])
+{
+  PetscReal p[3] = {X[0] - 0.05, X[1] - 0.05, X[2] - 0.05};
+
+  if (c->round[part]) {
+    const PetscReal most =
+      PetscMax(PetscAbsReal(p[0]), PetscMax(PetscAbsReal(p[1]), PetscAbsReal(p[2])));
+    const PetscReal length = PetscSqrtReal(SbDot3(p, p));
+
+    for (int i = 0; i < 3; i++)
+      p[i] *= most / length;
+  }
+  for (int i = 0; i < 3; i++)
+    x[i] = SbDot3(c->R[part] + 3 * i, p) + (part ? c->way[i] : 0.);
+}
+
+/* By how far both overlap along n, m. */
+static PetscReal overlap_along(SbContactSurface m, const PetscReal x[], const PetscReal n[3])
+{
+  PetscReal high = PETSC_MIN_REAL;
+  PetscReal low = PETSC_MAX_REAL;
+
+  for (PetscInt v = 0; v < m->nvertex; v++)
+    if (m->part[v])
+      low = PetscMin(low, SbDot3(n, x + 3 * v));
+    else
+      high = PetscMax(high, SbDot3(n, x + 3 * v));
+  return high - low;
+}
+
+/* The shortest motion that separates two convex bodies, by all directions in which it may be: the
+   normals of all triangles, and those of all pairs of edges. */
+static PetscReal brute_depth(SbContactSurface m, const PetscReal x[])
+{
+  PetscReal least = PETSC_MAX_REAL;
+  PetscReal n[3], a[3], b[3];
+
+  for (PetscInt t = 0; t < m->ntriangle; t++) {
+    const PetscReal sign = m->part[m->triangle[3 * t]] ? -1. : 1.;
+
+    (void)SbContactTriangleArea(x, m->triangle + 3 * t, n);
+    (void)SbNormalise(n);
+    for (int i = 0; i < 3; i++)
+      n[i] *= sign;
+    least = PetscMin(least, overlap_along(m, x, n));
+  }
+  for (PetscInt e = 0; e < m->nedge; e++) {
+    for (PetscInt f = 0; f < m->nedge; f++) {
+      PetscReal length;
+
+      if (m->part[m->edge[2 * e]] || !m->part[m->edge[2 * f]])
+        continue;
+      SbSubtract(x + 3 * m->edge[2 * e], x + 3 * m->edge[2 * e + 1], a);
+      SbSubtract(x + 3 * m->edge[2 * f], x + 3 * m->edge[2 * f + 1], b);
+      SbCross(a, b, n);
+      length = SbDot3(n, n);
+      if (length <= 1e-6 * SbDot3(a, a) * SbDot3(b, b))
+        continue;
+      (void)SbNormalise(n);
+      least = PetscMin(least, overlap_along(m, x, n));
+      for (int i = 0; i < 3; i++)
+        n[i] = -n[i];
+      least = PetscMin(least, overlap_along(m, x, n));
+    }
+  }
+  return least;
+}
+
+/* The depth that is reported of random pairs of convex bodies, from 3e-13 m to a third of their
+   size: never more than the shortest motion that separates them, and not much less. */
+static PetscErrorCode check_depths(void)
+{
+  SbContactOverlap o = {0};
+  PetscReal *x, *y;
+  PetscRandom random;
+  SbContactSurface m, whole;
+  SbFacet *facet;
+  PetscInt nfacet, set;
+  PetscReal least = 1.;
+  PetscReal most = 0.;
+  PetscInt nfound = 0;
+  PetscInt ndeep = 0;
+  SbSpace s;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  verify_case("depth of convex bodies");
+  PetscCall(test_open(&t, "-bodies a,b " MEET "-ts_dt 1e-3" SOFT("a", "box:0.1,0.1,0.1:2")
+                            SOFT("b", "box:0.1,0.1,0.1:1")));
+  s = t.run->model->space;
+  PetscCall(SbSpaceFindSet(s, "boundary", "the test", &set));
+  PetscCall(SbSpaceGetSetFacets(s, set, &nfacet, &facet));
+  PetscCall(SbContactSurfaceCreate(s, nfacet, facet, NULL, &m));
+  PetscCall(SbContactSurfaceCreateArray(m, &x));
+  whole = m;
+  if (m->sf)
+    PetscCall(SbContactSurfaceGather(m, x, &whole, &y));
+  else
+    PetscCall(PetscMalloc1(3 * m->nvertex, &y));
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
+  PetscCall(PetscRandomSetSeed(random, 11));
+  PetscCall(PetscRandomSeed(random));
+  o.touch = PETSC_MACHINE_EPSILON * PETSC_MACHINE_EPSILON;
+  o.coplanar = PETSC_TRUE;
+  for (int k = 0; k < PAIRS; k++) {
+    const PetscReal depth = 0.03 * PetscPowReal(10., -(PetscReal)(k % 12));
+    const int kind = k / 12 % 4; /* aligned boxes, boxes, parallelepipeds, spheres */
+    PetscReal low = 0.;
+    PetscReal high = 0.4;
+    PetscReal u[3] = {1., 0., 0.};
+    PetscReal truth;
+    Convex c = {.round = {kind == 3, kind == 3}};
+
+    for (int part = 0; part < 2; part++)
+      PetscCall(random_map(random, kind == 2 ? 0.2 : 0., c.R[part]));
+    for (int i = 0; i < 3 && kind; i++) {
+      PetscCall(PetscRandomGetValueReal(random, &u[i]));
+      u[i] = 2. * u[i] - 1.;
+    }
+    (void)SbNormalise(u);
+    for (int i = 0; i < 18 && !kind; i++)
+      c.R[i / 9][i % 9] = i % 9 % 4 ? 0. : 1.;
+
+    /* halves the motion along u at which they overlap by the depth */
+    for (int step = 0; step < 60; step++) {
+      const PetscReal at = step ? 0.5 * (low + high) : high;
+
+      for (int i = 0; i < 3; i++)
+        c.way[i] = at * u[i] + (kind || !i || k % 24 < 12 ? 0. : 0.03);
+      for (PetscInt v = 0; v < whole->nvertex; v++)
+        place_convex(&c, (int)whole->part[v], whole->X + 3 * v, y + 3 * v);
+      truth = brute_depth(whole, y);
+      if (PetscAbsReal(truth - depth) < 1e-3 * depth)
+        break;
+      if (truth > depth)
+        low = at;
+      else
+        high = at;
+    }
+    for (PetscInt v = 0; v < m->nvertex; v++)
+      place_convex(&c, (int)m->part[v], m->X + 3 * v, x + 3 * v);
+    PetscCall(SbContactOverlapFind(m, x, PETSC_FALSE, &o));
+    ndeep += truth > 1e-6;
+    nfound += truth > 1e-6 && o.ncrossing;
+    SB_CHECK(o.farthest <= (1. + 1e-6) * truth + 1e-16, "kind %d, %g m deep: %g m are reported",
+             kind, (double)truth, (double)o.farthest);
+    if (!o.ncrossing || truth < 1e-14)
+      continue;
+    SB_CHECK(o.farthest >= SHALLOW * truth - 1e-16, "kind %d, %g m deep: only %g m are reported",
+             kind, (double)truth, (double)o.farthest);
+    least = PetscMin(least, o.farthest / truth);
+    most = PetscMax(most, o.farthest / truth);
+  }
+  VERIFY_NEAR(nfound, ndeep, 0, "overlaps of more than 1e-6 m that are found");
+  VERIFY_MORE(least, SHALLOW, "least depth over the true one");
+  VERIFY_LESS(most, 1.001, "largest depth over the true one");
+  PetscCall(PetscRandomDestroy(&random));
+  PetscCall(SbContactOverlapFree(&o));
+  PetscCall(PetscFree(y));
+  PetscCall(PetscFree(facet));
+  if (whole != m)
+    PetscCall(SbContactSurfaceDestroy(&whole));
+  PetscCall(SbContactSurfaceDestroy(&m));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A cube on another one, in it or above it by less than the width of the barrier, as parts from
    files are: both are moved apart by that width at most, and stay there. */
 static PetscErrorCode check_touching(const char *response, PetscReal depth, const char *turn)
@@ -250,6 +461,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_touch_depths());
+  PetscCall(check_depths());
   for (int k = 0; k < 5; k++) {
     static const char *const responses[] = {"barrier", "projected", "multiplier", "augmented",
                                             "penalty"};
