@@ -54,8 +54,11 @@ typedef struct {
   PetscErrorCode (*initial_contacts)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
                                      const PetscReal u[], PetscBool *first,
                                      SbInitialContacts *list);
+  /* then, where surfaces touch that could not be moved apart rigidly: moves their vertices, u is
+     changed, ghosts too; moved: it was, alike on all ranks */
+  PetscErrorCode (*part)(SbContact c, SbSpace space, PetscReal t, PetscReal u[], PetscBool *moved);
   /* an attempt at a step from t to t + dt begins with u0 and the speed of SbContactSetBeginStep(),
-     m/s; where surfaces touch when the run begins, u0 is changed, ghosts too */
+     m/s */
   PetscErrorCode (*begin_step)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
                                PetscReal speed, PetscReal u0[]);
   /* * with restitution, after begin_step() of all contacts: finds the impacts of the step from u0
@@ -136,6 +139,8 @@ struct _p_SbContact {
   PetscReal progress;      /* of a potential: obstacles are at this fraction of their path */
   PetscReal width;         /* the smallest gap below which surfaces repel, m */
   PetscReal work;          /* on the bodies in the last accepted step, this rank's, J */
+  PetscReal given;         /* strain energy given by moving vertices apart when the run began, J:
+                              SbContactSetGive(); on rank 0, part of the work */
   char unsettled[512];     /* why the solution of this step is none, in words; "": it is one */
 };
 
@@ -178,12 +183,17 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 
   Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
               moved apart rigidly, as far as potentials ask for it.
+  Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved
+              apart; moved: some were. Give - by that the bodies got this energy, J.
   Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
   BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
-              unchanged until the step ends, but for U0 when the run begins with surfaces that still
-              touch. speed: SbModelStepSpeed(), the scale of tolerances, m/s.
+              unchanged until the step ends. speed: SbModelStepSpeed(), the scale of tolerances,
+              m/s.
 */
 PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U);
+PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
+                                PetscBool *moved);
+void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy);
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts);
 PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
                                      PetscReal speed, Vec U0, Vec V0);

@@ -1,6 +1,6 @@
 /*
   initial_contacts.c - bodies that touch when a run begins are moved apart rigidly, before the first
-  step.
+  step; those that cannot, by the vertices of their surfaces.
 */
 #include "contact_impl.h"
 
@@ -120,7 +120,7 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
 }
 
 /* Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is
-   inactive. Effects move the vertices of remaining contacts. */
+   inactive. */
 PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U)
 {
   const SbSpace s = contacts->space;
@@ -164,4 +164,25 @@ PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, Pets
   PetscCall(PetscFree2(fixed, way));
   PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
+                                PetscBool *moved)
+{
+  const SbSpace s = contacts->space;
+  PetscReal *u;
+
+  PetscFunctionBeginUser;
+  *moved = PETSC_FALSE;
+  PetscCall(SbSpaceGetLocalWrite(s, U, &u));
+  PetscCall(SbSpaceUpdateGhosts(s, u));
+  PHASE_CALL(contacts->potential[k], part, s, t, u, moved);
+  PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy)
+{
+  contacts->potential[k]->work = contacts->potential[k]->given =
+    contacts->space->rank ? 0. : energy;
 }

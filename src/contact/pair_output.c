@@ -98,6 +98,8 @@ PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *st
   PetscFunctionBeginUser;
   (void)r;
   PetscCall(PetscArrayzero(values, e->ncolumn));
+  if (!b->contact.partner.obstacle)
+    values[5] = b->sums.work + b->contact.base.given;
   if (!b->motion.begun)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSurfacesUpdate(b, stage->u));
@@ -151,8 +153,6 @@ PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *st
     for (int k = 0; k < 3 && one != two; k++)
       columns[k] += one > two ? force[k] : -force[k];
   }
-  if (!b->contact.partner.obstacle)
-    values[5] = b->sums.work;
   values[at[LOSS]] = b->friction.loss;
   if (s->rank)
     PetscFunctionReturn(PETSC_SUCCESS);

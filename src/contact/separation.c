@@ -10,14 +10,21 @@
 
   Overlap. Each penetrating point (overlap.c) is moved out by a part of its depth in
   each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width of the
-  barrier at least, and in a static run at once. Springs that reach less than half of that get
-  stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is
-  none left.
+  barrier at least, the last time to a gap of that width, and in a static run at once. Springs that
+  reach less than half of that get stiffer. Pairs of the overlap are excluded from barrier and
+  collision detection until they are apart by the width; springs keep what is outside there
+  meanwhile, and open what intersects no longer: at small gaps the barrier has many times the energy
+  of the deformation.
 */
 #include "surfaces.h"
 
-#define STIFF 10. /* static run: stiffness over that of the barrier */
-#define SAME 1e-5 /* of the bodies' size: positions this close coincide */
+#define STIFF 10.  /* static run: stiffness over that of the barrier */
+#define HELD 5.    /* of the width: gap within which what is outside is kept there */
+#define LEVER 0.25 /* least sum of squared weights of vertices that are not prescribed */
+#define FRONT 0.7  /* cosine of a gap and the direction of separation that opens it */
+#define OPENED 0.9 /* of the width: a gap at which what overlapped is apart */
+#define OPENING 30 /* most steps for that: bodies pressed from outside may never be */
+#define SAME 1e-5  /* of the bodies' size: positions this close coincide */
 
 /* Whether two bodies coincide: then no separation direction exists. */
 static PetscErrorCode same_place(const Surfaces *b, const PetscInt body[2], PetscBool *same)
@@ -42,6 +49,132 @@ static PetscErrorCode same_place(const Surfaces *b, const PetscInt body[2], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A spring for a pair that is to be opened to the gap `to`, m, from d. */
+static PetscErrorCode add_opening(Surfaces *b, const SbContactPair *pair, const SbDistance *d,
+                                  PetscReal gap, PetscReal to)
+{
+  const PetscReal k = of_pair(b, b->widths.k, pair);
+  const PetscReal w = of_pair(b, b->widths.w, pair);
+  PetscReal lever = 0.;
+  Spring spring = {.at = {.area = pair->area, .number = b->springs.n},
+                   .stiffness = b->separation.stiffer * k * pair->area / w};
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 4; i++)
+    lever += b->surface->driven[pair->v[i]] ? 0. : PetscSqr(d->weight[i]);
+  if (lever < LEVER)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (int pass = 0; pass < 2; pass++) { /* positive weights first */
+    for (int i = 0; i < 4; i++) {
+      if (pass ? d->weight[i] >= 0. : d->weight[i] <= 0.)
+        continue;
+      spring.at.v[spring.at.n] = pair->v[i];
+      spring.at.weight[spring.at.n++] = d->weight[i];
+    }
+  }
+  for (int i = 0; i < 3; i++)
+    spring.at.normal[i] = d->n[i];
+  spring.start = SbSpringPlace(b, &spring);
+  spring.goal = spring.start + to - gap;
+  PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
+  b->springs.spring[b->springs.n++] = spring;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* While bodies overlap, what of them is outside the other one already is kept there by springs, in
+   place of the barrier that is excluded: it would fall back. That are pairs whose gap opens along
+   the direction of separation. Collective. */
+static PetscErrorCode hold_parted(Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  const SbContactOverlap *o = &b->separation.overlap;
+  const uint8_t *near = b->pairs->near;
+
+  PetscFunctionBeginUser;
+  b->pairs->near = NULL;
+  b->pairs->known = PETSC_FALSE;
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  b->pairs->near = near;
+  b->pairs->known = PETSC_FALSE;
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    const PetscReal w = of_pair(b, b->widths.w, pair);
+    PetscReal along, gap;
+    SbDistance d;
+    PetscInt k = 0;
+
+    if (one == two || pair->side || SbContactPairRadius(m, pair) > 0.)
+      continue;
+    while (k < o->nway &&
+           (o->way[k].part[0] != PetscMin(one, two) || o->way[k].part[1] != PetscMax(one, two)))
+      k++;
+    if (k == o->nway)
+      continue;
+    gap = SbContactPairGap(m, pair, b->motion.x, &d);
+    along = (one < two ? 1. : -1.) * SbDot3(d.n, o->way[k].n);
+    if (gap < HELD * w && along > FRONT)
+      PetscCall(add_opening(b, pair, &d, gap, w));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies that overlapped and do so no longer are opened on to the width of the barrier by springs,
+   and stay without it until then, or for OPENING steps: the barrier has much energy at small gaps.
+   Collective. */
+static PetscErrorCode open_parted(Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  SbContactOverlap *o = &b->separation.overlap;
+  const PetscInt nbody = m->space->mesh->nbody;
+  PetscInt parted = 0;
+  PetscBool open = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k <= nbody; k++)
+    parted += (o->touching[k] & SB_TOUCH_PARTED) != 0;
+  if (!parted)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  b->pairs->near = b->separation.held;
+  b->pairs->known = PETSC_FALSE;
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    const PetscReal w = of_pair(b, b->widths.w, pair);
+    PetscReal gap;
+    SbDistance d;
+
+    if (one == two || pair->side || SbContactPairRadius(m, pair) > 0. ||
+        !(o->touching[one] & o->touching[two] & SB_TOUCH_PARTED))
+      continue;
+    gap = SbContactPairGap(m, pair, b->motion.x, &d);
+    if (gap >= w)
+      continue;
+    open = (PetscBool)(open && gap >= OPENED * w);
+    for (int k = 0; k < 4; k++)
+      o->near[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
+    if (SbDot3(d.n, d.n) > 0.)
+      PetscCall(add_opening(b, pair, &d, gap, w));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &open, 1, SB_MPI_BOOL, MPI_LAND, m->space->comm));
+  if (open || ++b->separation.opening > OPENING) {
+    b->springs.n = 0;
+    for (PetscInt k = 0; k <= nbody; k++)
+      o->touching[k] &= ~SB_TOUCH_PARTED;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  b->separation.overlapping = PETSC_TRUE;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near,
+                             (PetscMPIInt)(m->nvertex - m->nbody_vertex + m->Nbody_vertex),
+                             MPI_UINT8_T, MPI_MAX, m->space->comm));
+  b->pairs->near = o->near;
+  b->pairs->known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first,
                                   PetscBool touch)
 {
@@ -50,13 +183,19 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   SbContactOverlap *o = &b->separation.overlap;
   PetscBool inside = PETSC_FALSE;
   PetscBool same = PETSC_FALSE;
+  const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
   PetscInt body[2] = {0, 0};
+  uint8_t *was; /* o->near of the overlap itself */
 
   PetscFunctionBeginUser;
   b->springs.n = 0;
   o->touch = touch && !b->separation.overlapping ? SB_TOUCH * b->contact.base.width : 0.;
   if (!b->motion.begun && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
+  o->coplanar = PETSC_TRUE;
+  for (PetscInt k = 0; k <= s->mesh->nbody && o->touching; k++)
+    if (o->touching[k] & SB_TOUCH_OVERLAP)
+      o->touching[k] |= SB_TOUCH_PARTED;
   PetscCall(SbContactOverlapFind(m, b->motion.x, inside, o));
   if (inside)
     PetscCall(same_place(b, body, &same));
@@ -67,7 +206,8 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name,
              s->mesh->body[body[0]].name);
   b->separation.overlapping = (PetscBool)(o->ncrossing > 0 && !o->touches);
-  b->separation.sunk = PetscMax(b->separation.sunk, o->farthest);
+  if (o->touches)
+    b->separation.sunk = PetscMax(b->separation.sunk, o->farthest);
 
   /* a body wholly inside the obstacle has no separation direction */
   if (first && b->contact.partner.obstacle && !o->ncrossing) {
@@ -103,25 +243,39 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   }
   if (b->pairs->near || b->separation.overlapping)
     b->pairs->known = PETSC_FALSE;
-  b->pairs->near = b->separation.overlapping ? o->near : NULL;
+  b->pairs->near = b->separation.overlapping ? o->near : b->separation.held;
   b->motion.known = PETSC_FALSE;
-  if (!b->separation.overlapping)
+  if (!b->separation.overlapping) {
+    if (e->dynamic && b->motion.begun)
+      PetscCall(open_parted(b));
     PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  b->separation.opening = 0;
 
-  /* excludes pairs of gap zero, too, as of a vertex in a triangle */
+  /* excludes pairs of gap zero, too, as of a vertex in a triangle, and those of what is intersected
+     with a surface nearer than the width, as of sides in a common plane: the barrier has much
+     energy there */
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  PetscCall(PetscMalloc1(N, &was));
+  PetscCall(PetscArraycpy(was, o->near, N));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]];
+    const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
+    PetscReal limit = SAME * m->size;
     SbDistance d;
 
-    if (SbContactPairGap(m, pair, b->motion.x, &d) > SAME * m->size)
+    for (int k = 0; k < 4 && one != two; k++)
+      if (o->touching[one] & o->touching[two] & SB_TOUCH_OVERLAP && !pair->side &&
+          was[SbContactNumber(m, pair->v[k])] >= SB_OVERLAP_INTERSECTED)
+        limit = of_pair(b, b->widths.w, pair);
+    if (SbContactPairGap(m, pair, b->motion.x, &d) > limit)
       continue;
     for (int k = 0; k < 4; k++)
       o->near[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near,
-                             (PetscMPIInt)(m->nvertex - m->nbody_vertex + m->Nbody_vertex),
-                             MPI_UINT8_T, MPI_MAX, s->comm));
+  PetscCall(PetscFree(was));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, s->comm));
   b->pairs->known = PETSC_FALSE;
 
   /* warns once, naming what overlaps */
@@ -143,7 +297,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
       "until then "
       "they may pass through each other there",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-      o->npoint, (double)o->deepest, e->name));
+      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), e->name));
   }
   b->separation.announced = PETSC_TRUE;
 
@@ -155,16 +309,29 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
     const PetscInt two = m->part[p->v[p->n - 1]];
     const PetscReal w = PetscMin(b->widths.w[one], b->widths.w[two]);
     const PetscReal k = PetscMin(b->widths.k[one], b->widths.k[two]);
-    const PetscReal all = p->depth + 0.5 * w;
+    PetscReal lever = 0.; /* of what is not prescribed */
+    const PetscReal gap = e->dynamic ? w : 0.5 * w;
+    const PetscReal all = p->depth + gap;
+    PetscReal part = PetscMax(w, all * (1. - b->contact.overlap.left));
     Spring spring = {
       .at = *p, .stiffness = b->separation.stiffer * k * p->area / w * (e->dynamic ? 1. : STIFF)};
 
     spring.start = SbSpringPlace(b, &spring);
-    spring.goal =
-      spring.start +
-      (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact.overlap.left))) : all);
+
+    /* prescribed vertices stay as they are */
+    for (PetscInt j = 0; j < p->n; j++)
+      lever += m->driven[p->v[j]] ? 0. : PetscSqr(p->weight[j]);
+    if (lever < LEVER)
+      continue;
+
+    /* the barrier would add much energy to what is parted by less than its width */
+    if (!e->dynamic || p->depth < part)
+      part = all;
+    spring.goal = spring.start + part;
     PetscCall(SbReserve(b->springs.n + 1, sizeof(spring), &b->springs.size, &b->springs.spring));
     b->springs.spring[b->springs.n++] = spring;
   }
+  if (e->dynamic)
+    PetscCall(hold_parted(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,9 +22,10 @@
   (friction_pairs.c), and reported.
 
   Initial contact. Bodies that touch when a run begins, or are in each other by less than the width,
-  are moved apart rigidly (initial_contacts.c), by the width or, in a static run, half of it; where
-  that fails, by their vertices. Bodies that intersect by more are separated by penalty springs
-  (separation.c).
+  are moved apart rigidly (initial_contacts.c), to a gap of the width or, in a static run, half of
+  it; where that fails, by their vertices. Beyond the width the barrier holds no energy: at half of
+  it, it holds many times that of the deformation, which it would throw them apart with. Bodies that
+  intersect by more are separated by penalty springs (separation.c).
 */
 #include "surfaces.h"
 
@@ -35,9 +36,12 @@
 #define SLIP_LEAST \
   1e-7 /* least sticking slip e of a time step over the size of the smallest body */
 #define SLIP_STATIC 1e-5 /* the same of a static load step */
-#define HALF 0.5         /* fraction of the prescribed separation below which springs get stiffer */
-#define STIFFEST 11.     /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
-#define APART 0.5 /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define STIFFEST_PARTING \
+  64. /* largest factor on them: they are some 30 times as stiff as a layer of cells without it */
+#define HALF 0.5     /* fraction of the prescribed separation below which springs get stiffer */
+#define STIFFEST 11. /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
+#define APART 0.5    /* initial gap over w in static runs, where a force closes it */
+#define OPEN 0.99    /* of the initial gap: a pair that is moved apart is so */
 #define WIDTH_ROUNDING 1e-6 /* of a gap that is meant to be w, over w */
 #define ON 1e-9             /* of the bodies' size: a distance below which it has no direction */
 #define ALONG 0.9  /* cosine of a distance and the normal of surfaces in each other, if it counts */
@@ -244,13 +248,10 @@ static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The gap to which a pair is opened when a run begins, m: `share` of the width, less for surfaces
-   that were in each other, so that nothing moves farther than the width. */
-static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair, PetscReal share)
+/* The gap to which a pair is opened when a run begins, m. */
+static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair)
 {
-  const PetscReal w = of_pair(b, b->widths.w, pair);
-
-  return PetscMin(share * w, how_they_touch(b, pair) ? w - b->separation.sunk : w);
+  return (b->contact.base.effect->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair);
 }
 
 static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
@@ -279,8 +280,7 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
     const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
-    SbInitialContact touch = {.body = {one, two},
-                              .to = initial_target(b, pair, e->dynamic ? 1. : APART)};
+    SbInitialContact touch = {.body = {one, two}, .to = initial_target(b, pair)};
     SbDistance d;
 
     if (one == two || !counts(b, pair))
@@ -301,24 +301,28 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u:
-   local displacements, changed. Every rank treats its own pairs; displacements of vertices are
-   summed over all. */
-static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
+/* Moves touching surfaces apart to their initial gap where bodies could not be: Jacobi iterations
+   over all closer pairs. Every rank treats its own pairs; displacements of vertices are summed over
+   all. */
+static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal u[],
+                                    PetscBool *moved)
 {
-  Surfaces *b = (Surfaces *)e->data;
+  Surfaces *b = (Surfaces *)contact;
   const SbContactSurface m = b->surface;
+  PetscReal most; /* of the displacement of a node, m: some pairs, as those beside an overlap, never
+                     open */
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
   PetscReal *begin;         /* u at the beginning */
   PetscReal far = 0.;       /* farthest that a node has moved since, m */
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
+  if (b->motion.begun || t != 0.)
+    PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
   PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
-
-  /* a node moves by the width at most: some pairs, as those beside an overlap, never open */
-  for (int pass = 0; pass < PASSES && far < b->contact.base.width; pass++) {
+  most = b->contact.base.width + b->separation.sunk;
+  for (int pass = 0; pass < PASSES && far < most; pass++) {
     PetscInt n = 0;
 
     PetscCall(SbSurfacesPlace(b, u, 0., b->motion.x));
@@ -328,16 +332,16 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     PetscCall(find_touching(b, normal));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
-      const PetscReal goal = initial_target(b, pair, APART);
+      const PetscReal goal = initial_target(b, pair);
       PetscReal gap;
-      PetscReal sum = 0.;
+      PetscReal lever = 0.;
       SbDistance d;
 
       if (!counts(b, pair))
         continue;
       if (!initial_gap(b, pair, normal, &d, &gap) && d.d >= ON * m->size)
         continue;
-      if (gap >= 0.9 * goal)
+      if (gap >= OPEN * goal)
         continue;
       if (!pair->side && d.d < ON * m->size && !facing(b, pair, normal, d.n)) {
         /* along the outward normal of the second side */
@@ -351,10 +355,11 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
       }
       for (int k = 0; k < 4; k++)
         if (!m->driven[pair->v[k]])
-          sum += PetscSqr(d.weight[k]);
-      if (sum <= 0.)
+          lever += PetscSqr(d.weight[k]);
+      if (lever <= 0.)
         continue;
-      sum = PetscMax(sum, LEVER); /* prescribed vertices hold the pair nearly all by themselves */
+      lever =
+        PetscMax(lever, LEVER); /* prescribed vertices hold the pair nearly all by themselves */
       n++;
       for (int k = 0; k < 4; k++) {
         const PetscInt v = pair->v[k];
@@ -362,7 +367,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
         if (m->driven[v] || d.weight[k] == 0.)
           continue;
         for (int j = 0; j < 3; j++)
-          push[4 * v + j] += (goal - gap) * d.weight[k] / sum * d.n[j];
+          push[4 * v + j] += (goal - gap) * d.weight[k] / lever * d.n[j];
         push[4 * v + 3]++;
       }
     }
@@ -489,6 +494,45 @@ static void stiffen(Surfaces *b, PetscReal dt)
          : 0.);
 }
 
+/* Prescribed vertices of two bodies that lie on each other, as the rims of two blocks side by side
+   on one clamped base, never open: pairs of them are excluded, as those of an overlap are. Free
+   vertices beside them stay guarded. Collective. */
+static PetscErrorCode find_held(Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
+  uint8_t *held;
+  uint8_t any = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(N, &held));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    PetscReal lever = 0.;
+    SbDistance d;
+
+    if (pair->side || SbContactPairRadius(m, pair) > 0. ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= ON * m->size)
+      continue;
+    for (int k = 0; k < 4; k++)
+      lever += m->driven[pair->v[k]] ? 0. : PetscAbsReal(d.weight[k]);
+    for (int k = 0; k < 4 && lever <= ON; k++)
+      if (d.weight[k] != 0.)
+        any = held[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_UINT8_T, MPI_MAX, m->space->comm));
+  if (any) {
+    PetscCallMPI(
+      MPI_Allreduce(MPI_IN_PLACE, held, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
+    b->separation.held = held;
+    b->pairs->near = b->pairs->near ? b->pairs->near : held;
+    b->pairs->known = b->motion.known = PETSC_FALSE;
+  } else
+    PetscCall(PetscFree(held));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
                                           PetscReal speed, PetscReal u0[])
 {
@@ -497,7 +541,6 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   const SbContactSurface m = b->surface;
   PetscReal least = PETSC_MAX_REAL;
   PetscReal energy[2], unused;
-  PetscBool moved;
 
   PetscFunctionBeginUser;
   PetscCall(find_path(b, t, dt));
@@ -512,18 +555,12 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   if (!b->motion.begun || b->separation.overlapping || b->separation.parted) {
     PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
     PetscCall(SbSurfacesSeparate(
-      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.),
-      (PetscBool)(!b->motion.begun && t == 0.)));
+      e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.), PETSC_FALSE));
   }
-  if (!b->motion.begun && t == 0.) { /* not when it goes on from a checkpoint */
-    PetscCall(part_touching(e, s, u0, &moved));
-    if (moved || b->separation.overlap.touches) {
-      PetscCall(SbSurfacesPlace(b, u0, 0., b->motion.x));
-      PetscCall(SbSurfacesSeparate(e, s, dt, PETSC_FALSE, PETSC_FALSE));
-    }
-    if (!e->dynamic)
-      PetscCall(touch_at_width(e));
-  }
+  if (!b->motion.begun && !b->separation.overlapping)
+    PetscCall(find_held(b));
+  if (!b->motion.begun && t == 0. && !e->dynamic) /* not when it goes on from a checkpoint */
+    PetscCall(touch_at_width(e));
   b->motion.begun = PETSC_TRUE;
   PetscCall(SbSurfacesUpdate(b, u0));
   if (b->widths.wider >
@@ -641,7 +678,7 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
   b->separation.parted = PETSC_FALSE;
   if (progress[1] > 0.)
     b->separation.stiffer = progress[0] < HALF * progress[1]
-                              ? 2. * b->separation.stiffer
+                              ? PetscMin(STIFFEST_PARTING, 2. * b->separation.stiffer)
                               : PetscMax(1., 0.5 * b->separation.stiffer);
 
   if (b->contact.friction.mu > 0.)
@@ -653,6 +690,8 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
   b->record.most = PetscMax(b->record.most, b->active.n);
   if (!b->options.verify || b->separation.overlapping)
     PetscFunctionReturn(PETSC_SUCCESS);
+  b->separation.overlap.coplanar = PETSC_FALSE;
+  b->separation.overlap.touch = 0.;
   PetscCall(SbContactOverlapFind(b->surface, b->motion.x, PETSC_FALSE, &b->separation.overlap));
   PetscCheck(!b->separation.overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT
@@ -669,7 +708,8 @@ static PetscErrorCode save_surfaces(SbEffect e, SbSpace s, PetscInt *n, PetscRea
 {
   const Surfaces *b = (const Surfaces *)e->data;
   const PairForces *m = &b->multipliers.kept;
-  const PetscReal sum[SUMS] = {b->sums.work, b->friction.loss, s->rank ? 0. : b->separation.stiffer,
+  const PetscReal sum[SUMS] = {b->sums.work + b->contact.base.given, b->friction.loss,
+                               s->rank ? 0. : b->separation.stiffer,
                                s->rank ? 0. : b->widths.scale};
 
   PetscFunctionBeginUser;
@@ -763,12 +803,14 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
   PetscCall(PetscFree(b->blocks.slot));
   PetscCall(PetscFree(b->springs.spring));
   PetscCall(SbContactOverlapFree(&b->separation.overlap));
+  PetscCall(PetscFree(b->separation.held));
   PetscCall(SbPartnerDestroy(&b->contact.partner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static const SbContactOps surface_ops = {
   .initial_contacts = initial_contacts_surfaces,
+  .part = part_surfaces,
   .begin_step = begin_step_surfaces,
   .find_impacts = SbContactFindImpacts_Surfaces,
   .gradient = SbContactGradient_Surfaces,

@@ -124,7 +124,10 @@ typedef struct {
   PetscBool parted;      /* there was some at the start of this load step */
   PetscBool searched;    /* it was searched for when the run began */
   PetscBool announced;   /* the warning was given */
-  PetscReal sunk;        /* largest depth of surfaces that only touch, at the start, m */
+  PetscInt opening;      /* steps since nothing intersects any more */
+  uint8_t *held;     /* as SbContactOverlap.near: prescribed vertices that lie on each other; NULL:
+                            there are none */
+  PetscReal sunk;    /* largest depth of surfaces that only touch, at the start, m */
   PetscReal stiffer; /* factor on the stiffness of springs, by their success in the last steps */
   SbContactOverlap overlap;
 } Separation;

@@ -95,8 +95,11 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     e->load_work += 0.5 * (work[0] + work[1]) + own[0];
     e->prescribed_work += 0.5 * (work[2] + work[3]) + own[1];
     e->damping_loss += 0.5 * dt * (power + run->state.damping_power);
-  } else if (run->clock.step0 == 0)
-    run->state.energy_start = e->kinetic + e->strain;
+  } else if (run->clock.step0 == 0) {
+    /* contact may have moved surfaces apart already */
+    PetscCallMPI(MPI_Allreduce(own, &e->load_work, 1, MPIU_REAL, MPI_SUM, m->comm));
+    run->state.energy_start = e->kinetic + e->strain - e->load_work;
+  }
   e->integrator_loss = run->state.energy_start + e->load_work + e->prescribed_work -
                        e->damping_loss - e->remesh_loss - e->kinetic - e->strain;
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);

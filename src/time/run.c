@@ -276,6 +276,34 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bodies that touch when the run begins are moved apart; the energy that this gives them is work of
+   the contact. */
+static PetscErrorCode start_contacts(SbRun run)
+{
+  const SbModel m = run->model;
+  const PetscReal t = run->clock.t0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactSetStart(&m->contacts, t, run->clock.dt, run->state.U));
+  for (PetscInt k = 0; k < m->contacts.npotential; k++) {
+    SbEnergies before = {0};
+    SbEnergies after = {0};
+    PetscBool moved;
+    Vec old;
+
+    PetscCall(VecDuplicate(run->state.U, &old));
+    PetscCall(VecCopy(run->state.U, old));
+    PetscCall(SbContactSetPart(&m->contacts, k, t, run->state.U, &moved));
+    if (moved) {
+      PetscCall(SbModelEnergies(m, old, run->state.V, &before));
+      PetscCall(SbModelEnergies(m, run->state.U, run->state.V, &after));
+      SbContactSetGive(&m->contacts, k, after.strain - before.strain);
+    }
+    PetscCall(VecDestroy(&old));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolve(SbRun run)
 {
   const SbModel m = run->model;
@@ -298,7 +326,7 @@ PetscErrorCode SbRunSolve(SbRun run)
     run->clock.wall_start = MPI_Wtime();
   run->clock.paused = PETSC_FALSE;
   run->monitors.last.U = NULL;
-  PetscCall(SbContactSetStart(&m->contacts, run->clock.t0, run->clock.dt, run->state.U));
+  PetscCall(start_contacts(run));
   if (run->solve.ts)
     PetscCall(SbRunIntegrate(run));
   else if (run->clock.arc.on)
