@@ -234,6 +234,7 @@ typedef struct {
 
   /* warnings that were given */
   PetscBool warned_short; /* of much shorter steps */
+  PetscBool warned_jumps; /* of a penalty on jumps that has not settled */
   PetscBool warned_gain;  /* of an unstable integrator */
 
   void *output;                                /* data of src/output; NULL without output */

@@ -169,6 +169,27 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same with the penalty on jumps of the X that it ends with; follows: the repetitions of this
+   step, which its, the measure for the length of the next one, leaves out. */
+static PetscErrorCode correct_followed(Path *p, PetscReal l, PetscInt *follows, PetscInt *its,
+                                       PetscBool *ok)
+{
+  PetscBool again = PETSC_FALSE;
+  PetscInt more;
+
+  PetscFunctionBeginUser;
+  PetscCall(correct(p, l, its, ok));
+  if (*ok)
+    PetscCall(SbRunRepeatForJumps(p->run, p->factor, p->X, follows, &again));
+  while (again) {
+    PetscCall(correct(p, l, &more, ok));
+    again = PETSC_FALSE;
+    if (*ok)
+      PetscCall(SbRunRepeatForJumps(p->run, p->factor, p->X, follows, &again));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Attempts a step of length l from U with the load factor `from`; sign: of the initial change of
    the load. */
 static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal sign, PetscInt *its,
@@ -178,13 +199,15 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscReal vv, dd, dv;
   PetscBool far;
   PetscBool again = (PetscBool)(run->monitors.post_solve.fn != NULL);
+  PetscInt follows = 0;
   PetscInt more;
 
   PetscFunctionBeginUser;
+  PetscCall(SbModelFollowJumps(run->model, from, run->state.U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(product(p, p->begin, p->begin, &vv));
   PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->state.U));
   PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
-  PetscCall(correct(p, l, its, ok));
+  PetscCall(correct_followed(p, l, &follows, its, ok));
 
   /* too large an angle: another branch */
   PetscCall(VecWAXPY(p->d, -1., run->state.U, p->X));
@@ -203,7 +226,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   if (*ok && from < 1. && p->factor > 1.) {
     PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->state.U));
     PetscCall(put_at(p, 1.));
-    PetscCall(correct(p, l = 0., &more, ok));
+    PetscCall(correct_followed(p, l = 0., &follows, &more, ok));
     *its += more;
   }
   for (int i = 0; i < SB_MAX_RESOLVES && again && *ok; i++) {
@@ -212,7 +235,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
     again = PETSC_FALSE;
     PetscCall((*run->monitors.post_solve.fn)(run, &step, run->monitors.post_solve.ctx, &again));
     if (again)
-      PetscCall(correct(p, l, &more, ok));
+      PetscCall(correct_followed(p, l, &follows, &more, ok));
   }
   PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->state.U, p->X}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);

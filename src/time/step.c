@@ -12,7 +12,10 @@
 
 #define SHORT 0.13 /* step over the requested one, below which a warning follows: three halvings */
 #define FORGET 0.9 /* decay per step of the recorded longest step */
-#define FULL 0.9   /* step over the requested one, from which on it counts as that */
+#define SETTLED \
+  30 /* solves of a load step after which its penalty on jumps has to be that of its end: 6 to 8 where \
+        a cube is pressed to half or to 0.4 */
+#define FULL 0.9 /* step over the requested one, from which on it counts as that */
 
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 {
@@ -35,6 +38,25 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
   PetscCall(SbRunRestartAcceleration(run));
   if (run->state.reaction)
     PetscCall(SbRunReactions(run, run->clock.t, run->state.reaction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *times, PetscBool *again)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbModelFollowJumps(run->model, t, U, SB_STEPS_OF_LOAD, again));
+  if (!*again || ++*times < SETTLED)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  *again = PETSC_FALSE;
+  if (!run->monitors.warned_jumps)
+    PetscCall(SbWarning(
+      run->model->comm,
+      "load factor %g: the penalty on jumps of elements cr and dg has not settled after "
+      "%" PetscInt_FMT
+      " solves of the load step: the result depends on the number of load steps. Give more "
+      "-static_steps, or -body_<name>_element p2",
+      (double)t, *times));
+  run->monitors.warned_jumps = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,6 +86,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
   PetscBool warm = PETSC_FALSE;
+  PetscInt follows = 0;
 
   PetscFunctionBeginUser;
   if (!m->dynamic)
@@ -79,10 +102,9 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, ok));
 
-    /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
-       its end */
-    if (*ok && !m->dynamic && !warm) {
-      PetscCall(SbModelFollowJumps(m, step->t + step->dt, step->U, SB_STEPS_OF_LOAD, &warm));
+    /* the penalty on jumps is that of an earlier state: repeat a load step with that of its end */
+    if (*ok && !m->dynamic) {
+      PetscCall(SbRunRepeatForJumps(run, step->t + step->dt, step->U, &follows, &warm));
       if (warm)
         continue;
     }

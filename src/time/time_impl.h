@@ -49,6 +49,11 @@ typedef struct {
    Explicit integrators, for their stable step, and alpha2 use the penalty of the rest state.
    Collective. */
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
+/* Updates the penalty on jumps from the end U of a load step, at the load factor t. again: by more
+   than a percent, so that the step is to be solved once more, from U; times: counts that, and ends
+   it with a warning. Collective. */
+PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *times,
+                                   PetscBool *again);
 /* Attempts a step; ok: it can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode
