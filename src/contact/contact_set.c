@@ -33,6 +33,7 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
     to->nconstraint += c->ops->assemble_constraints != NULL;
     to->nrestitution += c->restitution > 0.;
   }
+  PetscCall(SbContactSetCheckRepeated(to));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
