@@ -130,13 +130,14 @@ struct _p_SbContact {
   const SbContactOps *ops; /* of its response */
   PetscBool springs;       /* springs or friction, not constraints alone */
   PetscBool exact;         /* its potential has exact constraints */
-  PetscBool saddle;        /* constraints are to be solved with their multipliers as unknowns */
-  PetscBool ends_step;     /* a step ends at the first time of impact */
-  PetscReal restitution;   /* coefficient; 0: none */
-  PetscReal progress;      /* of a potential: obstacles are at this fraction of their path */
-  PetscReal width;         /* the smallest gap below which surfaces repel, m */
-  PetscReal work;          /* on the bodies in the last accepted step, this rank's, J */
-  char unsettled[512];     /* why the solution of this step is none, in words; "": it is one */
+  PetscBool rigid;  /* its potential has multipliers: forces of constraints, impulses at impact */
+  PetscBool saddle; /* constraints are to be solved with their multipliers as unknowns */
+  PetscBool ends_step;   /* a step ends at the first time of impact */
+  PetscReal restitution; /* coefficient; 0: none */
+  PetscReal progress;    /* of a potential: obstacles are at this fraction of their path */
+  PetscReal width;       /* the smallest gap below which surfaces repel, m */
+  PetscReal work;        /* on the bodies in the last accepted step, this rank's, J */
+  char unsettled[512];   /* why the solution of this step is none, in words; "": it is one */
 };
 
 /* The contacts of a scene. All zero: there is none. */
@@ -148,6 +149,7 @@ typedef struct {
   SbContact *potential;  /* [npotential] those that have one */
   SbContact ends_step;   /* the first one with the option time_of_impact; NULL: none */
   PetscInt nexact;       /* potentials with exact constraints */
+  PetscInt nrigid;       /* potentials with multipliers */
   PetscBool saddle;      /* some of them have their forces as unknowns */
   PetscInt nconstraint;  /* those with constraints */
   PetscInt nrestitution; /* those with restitution */

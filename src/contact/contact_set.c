@@ -29,6 +29,7 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
     if (c->ends_step && !to->ends_step)
       to->ends_step = c;
     to->nexact += c->exact;
+    to->nrigid += c->rigid;
     to->saddle = (PetscBool)(to->saddle || (c->exact && c->saddle));
     to->nconstraint += c->ops->assemble_constraints != NULL;
     to->nrestitution += c->restitution > 0.;

@@ -827,6 +827,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
   b->options.sticks = (PetscBool)(b->contact.friction.mu > 0. && sticking == 0);
   b->contact.base.ops = &surface_ops;
   b->contact.base.exact = is_exact(b);
+  b->contact.base.rigid = has_multipliers(b);
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
