@@ -91,6 +91,9 @@ typedef struct {
   /* exact constraints: adds the rows of those that are active at u */
   PetscErrorCode (*constraints)(SbContact c, SbSpace space, const PetscReal u[],
                                 SbConstraintRows *rows);
+  /* adds rows of the directions that contact holds at u, of whatever stiffness */
+  PetscErrorCode (*holding)(SbContact c, SbSpace space, const PetscReal u[],
+                            SbConstraintRows *rows);
   /* lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and slip
      directions from u; again: it did, and the step needs one more solve */
   PetscErrorCode (*update_friction)(SbContact c, SbSpace space, const PetscReal u[],
@@ -232,6 +235,8 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
                                           PetscBool *again);
 /* The rows of exact constraints that are active at X, where contacts->nexact > 0; collective. */
 PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
+/* Rows of the directions in which potentials hold bodies at X, of whatever response; collective. */
+PetscErrorCode SbContactSetHolding(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
 /* Why the solution of a step is none though Newton's method has converged, in words; "": it is one.
    Not collective, the same on all ranks. */
 const char *SbContactSetUnsettled(const SbContactSet *contacts);

@@ -186,6 +186,19 @@ PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbCo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSetHolding(const SbContactSet *contacts, Vec X, SbConstraintRows *rows)
+{
+  const SbSpace s = contacts->space;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, X, &u));
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], holding, s, u, rows);
+  PetscCall(SbSpaceRestoreLocalRead(s, X, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBool solved,
                                           PetscBool *again)
 {

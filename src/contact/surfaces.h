@@ -29,12 +29,14 @@ typedef struct {
   PairForce *pair; /* [n] in the order of pairs */
 } PairForces;
 typedef struct {
-  PairForces now;   /* of the next solve */
-  PairForces kept;  /* forces of the last accepted step, with which an attempt begins */
-  PetscInt updates; /* in this step */
-  PetscReal least;  /* smallest error of gaps of its solutions, over the width */
-  PetscInt stuck;   /* updates since */
-  PetscBool said;   /* the warning that they do not settle was given */
+  PairForces now;         /* of the next solve */
+  PairForces kept;        /* forces of the last accepted step, with which an attempt begins */
+  PetscInt updates;       /* in this step */
+  PetscReal least;        /* smallest error of gaps of its solutions, over the width */
+  PetscInt stuck;         /* updates since */
+  PetscBool said;         /* the warning that they do not settle was given */
+  PetscReal softer;       /* factor on the springs of exact constraints in load steps */
+  PetscReal begun, tried; /* load factor where the last attempt began, and its increment; 0: none */
 } Multipliers;
 
 /* A pair with friction in this step. */
@@ -359,6 +361,8 @@ PetscErrorCode SbMultipliersRestore(Surfaces *b);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows);
+PetscErrorCode SbContactHolding_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
+                                      SbConstraintRows *rows);
 
 /* Operations (sbcontact.h, sbeffect.h). */
 PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, PetscReal dt,
