@@ -99,6 +99,12 @@ typedef struct {
   PetscErrorCode (*update_friction)(SbContact c, SbSpace space, const PetscReal u[],
                                     PetscBool solved, PetscBool *again);
 
+  /* an attempt failed, why: in words; again: the next one is to have the same length, with a
+     response that needs no multipliers */
+  PetscErrorCode (*fall_back)(SbContact c, SbSpace space, const char *why, PetscBool *again);
+  /* the active set has not settled after `rounds` solves: sets SbContact.unsettled */
+  PetscErrorCode (*explain)(SbContact c, SbSpace space, PetscInt rounds);
+
   /* * restitution: work of the forces of impacts in the last solve, in the frame of the other side,
      J */
   PetscErrorCode (*impact_work)(SbContact c, PetscReal *work);
@@ -235,6 +241,13 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
                                           PetscBool *again);
 /* The rows of exact constraints that are active at X, where contacts->nexact > 0; collective. */
 PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
+/* A failed attempt at a step is to be repeated as it is (again), with another response; why it
+   failed, in words. Collective. */
+PetscErrorCode SbContactSetFallBack(const SbContactSet *contacts, const char *why,
+                                    PetscBool *again);
+/* The active set has not settled after `rounds` solves: SbContactSetUnsettled() says where.
+   Collective. */
+PetscErrorCode SbContactSetExplain(const SbContactSet *contacts, PetscInt rounds);
 /* Rows of the directions in which potentials hold bodies at X, of whatever response; collective. */
 PetscErrorCode SbContactSetHolding(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
 /* Why the solution of a step is none though Newton's method has converged, in words; "": it is one.

@@ -60,6 +60,15 @@ PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscR
   for (PetscInt k = 0; k < contacts->n; k++)
     PHASE_CALL(contacts->contact[k], begin_step, s, t, dt, speed, u);
 
+  /* the responses of this attempt */
+  contacts->nexact = 0;
+  contacts->saddle = PETSC_FALSE;
+  for (PetscInt k = 0; k < contacts->n; k++) {
+    contacts->nexact += contacts->contact[k]->exact;
+    contacts->saddle = (PetscBool)(contacts->saddle ||
+                                   (contacts->contact[k]->exact && contacts->contact[k]->saddle));
+  }
+
   /* the impacts of this step */
   if (contacts->nrestitution && V0) {
     contacts->bounce.U0 = U0;
@@ -213,6 +222,23 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
   PetscCall(SbSpaceRestoreLocalRead(s, X, &u));
   if (contacts->nrestitution && solved && !*again)
     PetscCall(SbContactSetCheckRestitution(contacts, X, again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetFallBack(const SbContactSet *contacts, const char *why, PetscBool *again)
+{
+  PetscFunctionBeginUser;
+  *again = PETSC_FALSE;
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], fall_back, contacts->space, why, again);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetExplain(const SbContactSet *contacts, PetscInt rounds)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], explain, contacts->space, rounds);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -523,6 +523,7 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   PetscFunctionBeginUser;
   PetscCall(find_path(b, t, dt));
   b->contact.base.progress = 0.;
+  SbSurfacesBeginResponse(b);
   soften(b, t, dt);
   stiffen(b, dt);
   PetscCall(SbMultipliersRestore(b));
@@ -799,6 +800,7 @@ static const SbContactOps surface_ops = {
   .update_friction = update_surfaces,
   .constraints = SbContactConstraints_Pairs,
   .holding = SbContactHolding_Pairs,
+  .fall_back = SbContactFallBack_Surfaces,
   .impact_work = SbContactImpactWork_Surfaces,
   .scale_restitution = SbContactScaleRestitution_Surfaces,
   .gap = SbContactGap_Surfaces,
@@ -818,7 +820,7 @@ static const SbEffectOps surface_effect = {
   .destroy = destroy_surfaces,
 };
 
-PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_auto)
 {
   static const char *const obstacle[] = {
     "force_x",     "force_y", "force_z", "torque_x",      "torque_y",     "torque_z", "contacts",
@@ -827,7 +829,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Surfaces *b = (Surfaces *)e->data;
-  int search, sticking;
+  int search, sticking, unsettled;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
@@ -854,7 +856,10 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
-  e->nstate = has_table(b) ? PAIR_KEY + 4 : SUMS;
+  PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
+  b->fall_back.response = b->contact.response;
+  b->fall_back.may = (PetscBool)(has_multipliers(b) && (unsettled == 2 || (by_auto && !unsettled)));
+  e->nstate = has_multipliers(b) || b->options.sticks ? PAIR_KEY + 4 : SUMS;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

@@ -158,9 +158,17 @@ typedef struct {
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
 } PairColumns;
 
+/* A step that is repeated with the barrier (fall_back.c). */
+typedef struct {
+  PetscBool may, now;  /* -effect_X_unsettled barrier; the next attempt has the barrier */
+  SbResponse response; /* of all other steps */
+  PetscInt n;          /* number of such steps */
+} FallBack;
+
 typedef struct {
   Contact contact; /* first */
   SurfaceOptions options;
+  FallBack fall_back;
   SbContactSurface surface;
   SbContactPairs pairs;
   SurfaceMotion motion;
@@ -205,7 +213,7 @@ static inline PetscBool has_multipliers(const Surfaces *b)
 /* Whether there is a table of multipliers: of forces, of friction, or of both. */
 static inline PetscBool has_table(const Surfaces *b)
 {
-  return (PetscBool)(has_multipliers(b) || b->options.sticks);
+  return (PetscBool)(b->contact.base.effect->nstate > PAIR_KEY);
 }
 
 /* How a pair resists. */
@@ -237,8 +245,9 @@ static inline PetscBool counts_spring(const Surfaces *b, const Spring *spring)
   return (PetscBool)b->surface->own[spring->at.v[k]];
 }
 
-/* Makes e, with its Contact, an effect of surfaces in contact. Not collective. */
-PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope);
+/* Makes e, with its Contact, an effect of surfaces in contact; by_auto: its response was chosen.
+   Not collective. */
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_auto);
 /* Positions at the local displacements u; pairs with gaps below the width, ordered by number.
    Collective. */
 PetscErrorCode SbSurfacesUpdate(Surfaces *b, const PetscReal u[]);
@@ -358,6 +367,10 @@ PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
 PetscErrorCode SbMultipliersKeep(Surfaces *b);
 PetscErrorCode SbMultipliersRestore(Surfaces *b);
+/* Steps with the barrier (fall_back.c). Begin: an attempt, with which response. */
+void SbSurfacesBeginResponse(Surfaces *b);
+PetscErrorCode SbContactFallBack_Surfaces(SbContact contact, SbSpace s, const char *why,
+                                          PetscBool *again);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows);

@@ -310,8 +310,10 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     char why[512] = "";
     const char *what = SNESConvergedReasons[reason];
 
-    if (reason > 0)
-      what = unsettled[0] ? unsettled : "the solution is not finite, or beyond 1e15 m";
+    if (unsettled[0])
+      what = unsettled;
+    else if (reason > 0)
+      what = "the solution is not finite, or beyond 1e15 m";
     else if (reason == SNES_DIVERGED_LINEAR_SOLVE)
       PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else

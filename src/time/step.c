@@ -79,10 +79,18 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, ok));
 
+    /* a response whose forces do not settle may go on with another one */
+    again = PETSC_FALSE;
+    if (!*ok && reason != SNES_CONVERGED_ITERATING && !run->clock.stopped)
+      PetscCall(SbContactSetFallBack(&m->contacts, run->clock.stop_reason, &again));
+    if (again)
+      continue;
+
     /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of
        its end */
     if (*ok && !m->dynamic && !warm) {
       PetscCall(SbModelFollowJumps(m, step->t + step->dt, step->U, SB_STEPS_OF_LOAD, &warm));
+      again = warm;
       if (warm)
         continue;
     }

@@ -135,7 +135,7 @@ def check_fast():
 
 def check_unsettled():
     """Multipliers that do not settle: a time step is cut, and said why; where it cannot be, that is an error with the pair, the place and what
-    helps; a looser tolerance goes on."""
+    helps; a looser tolerance goes on, and so does the barrier, also after a restart."""
     fast = ("-bodies a,b " + BODY.format("a", "0.1,0.1,0.1:1", "0,0,0", "neohookean", "1e5", "0.3")
             + BODY.format("b", "0.1,0.1,0.1:1", "0.02,0.03,0.11", "neohookean", "1e5", "0.3")
             + "-body_b_velocity 0,0,-20 -effects meet -effect_meet_type contact -effect_meet_verify yes -ts_dt 0.001 -ts_max_time 0.005 "
@@ -146,6 +146,21 @@ def check_unsettled():
         check(history(f"cut-{ranks}")["rejected"].max() > 0 and re.search(words, text), f"cut-{ranks}: not said why steps were cut\n{text}")
     text = run("uncut", fast + "-time_max_halvings 0", code=1)
     check(re.search("error: step .*" + words, text), f"uncut: no reason\n{text}")
+    for ranks in 1, 2:
+        text = run(f"fall-{ranks}", fast + "-effect_meet_unsettled barrier -output_fields none", ranks)
+        found = history(f"fall-{ranks}")
+        energy = found["kinetic"] + found["strain"]
+        check(re.search(words + ".*goes on with the response barrier", text) and text.count("goes on with the response barrier") == 1,
+              f"fall-{ranks}: not said that steps have the barrier\n{text}")
+        check(found["rejected"].max() == 0 and energy.max() < 201 and abs(found["momentum_z"][-1] / found["momentum_z"][0] - 1) < 1e-6,
+              f"fall-{ranks}: {found['rejected'].max()} rejected steps, energy {energy.max()} J, momentum {found['momentum_z'][-1]}")
+    check(abs(history("fall-1")["strain"] - history("fall-2")["strain"]).max() < 1e-3, "fall: ranks differ")
+    shutil.rmtree(OUT / "fall-half", ignore_errors=True)
+    half = fast + "-effect_meet_unsettled barrier -output_fields none -checkpoint_every_steps 2 "
+    run("fall-half", half.replace("-ts_max_time 0.005", "-ts_max_time 0.002"))
+    run("fall-half", half + "-restart latest", 2)
+    off = abs(history("fall-half")["strain"] - history("fall-1")["strain"]).max()
+    check(off < 1e-3, f"fall: strain {off} J off after a restart")
     text = run("loose", fast + "-effect_meet_multiplier_tolerance 1e3")
     check("updates" not in text and history("loose")["rejected"].max() == 0, f"loose: {text}")
 
