@@ -458,7 +458,7 @@ static PetscErrorCode scale_width_surfaces(SbContact contact, PetscReal factor, 
 
 /* A static run begins: surfaces that are apart by w, as far as positions tell, are to touch, so
    that w becomes larger by as little. Without it the barrier there has no stiffness to begin
-   with. */
+   with. With multipliers w is what it was from the first update on. */
 static PetscErrorCode touch_at_width(SbEffect e)
 {
   Surfaces *b = (Surfaces *)e->data;
@@ -760,6 +760,10 @@ static PetscErrorCode update_surfaces(SbContact contact, SbSpace s, const PetscR
   if (solved && (has_multipliers(b) || (b->options.sticks && settles))) {
     PetscCall(SbSurfacesUpdate(b, u));
     PetscCall(SbMultipliersUpdate(b, again));
+    if (has_multipliers(b) && b->widths.scale > 1.) { /* touch_at_width(): their forces exist now */
+      set_scale(contact->effect, 1.);
+      *again = PETSC_TRUE;
+    }
     if (*again)
       PetscFunctionReturn(PETSC_SUCCESS);
   }

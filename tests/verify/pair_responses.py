@@ -80,6 +80,29 @@ def check_patch():
                   f"{name}: gap {found['meet_gap'][-1]} m, not {width}")
 
 
+def check_scaling():
+    """Blocks that touch without a force: displacements over the load do not depend on it, but for the rotation of surfaces and their slip along
+    each other, of the order of displacement over size. Vertices of the upper block lie above edges of the lower one, and part of it lifts off."""
+    blocks = ("-bodies a,b " + BODY.format("a", "1,1,0.5:2", "0,0,0", "linear", "1e6", "0.3")
+              + BODY.format("b", "0.8,0.8,0.4:4", "0.1,0.1,0.501", "linear", "2e6", "0.3")
+              + "-effects bottom,press,held,meet -effect_bottom_type fixed -effect_bottom_on a.zmin -effect_held_type fixed -effect_held_on b.zmax "
+              "-effect_held_components xy -effect_press_type traction -effect_press_on b.zmax -effect_meet_type contact "
+              "-effect_meet_barrier_width 1e-3 -time static -output_precision double ")
+    for response in EXACT:
+        found = []
+        for load in 1, 10, 100:
+            name = f"scaling-{response}-{load}"
+            shutil.rmtree(OUT / name, ignore_errors=True)
+            run(name, blocks + f"-effect_meet_response {response} -effect_press_vector 0;0;-{load}*(1+2*x)")
+            with h5py.File(OUT / name / "fields.h5") as f:
+                last = f["step"][sorted(f["step"])[-1]]
+                last = last[sorted(last)[-1]] if "displacement" not in last else last
+                found.append(last["displacement"][:] / load)
+        off = [abs(u - found[0]).max() / abs(found[0]).max() for u in found[1:]]
+        print(f"  scaling-{response}: displacements over loads 10 and 100 times as large differ by {off[0]:.1e} and {off[1]:.1e}")
+        check(off[0] < 1e-4 and off[1] < 1e-3, f"scaling-{response}: displacements are not proportional to the load: {off}")
+
+
 def check_flight():
     for response in ALL:
         name = f"fly-{response}"
@@ -216,6 +239,7 @@ def check_refusals():
 
 
 check_patch()
+check_scaling()
 check_flight()
 check_impulse()
 check_fast()
