@@ -94,10 +94,19 @@ typedef struct {
   /* exact constraints: adds the rows of those that are active at u */
   PetscErrorCode (*constraints)(SbContact c, SbSpace space, const PetscReal u[],
                                 SbConstraintRows *rows);
+  /* adds rows of the directions that contact holds at u, of whatever stiffness */
+  PetscErrorCode (*holding)(SbContact c, SbSpace space, const PetscReal u[],
+                            SbConstraintRows *rows);
   /* lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and slip
      directions from u; again: it did, and the step needs one more solve */
   PetscErrorCode (*update_friction)(SbContact c, SbSpace space, const PetscReal u[],
                                     PetscBool solved, PetscBool *again);
+
+  /* an attempt failed, why: in words; again: the next one is to have the same length, with a
+     response that needs no multipliers */
+  PetscErrorCode (*fall_back)(SbContact c, SbSpace space, const char *why, PetscBool *again);
+  /* the active set has not settled after `rounds` solves: sets SbContact.unsettled */
+  PetscErrorCode (*explain)(SbContact c, SbSpace space, PetscInt rounds);
 
   /* * restitution: work of the forces of impacts in the last solve, in the frame of the other side,
      J */
@@ -133,6 +142,8 @@ struct _p_SbContact {
   const SbContactOps *ops; /* of its response */
   PetscBool springs;       /* springs or friction, not constraints alone */
   PetscBool exact;         /* its potential has exact constraints */
+  PetscBool rigid;         /* its potential has multipliers: forces of constraints, impulses at
+                              impact */
   PetscBool saddle;        /* constraints are to be solved with their multipliers as unknowns */
   PetscBool ends_step;     /* a step ends at the first time of impact */
   PetscReal restitution;   /* coefficient; 0: none */
@@ -153,6 +164,7 @@ typedef struct {
   SbContact *potential;  /* [npotential] those that have one */
   SbContact ends_step;   /* the first one with the option time_of_impact; NULL: none */
   PetscInt nexact;       /* potentials with exact constraints */
+  PetscInt nrigid;       /* potentials with multipliers */
   PetscBool saddle;      /* some of them have their forces as unknowns */
   PetscInt nconstraint;  /* those with constraints */
   PetscInt nrestitution; /* those with restitution */
@@ -240,6 +252,15 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
                                           PetscBool *again);
 /* The rows of exact constraints that are active at X, where contacts->nexact > 0; collective. */
 PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
+/* A failed attempt at a step is to be repeated as it is (again), with another response; why it
+   failed, in words. Collective. */
+PetscErrorCode SbContactSetFallBack(const SbContactSet *contacts, const char *why,
+                                    PetscBool *again);
+/* The active set has not settled after `rounds` solves: SbContactSetUnsettled() says where.
+   Collective. */
+PetscErrorCode SbContactSetExplain(const SbContactSet *contacts, PetscInt rounds);
+/* Rows of the directions in which potentials hold bodies at X, of whatever response; collective. */
+PetscErrorCode SbContactSetHolding(const SbContactSet *contacts, Vec X, SbConstraintRows *rows);
 /* Why the solution of a step is none though Newton's method has converged, in words; "": it is one.
    Not collective, the same on all ranks. */
 const char *SbContactSetUnsettled(const SbContactSet *contacts);

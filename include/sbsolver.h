@@ -169,6 +169,10 @@ typedef struct {
 /* Room for further rows and entries. Not collective. */
 PetscErrorCode SbConstraintRowsReserve(SbConstraintRows *rows, PetscInt n, PetscInt nentry);
 PetscErrorCode SbConstraintRowsFree(SbConstraintRows *rows);
+/* The rows of all ranks, of unit length, as a matrix with `columns` unknowns of this rank;
+   length[]: what they had. Collective; the caller destroys it. */
+PetscErrorCode SbConstraintRowsMatrix(const SbConstraintRows *rows, MPI_Comm comm, PetscInt columns,
+                                      PetscReal length[], Mat *matrix);
 
 /*
   SbContactSystemSolveConstrained - SbContactSystemSolve() with stiff constraints: in their null

@@ -109,3 +109,6 @@ void SbPartnerAddForce(const SbPartner *partner, const SbPose *pose, const Petsc
 /* restitution.c: energy check of a converged step; `again`: coefficients were reduced.
    Collective. */
 PetscErrorCode SbContactSetCheckRestitution(SbContactSet *contacts, Vec U, PetscBool *again);
+
+/* repeated.c: an error where two contacts treat the same surfaces. Collective. */
+PetscErrorCode SbContactSetCheckRepeated(const SbContactSet *contacts);

@@ -29,10 +29,12 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
     if (c->ends_step && !to->ends_step)
       to->ends_step = c;
     to->nexact += c->exact;
+    to->nrigid += c->rigid;
     to->saddle = (PetscBool)(to->saddle || (c->exact && c->saddle));
     to->nconstraint += c->ops->assemble_constraints != NULL;
     to->nrestitution += c->restitution > 0.;
   }
+  PetscCall(SbContactSetCheckRepeated(to));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -57,6 +59,15 @@ PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscR
   PetscCall(SbSpaceUpdateGhosts(s, u));
   for (PetscInt k = 0; k < contacts->n; k++)
     PHASE_CALL(contacts->contact[k], begin_step, s, t, dt, speed, u);
+
+  /* the responses of this attempt */
+  contacts->nexact = 0;
+  contacts->saddle = PETSC_FALSE;
+  for (PetscInt k = 0; k < contacts->n; k++) {
+    contacts->nexact += contacts->contact[k]->exact;
+    contacts->saddle = (PetscBool)(contacts->saddle ||
+                                   (contacts->contact[k]->exact && contacts->contact[k]->saddle));
+  }
 
   /* the impacts of this step */
   if (contacts->nrestitution && V0) {
@@ -184,6 +195,19 @@ PetscErrorCode SbContactSetConstraints(const SbContactSet *contacts, Vec X, SbCo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSetHolding(const SbContactSet *contacts, Vec X, SbConstraintRows *rows)
+{
+  const SbSpace s = contacts->space;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, X, &u));
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], holding, s, u, rows);
+  PetscCall(SbSpaceRestoreLocalRead(s, X, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBool solved,
                                           PetscBool *again)
 {
@@ -198,6 +222,23 @@ PetscErrorCode SbContactSetUpdateFriction(SbContactSet *contacts, Vec X, PetscBo
   PetscCall(SbSpaceRestoreLocalRead(s, X, &u));
   if (contacts->nrestitution && solved && !*again)
     PetscCall(SbContactSetCheckRestitution(contacts, X, again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetFallBack(const SbContactSet *contacts, const char *why, PetscBool *again)
+{
+  PetscFunctionBeginUser;
+  *again = PETSC_FALSE;
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], fall_back, contacts->space, why, again);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetExplain(const SbContactSet *contacts, PetscInt rounds)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], explain, contacts->space, rounds);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -51,6 +51,31 @@ static void find_tangents(const PetscReal n[3], PetscReal t[2][3])
   SbCross(n, t[0], t[1]);
 }
 
+/* Normals of pairs that press, and tangents where they have friction. */
+PetscErrorCode SbContactHolding_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
+                                      SbConstraintRows *rows)
+{
+  Surfaces *b = (Surfaces *)contact;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SbSurfacesUpdate(b, u));
+  for (PetscInt i = 0; i < b->active.n && b->motion.begun; i++) {
+    const Active *a = &b->active.pair[i];
+    const SbPairLaw law = SbPairLawOf(b, a);
+    PetscReal d[3], t[2][3];
+
+    SbPairLawEvaluate(&law, a->gap, a->pair.area, d);
+    if (d[1] >= 0. || !counts(b, &a->pair))
+      continue;
+    PetscCall(add_row(b, a, a->at.n, 0., 1., 1., rows));
+    find_tangents(a->at.n, t);
+    for (int k = 0; k < 2 && b->contact.friction.mu > 0.; k++)
+      PetscCall(add_row(b, a, t[k], 0., 1., 1., rows));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows)
 {

@@ -121,9 +121,9 @@ static PetscErrorCode share(const Surfaces *b, PetscInt n, const PairForce mine[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces that are not settled: a step with multipliers of gaps fails, for others of friction alone
-   it goes on with a warning. */
-static PetscErrorCode complain(Surfaces *b, const Wrong *worst)
+/* Forces that are not settled: a step with multipliers of gaps fails, or goes on with a warning, as
+   others of friction alone do. */
+static PetscErrorCode complain(Surfaces *b, const Wrong *worst, PetscBool fails)
 {
   const SbSpace s = b->surface->space;
   const SbEffect e = b->contact.base.effect;
@@ -146,7 +146,7 @@ static PetscErrorCode complain(Surfaces *b, const Wrong *worst)
            "width of %.3g m",
            e->name, b->multipliers.updates, name[0], name[1], (double)at.x[0], (double)at.x[1],
            (double)at.x[2], (double)at.by, (double)b->widths.w[0]);
-  if (has_multipliers(b))
+  if (has_multipliers(b) && fails)
     SbFormat(sizeof(b->contact.base.unsettled), b->contact.base.unsettled,
              "%s, and settle no further: -effect_%s_response barrier needs none; "
              "-effect_%s_multiplier_tolerance %.1g goes on all the same",
@@ -192,7 +192,9 @@ PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again)
     b->motion.known = PETSC_FALSE;
     *again = PETSC_TRUE;
   } else if (by > loose)
-    PetscCall(complain(b, &worst));
+    PetscCall(complain(b, &worst, PETSC_TRUE));
+  else if (has_multipliers(b) && by > PetscMax(tolerance, SETTLED))
+    PetscCall(complain(b, &worst, PETSC_FALSE));
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -139,6 +139,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
   PetscCall(SbPartnerBeginStep(t, dt, &c->contact.partner));
   c->contact.friction.updates = 0;
   c->first = PETSC_TRUE;
+  c->contact.base.unsettled[0] = 0;
   c->impact = 1;
   SbOverlapBegin(&c->contact.overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
@@ -290,6 +291,20 @@ static PetscErrorCode constrain_nodes(SbContact contact, SbSpace space, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Notes a node, if it is worse. */
+static void note(SbSpace space, const ContactNode *touch, const PetscReal u[], PetscReal by,
+                 NodePlace *worst)
+{
+  PetscReal x[3];
+
+  if ((double)by <= worst->by)
+    return;
+  place(space, touch->node, u, x);
+  *worst = (NodePlace){.by = (double)by,
+                       .x = {(double)x[0], (double)x[1], (double)x[2]},
+                       .body = space->node_body[touch->node]};
+}
+
 static PetscErrorCode update_nodes(SbContact contact, SbSpace space, const PetscReal u[],
                                    PetscBool *changed)
 {
@@ -334,6 +349,7 @@ static PetscErrorCode update_nodes(SbContact contact, SbSpace space, const Petsc
     }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
+  c->wrong.by = c->pulled.by = 0.;
   for (PetscInt i = 0; i < c->n; i++) {
     ContactNode *touch = &c->node[i];
     PetscReal error;
@@ -346,14 +362,21 @@ static PetscErrorCode update_nodes(SbContact contact, SbSpace space, const Petsc
         mine = PETSC_TRUE;
       touch->spring.idle = PETSC_FALSE;
     }
+    if (exact(c) && touch->facets.along >= 0 && touch->toggles >= NODE_TOGGLES &&
+        touch->lambda < -NODE_PULLED * largest)
+      note(space, touch, u, -touch->lambda / largest, &c->pulled);
     if (!(exact(c) ? SbNodeUpdate_Exact(c, largest, touch)
-                   : SbNodeUpdate_Springs(c, largest, touch)))
+                   : SbNodeUpdate_Springs(c, largest, touch))) {
       mine = PETSC_TRUE;
+      note(space, touch, u, 1., &c->wrong);
+    }
 
     /* stick and slip */
     if (c->contact.friction.mu <= 0 || !touch->on || touch->facets.along < 0)
       continue;
     error = SbFrictionUpdate(c, touch, contact_force(c, touch));
+    if (largest > 0.)
+      note(space, touch, u, PetscMin(1., error / (c->contact.friction.mu * largest)), &c->wrong);
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   c->first = PETSC_FALSE;
@@ -442,6 +465,62 @@ static PetscErrorCode warn_of_passing(Nodes *c, SbSpace space, PetscReal t, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The worst place of all ranks. Collective. */
+static PetscErrorCode find_worst(SbSpace space, NodePlace *place)
+{
+  struct {
+    double by;
+    int rank;
+  } most = {place->by, space->rank};
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE_INT, MPI_MAXLOC, space->comm));
+  PetscCallMPI(MPI_Bcast(place, (PetscMPIInt)sizeof(*place), MPI_BYTE, most.rank, space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which node changes still. */
+static PetscErrorCode explain_nodes(SbContact contact, SbSpace space, PetscInt rounds)
+{
+  Nodes *c = (Nodes *)contact;
+  const char *name = contact->effect->name;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_worst(space, &c->wrong));
+  if (c->wrong.by > 0.)
+    SbFormat(sizeof(contact->unsettled), contact->unsettled,
+             "effect %s: after %" PetscInt_FMT
+             " solves its active set has not settled: a node of %s at (%g, %g, %g) m touches the "
+             "obstacle and leaves it in turn, or its friction changes; -effect_%s_response barrier "
+             "has no active set",
+             name, rounds, space->mesh->body[c->wrong.body].name, c->wrong.x[0], c->wrong.x[1],
+             c->wrong.x[2], name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first warning of a node that ended the step that ended at t on the obstacle though it
+   pulls. */
+static PetscErrorCode warn_of_pull(Nodes *c, SbSpace space, PetscReal t)
+{
+  const char *name = c->contact.base.effect->name;
+
+  PetscFunctionBeginUser;
+  if (c->said || !exact(c))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_worst(space, &c->pulled));
+  if (c->pulled.by <= 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  c->said = PETSC_TRUE;
+  PetscCall(SbWarning(space->comm,
+                      "effect %s: in the step to %g a node of %s at (%g, %g, %g) m came to the "
+                      "obstacle %d times, and stays there though it pulls by %.2g of the largest "
+                      "contact force; said once: shorter steps, or -effect_%s_response barrier, "
+                      "which has no active set",
+                      name, (double)t, space->mesh->body[c->pulled.body].name, c->pulled.x[0],
+                      c->pulled.x[1], c->pulled.x[2], NODE_TOGGLES, c->pulled.by, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Nodes *c = (Nodes *)e->data;
@@ -451,6 +530,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   PetscFunctionBeginUser;
   PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   PetscCall(warn_of_passing(c, space, stage->t, &pose, stage->u));
+  PetscCall(warn_of_pull(c, space, stage->t));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);
@@ -497,6 +577,7 @@ static const SbContactOps constraint_ops = {
   .start_active_set = start_nodes,
   .assemble_constraints = constrain_nodes,
   .update_active_set = update_nodes,
+  .explain = explain_nodes,
   .time_of_impact = time_of_impact_nodes,
   .impact_work = SbContactImpactWork_Exact,
   .scale_restitution = SbContactScaleRestitution_Exact,
@@ -511,6 +592,7 @@ static const SbContactOps spring_ops = {
   .begin_step = begin_step_nodes,
   .start_active_set = start_nodes,
   .update_active_set = update_nodes,
+  .explain = explain_nodes,
   .time_of_impact = time_of_impact_nodes,
   .gap = SbContactGap_Nodes,
   .points = SbContactPoints_Nodes,

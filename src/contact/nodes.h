@@ -68,6 +68,13 @@ typedef struct {
   SbFrictionState friction;
 } ContactNode;
 
+/* A node for messages. */
+typedef struct {
+  double by;   /* 0: none; what is wrong, over the largest contact force */
+  double x[3]; /* m */
+  PetscInt body;
+} NodePlace;
+
 typedef struct {
   Contact contact;     /* first */
   PetscReal stiffness; /* factor on that of springs */
@@ -78,6 +85,9 @@ typedef struct {
   PetscBool passed;    /* the warning of nodes that passed through the obstacle was given */
   PetscReal impact;    /* fraction of the step at the first time of impact, 1: none */
   PetscReal size;      /* of the bodies, m */
+  NodePlace wrong;     /* a node that the last update changed */
+  NodePlace pulled;    /* the node that stays active against the largest pull */
+  PetscBool said;      /* the warning of such a node was given */
   PetscInt n;
   ContactNode *node; /* [n] */
 } Nodes;
@@ -85,6 +95,7 @@ typedef struct {
 #define NODE_TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
 #define NODE_TOGGLES 3      /* activations of a node within a step after which it stays active */
 #define NODE_PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define NODE_PULLED 1e-3  /* tension of a node that stays active all the same, for a warning */
 #define NODE_SETTLED 1e-4 /* tolerance of spring forces and of friction, over the largest */
 
 /* Whether active nodes are constrained exactly. */

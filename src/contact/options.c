@@ -99,6 +99,11 @@ static const SbOption rows[] = {
    "static "
    "runs and 1e-5 in time steps, augmented 1e-3, barrier and penalty 1e-3 in static runs, and no "
    "further solves in time steps"},
+  {"unsettled", SB_OPTION_CHOICE, 1, "", "auto", "auto|fail|barrier",
+   "between bodies: what happens to a step in which the forces of augmented, projected and "
+   "multiplier do not settle: fail: it is halved, and where that does not help the run ends; "
+   "barrier: it is repeated with the response barrier, with a warning; auto: barrier if the "
+   "response is the choice of auto, fail if it is given by name"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -263,6 +268,9 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
     "-effect_%s_multiplier_tolerance is of contact between bodies and of barrier: leave it "
     "out",
     e->name);
+  PetscCall(SbOptionGiven(scope, "unsettled", &given));
+  PetscCheck(!given || surfaces, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_unsettled is of contact between bodies: leave it out", e->name);
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
@@ -270,7 +278,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   c->base.restitution = c->bounce.e;
   if (surfaces)
-    PetscCall(SbSurfacesCreate(e, scope));
+    PetscCall(SbSurfacesCreate(e, scope, (PetscBool)(why != NULL)));
   else
     PetscCall(SbContactNodesCreate(e, scope));
   PetscFunctionReturn(PETSC_SUCCESS);

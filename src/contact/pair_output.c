@@ -297,6 +297,8 @@ PetscErrorCode SbEffectSummary_Surfaces(SbEffect e, SbSpace s, size_t size, char
   if (b->contact.friction.mu > 0.)
     SbAppend(size, text, ", friction lagged behind normal forces by at most %.2g of itself",
              (double)b->friction.most);
+  if (b->fall_back.n)
+    SbAppend(size, text, ", %" PetscInt_FMT " steps with the response barrier", b->fall_back.n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

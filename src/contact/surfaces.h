@@ -29,12 +29,14 @@ typedef struct {
   PairForce *pair; /* [n] in the order of pairs */
 } PairForces;
 typedef struct {
-  PairForces now;   /* of the next solve */
-  PairForces kept;  /* forces of the last accepted step, with which an attempt begins */
-  PetscInt updates; /* in this step */
-  PetscReal least;  /* smallest error of gaps of its solutions, over the width */
-  PetscInt stuck;   /* updates since */
-  PetscBool said;   /* the warning that they do not settle was given */
+  PairForces now;         /* of the next solve */
+  PairForces kept;        /* forces of the last accepted step, with which an attempt begins */
+  PetscInt updates;       /* in this step */
+  PetscReal least;        /* smallest error of gaps of its solutions, over the width */
+  PetscInt stuck;         /* updates since */
+  PetscBool said;         /* the warning that they do not settle was given */
+  PetscReal softer;       /* factor on the springs of exact constraints in load steps */
+  PetscReal begun, tried; /* load factor where the last attempt began, and its increment; 0: none */
 } Multipliers;
 
 /* A pair with friction in this step. */
@@ -159,9 +161,17 @@ typedef struct {
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
 } PairColumns;
 
+/* A step that is repeated with the barrier (fall_back.c). */
+typedef struct {
+  PetscBool may, now;  /* -effect_X_unsettled barrier; the next attempt has the barrier */
+  SbResponse response; /* of all other steps */
+  PetscInt n;          /* number of such steps */
+} FallBack;
+
 typedef struct {
   Contact contact; /* first */
   SurfaceOptions options;
+  FallBack fall_back;
   SbContactSurface surface;
   SbContactPairs pairs;
   SurfaceMotion motion;
@@ -206,7 +216,7 @@ static inline PetscBool has_multipliers(const Surfaces *b)
 /* Whether there is a table of multipliers: of forces, of friction, or of both. */
 static inline PetscBool has_table(const Surfaces *b)
 {
-  return (PetscBool)(has_multipliers(b) || b->options.sticks);
+  return (PetscBool)(b->contact.base.effect->nstate > PAIR_KEY);
 }
 
 /* How a pair resists. */
@@ -238,8 +248,9 @@ static inline PetscBool counts_spring(const Surfaces *b, const Spring *spring)
   return (PetscBool)b->surface->own[spring->at.v[k]];
 }
 
-/* Makes e, with its Contact, an effect of surfaces in contact. Not collective. */
-PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope);
+/* Makes e, with its Contact, an effect of surfaces in contact; by_auto: its response was chosen.
+   Not collective. */
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_auto);
 /* Positions at the local displacements u; pairs with gaps below the width, ordered by number.
    Collective. */
 PetscErrorCode SbSurfacesUpdate(Surfaces *b, const PetscReal u[]);
@@ -359,9 +370,15 @@ PetscErrorCode SbMultipliersUpdate(Surfaces *b, PetscBool *again);
 /* Keep: those of an accepted step. Restore: an attempt begins, perhaps after one that failed. */
 PetscErrorCode SbMultipliersKeep(Surfaces *b);
 PetscErrorCode SbMultipliersRestore(Surfaces *b);
+/* Steps with the barrier (fall_back.c). Begin: an attempt, with which response. */
+void SbSurfacesBeginResponse(Surfaces *b);
+PetscErrorCode SbContactFallBack_Surfaces(SbContact contact, SbSpace s, const char *why,
+                                          PetscBool *again);
 /* Exact constraints (exact_pairs.c). */
 PetscErrorCode SbContactConstraints_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                           SbConstraintRows *rows);
+PetscErrorCode SbContactHolding_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
+                                      SbConstraintRows *rows);
 
 /* Operations (sbcontact.h, sbeffect.h). */
 PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, PetscReal dt,

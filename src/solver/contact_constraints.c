@@ -81,30 +81,28 @@ PetscErrorCode SbConstraintRowsFree(SbConstraintRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* C with rows of unit length, and its transpose. */
-static PetscErrorCode create_rows(const SbConstraintRows *rows, Constrained *c)
+PetscErrorCode SbConstraintRowsMatrix(const SbConstraintRows *rows, MPI_Comm comm, PetscInt columns,
+                                      PetscReal length[], Mat *to)
 {
-  const MPI_Comm comm = PetscObjectComm((PetscObject)c->M);
   PetscInt *nonzero, *column;
   PetscReal *value;
-  PetscInt columns, first;
+  PetscInt first;
+  Mat C;
   PetscInt longest = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(rows->n, &c->length));
   PetscCall(PetscMalloc1(rows->n, &nonzero));
   for (PetscInt r = 0; r < rows->n; r++) {
     nonzero[r] = rows->start[r + 1] - rows->start[r];
     longest = PetscMax(longest, nonzero[r]);
   }
-  PetscCall(MatGetLocalSize(c->M, NULL, &columns));
-  PetscCall(MatCreate(comm, &c->C));
-  PetscCall(MatSetSizes(c->C, rows->n, columns, PETSC_DETERMINE, PETSC_DETERMINE));
-  PetscCall(MatSetType(c->C, MATAIJ));
-  PetscCall(MatSeqAIJSetPreallocation(c->C, 0, nonzero));
-  PetscCall(MatMPIAIJSetPreallocation(c->C, 0, nonzero, 0, nonzero));
-  PetscCall(MatSetOption(c->C, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
-  PetscCall(MatGetOwnershipRange(c->C, &first, NULL));
+  PetscCall(MatCreate(comm, &C));
+  PetscCall(MatSetSizes(C, rows->n, columns, PETSC_DETERMINE, PETSC_DETERMINE));
+  PetscCall(MatSetType(C, MATAIJ));
+  PetscCall(MatSeqAIJSetPreallocation(C, 0, nonzero));
+  PetscCall(MatMPIAIJSetPreallocation(C, 0, nonzero, 0, nonzero));
+  PetscCall(MatSetOption(C, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  PetscCall(MatGetOwnershipRange(C, &first, NULL));
 
   /* the entries of a row by column, each column once */
   PetscCall(PetscMalloc2(longest, &column, longest, &value));
@@ -126,16 +124,30 @@ static PetscErrorCode create_rows(const SbConstraintRows *rows, Constrained *c)
     }
     for (PetscInt k = 0; k < n; k++)
       square += value[k] * value[k];
-    c->length[r] = square > 0. ? PetscSqrtReal(square) : 1.;
+    length[r] = square > 0. ? PetscSqrtReal(square) : 1.;
     for (PetscInt k = 0; k < n; k++)
-      value[k] /= c->length[r];
-    PetscCall(MatSetValues(c->C, 1, &row, n, column, value, INSERT_VALUES));
+      value[k] /= length[r];
+    PetscCall(MatSetValues(C, 1, &row, n, column, value, INSERT_VALUES));
   }
   PetscCall(PetscFree2(column, value));
-  PetscCall(MatAssemblyBegin(c->C, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(c->C, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatTranspose(c->C, MAT_INITIAL_MATRIX, &c->Ct));
+  PetscCall(MatAssemblyBegin(C, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(C, MAT_FINAL_ASSEMBLY));
   PetscCall(PetscFree(nonzero));
+  *to = C;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* C with rows of unit length, and its transpose. */
+static PetscErrorCode create_rows(const SbConstraintRows *rows, Constrained *c)
+{
+  PetscInt columns;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(rows->n, &c->length));
+  PetscCall(MatGetLocalSize(c->M, NULL, &columns));
+  PetscCall(
+    SbConstraintRowsMatrix(rows, PetscObjectComm((PetscObject)c->M), columns, c->length, &c->C));
+  PetscCall(MatTranspose(c->C, MAT_INITIAL_MATRIX, &c->Ct));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

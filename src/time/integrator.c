@@ -133,6 +133,7 @@ static SbMethodSettings method_settings(SbRun run)
     set.alpha_f = f;
     set.beta = 0.25 * PetscSqr(1. + m - f);
     set.gamma = 0.5 + m - f;
+    set.separate = (PetscBool)(run->model->contacts.nrigid > 0);
   }
   return set;
 }
@@ -324,7 +325,8 @@ PetscErrorCode SbRunSetUpIntegrator(SbRun run)
   m->barrier_apart =
     (PetscBool)(m->contacts.npotential && run->solve.preset != SB_TIME_EULER_IMPLICIT);
   if (m->barrier_apart)
-    run->solve.barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
+    run->solve.barrier_weight =
+      (settings.separate ? 0.5 * settings.alpha_m / settings.beta : 1.) / settings.alpha_f;
   if (run->solve.preset != SB_TIME_ALPHA2)
     SbSecondOrderSet(run->solve.ts, run, &settings);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,6 +9,8 @@
   rounding. 2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the last
   solve's operator, D the
      diagonal of its matrix: free if l is zero, as neither springs nor friction nor stress resist.
+     Contact between bodies, which A lacks, counts as a row for each active pair, with the largest
+     entry of D as its stiffness.
 
   Not found: parts that are free only together, connected by contact. A part on springs whose
   stiffness is within the rounding of that of its cells counts as free.
@@ -152,14 +154,55 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* C: rows of contact between bodies at the state of the run, NULL without it. Collective; the
+   caller destroys it. */
+static PetscErrorCode find_rows(SbRun run, Mat *C)
+{
+  const SbModel m = run->model;
+  SbConstraintRows rows = {0};
+  PetscReal *length;
+
+  PetscFunctionBeginUser;
+  *C = NULL;
+  if (!m->contacts.npotential)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactSetHolding(&m->contacts, run->state.U, &rows));
+  PetscCall(SbConstraintRowsReserve(&rows, 1, 0));
+  PetscCall(PetscMalloc1(rows.n, &length));
+  PetscCall(SbConstraintRowsMatrix(&rows, m->comm, 3 * m->space->nnode_owned, length, C));
+  PetscCall(PetscFree(length));
+  PetscCall(SbConstraintRowsFree(&rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w = A z, with contact between bodies: + k C^T C z. */
+static PetscErrorCode multiply(SbRun run, Mat C, PetscReal k, Vec z, Vec w)
+{
+  Vec g, f;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatMult(run->solve.system, z, w));
+  if (!C)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatCreateVecs(C, NULL, &g));
+  PetscCall(VecDuplicate(w, &f));
+  PetscCall(MatMult(C, z, g));
+  PetscCall(MatMultTranspose(C, g, f));
+  PetscCall(VecAXPY(w, k, f));
+  PetscCall(VecDestroy(&f));
+  PetscCall(VecDestroy(&g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Of several free motions the message describes the first along or about an axis, if any. lost: Z -
    P Z. */
-static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
+static PetscErrorCode choose_axis(SbRun run, Vec d, Mat C, Vec lost[6], Vec z[6], Part *part)
 {
-  PetscReal off, on, stiffness, size;
+  PetscReal off, on, stiffness, size, most;
   Vec w;
 
   PetscFunctionBeginUser;
+  PetscCall(VecMax(d, NULL, &most));
   PetscCall(VecDuplicate(d, &w));
   for (int k = 0; k < 6; k++) {
     PetscCall(VecNorm(lost[k], NORM_2, &off));
@@ -168,7 +211,7 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
       continue;
     PetscCall(VecPointwiseMult(w, d, z[k]));
     PetscCall(VecDot(w, z[k], &size));
-    PetscCall(MatMult(run->solve.system, z[k], w));
+    PetscCall(multiply(run, C, most, z[k], w));
     PetscCall(VecDot(w, z[k], &stiffness));
     if (PetscAbsReal(stiffness) > FREE * size)
       continue;
@@ -181,17 +224,20 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
 }
 
 /* Finds the free motions of a part; along: displacements of one of them (may be NULL). */
-static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part, Vec along)
+static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Mat C, Part *part,
+                              Vec along)
 {
   const SbSpace s = run->model->space;
   const PetscScalar *u;
   PetscReal x[36], E[36], M[36], value[6];
+  PetscReal most;
   PetscInt n = 0;
   PetscBool ok;
   Vec *Z, *z;
 
   PetscFunctionBeginUser;
   part->nfree = 0;
+  PetscCall(VecMax(d, NULL, &most));
   PetscCall(measure(run, label, part));
   PetscCall(VecDuplicateVecs(d, 6, &Z));
   PetscCall(VecDuplicateVecs(d, 6, &z));
@@ -248,7 +294,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     for (PetscInt j = 0; j < n; j++) {
       PetscCall(VecPointwiseMult(w, d, y[j]));
       PetscCall(VecMDot(w, j + 1, y, M + 6 * j));
-      PetscCall(MatMult(run->solve.system, y[j], w));
+      PetscCall(multiply(run, C, most, y[j], w));
       PetscCall(VecMDot(w, j + 1, y, E + 6 * j));
     }
     PetscCall(eigen(n, E, M, value, &ok));
@@ -268,7 +314,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     PetscCall(VecDestroy(&w));
   }
   if (part->nfree > 1)
-    PetscCall(choose_axis(run, d, Z, z, part));
+    PetscCall(choose_axis(run, d, C, Z, z, part));
   if (part->nfree && along) {
     PetscCall(VecZeroEntries(along));
     PetscCall(VecMAXPY(along, 6, part->motion, z));
@@ -353,6 +399,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscBool diagonal;
   Part part;
   Vec d;
+  Mat C;
 
   PetscFunctionBeginUser;
   *body = -1;
@@ -364,6 +411,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(SbSpaceCreateVec(s, &d));
   PetscCall(MatGetDiagonal(run->solve.J, d));
   PetscCall(VecAbs(d));
+  PetscCall(find_rows(run, &C));
   PetscCall(label_parts(s, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
@@ -373,7 +421,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(PetscSortInt(npart, list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
     part.label = list[k];
-    PetscCall(examine(run, label, d, &part, along));
+    PetscCall(examine(run, label, d, C, &part, along));
     if (part.nfree)
       *body = part.body;
   }
@@ -391,6 +439,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(PetscFree(label));
   PetscCall(PetscFree(own));
   PetscCall(PetscFree(list));
+  PetscCall(MatDestroy(&C));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,9 +17,15 @@
     u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f
     v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
 
-  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta),
-  and damping the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f over u1 - u0 is at most
-  the decrease of B, as B is convex: contact only dissipates.
+  (the equation of a is that of generalized-alpha at its stage). Newmark's formula for a1 then gives
+  a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta), and damping the velocity 2 (u1 - u0)
+  / h - v0. The work of the impulse h f over u1 - u0 is at most the decrease of B, as B is convex:
+  contact only dissipates.
+
+  With multipliers (SbContact.rigid) generalized-alpha has contact in the same way, with the weight
+  alpha_m / (2 beta alpha_f) in its residual. As a force at the end of the step an impact is in a1
+  once more in the step that follows: with rho = 1/2 a node that meets a wall with V leaves with
+  1.25 V. As an impulse it leaves with V at most.
 
   The acceleration is part of the state (run->state.A), so a restart continues exactly. A step may
   be repeated once, up to the first time of impact; the remainder is the next step (solve.c). A
@@ -103,7 +109,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
     PetscCall(
       VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, A0));
     PetscCall(VecCopy(so->V0, so->V1));
-    if (so->set.separate)
+    if (so->set.separate && !so->Xa)
       PetscCall(VecAXPBYPCZ(so->V1, 2. / h, -2. / h, -1., X, so->X0));
     else
       PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., A0, so->A1));
@@ -163,7 +169,7 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   (void)snes;
   PetscCall(stage_state(ts, X, &t));
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
-    shift_v = so->set.separate ? 2. / h : so->set.gamma / (so->set.beta * h);
+    shift_v = so->set.separate && !so->Xa ? 2. / h : so->set.gamma / (so->set.beta * h);
     shift_a = so->set.alpha_m / (so->set.alpha_f * so->set.beta * h * h);
   }
   PetscCall(TSComputeI2Jacobian(ts, t, so->U, so->V, so->A, shift_v, shift_a, J, P));
@@ -304,8 +310,10 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     char why[512] = "";
     const char *what = SNESConvergedReasons[reason];
 
-    if (reason > 0)
-      what = unsettled[0] ? unsettled : "the solution is not finite, or beyond 1e15 m";
+    if (unsettled[0])
+      what = unsettled;
+    else if (reason > 0)
+      what = "the solution is not finite, or beyond 1e15 m";
     else if (reason == SNES_DIVERGED_LINEAR_SOLVE)
       PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else

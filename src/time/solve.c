@@ -191,6 +191,7 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
     forget_tangent(run);
     PetscCall(SbRunStopAsked(run, run->clock.step, run->clock.t, PETSC_TRUE));
     if (run->clock.stopped || round == ROUNDS) {
+      PetscCall(SbContactSetExplain(&m->contacts, round));
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }

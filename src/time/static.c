@@ -168,8 +168,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       PetscCall(SbContactSetNearest(&l->run->model->contacts, sizeof(near), near));
       SbRunSuspects(l->run, sizeof(near), near);
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
-                          reason > 0 && unsettled[0] ? unsettled : SNESConvergedReasons[reason],
-                          why, near[0] ? "; " : "", near));
+                          unsettled[0] ? unsettled : SNESConvergedReasons[reason], why,
+                          near[0] ? "; " : "", near));
     }
   }
 

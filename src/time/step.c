@@ -87,11 +87,12 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscBool again = PETSC_TRUE;
   PetscBool warm = PETSC_FALSE;
   PetscInt follows = 0;
+  int asked = 0;
 
   PetscFunctionBeginUser;
   if (!m->dynamic)
     PetscCall(SbModelFollowJumps(m, step->t, step->U0, SB_STEPS_OF_LOAD, NULL));
-  for (int solves = 0; again; solves++) {
+  while (again) {
     /* begin: effects move, surfaces are updated, candidates of contact are found; a guess */
     PetscCall(SbRunBeginSolve(run, a, warm));
 
@@ -102,9 +103,17 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, ok));
 
+    /* a response whose forces do not settle may go on with another one */
+    again = PETSC_FALSE;
+    if (!*ok && reason != SNES_CONVERGED_ITERATING && !run->clock.stopped)
+      PetscCall(SbContactSetFallBack(&m->contacts, run->clock.stop_reason, &again));
+    if (again)
+      continue;
+
     /* the penalty on jumps is that of an earlier state: repeat a load step with that of its end */
     if (*ok && !m->dynamic) {
       PetscCall(SbRunRepeatForJumps(run, step->t + step->dt, step->U, &follows, &warm));
+      again = warm;
       if (warm)
         continue;
     }
@@ -112,7 +121,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
-    if (*ok && run->monitors.post_solve.fn && solves < SB_MAX_RESOLVES)
+    if (*ok && run->monitors.post_solve.fn && asked++ < SB_MAX_RESOLVES)
       PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, &again));
   }
 

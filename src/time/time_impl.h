@@ -21,7 +21,7 @@ typedef struct {
   PetscReal alpha_m, alpha_f, beta,
     gamma;            /* generalized-alpha; fractions of the new state, as in TSALPHA2 */
   PetscBool impulses; /* Newmark with contact */
-  PetscBool separate; /* Newmark with barrier contact: the acceleration excludes it */
+  PetscBool separate; /* the acceleration excludes contact's potential, whose impulse is separate */
 } SbMethodSettings;
 
 static inline PetscBool SbRunIsExplicit(SbRun run)

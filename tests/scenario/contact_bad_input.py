@@ -2,7 +2,8 @@
 wrong, or the correct motion.
 
 Bodies that overlap, that are in the same place, that touch, also where both are held; a thin body and a thin obstacle that are hit by more than their thickness in a
-step; an obstacle with an open surface; one that jumps over a body.
+step; an obstacle with an open surface; one that jumps over a body. Two effects for the same surfaces, which would double forces, are refused;
+different surfaces of the same bodies are not.
 @ranks 1 2
 @cpu 120
 """
@@ -74,6 +75,26 @@ for response in ALL:
     code, text, last = run("jump", ONE + PLATE.format(0.11, 0.13) + "-effect_meet_displacement 0;0;-0.2*min(max(1e6*(t-0.025),0),1)", response)
     said = "effect meet" in text and ("passed through the obstacle" if nodes else "a and the obstacle are") in text
     check(f"jump {response}", said and code == (0 if nodes else 1), text)
+
+    # two effects for the same surfaces
+    apart = TWO + BODY.format("b", "0.1,0.1,0.1:2", "0,0,0.2")
+    again = f"-effect_again_type contact -effect_again_response {response} "
+    code, text, _ = run("twice", apart.replace("hold,meet", "hold,meet,again") + again + "-effect_again_friction 0.5", response)
+    check(f"twice {response}", code == 1 and "error: " in text and "effect_meet_on" in text and "effect_again_on" in text
+          and "body a with body b" in text, text)
+    selves = apart.replace("hold,meet", "hold,meet,again") + again + "-effect_meet_self yes -effect_again_self yes -effect_meet_on a -effect_again_on a "
+    code, text, _ = run("selves", selves, response)
+    check(f"selves {response}", code == 1 and "effect_meet_self" in text and "effect_again_self" in text and "body a with itself" in text, text)
+    sides = "-effect_meet_on a.zmax,b.zmin -effect_again_on a.zmax,b.zmax "
+    code, text, _ = run("sides", apart.replace("hold,meet", "hold,meet,again") + again + sides, response)
+    check(f"sides {response}", code == 0, text)
+    floor = "-effect_{0}_obstacle plane:0,0,{1},-0.01 "
+    floors = ONE.replace("hold,meet", "hold,meet,again") + again
+    code, text, _ = run("floors", floors + floor.format("meet", 1) + floor.format("again", 1), response)
+    check(f"floors {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text and "body a" in text, text)
+    other = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_again_displacement 0;0;-t"
+    code, text, _ = run("other", other, response)
+    check(f"other {response}", code == 0, text)
 
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)

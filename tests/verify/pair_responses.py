@@ -2,7 +2,7 @@
 
 Patch test: two blocks, one on the other, with meshes that do not match and sides that cannot move outwards, are pressed with 1e4 Pa: the
 stress is uniform, exactly so for multiplier and projected. A cube flies into another: momentum stays, no energy is made, nothing passes
-through anything, and no pair pulls. Multipliers that do not settle. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
+through anything, and no pair pulls. A block lands with generalized-alpha. Multipliers that do not settle. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
 import csv
@@ -80,6 +80,29 @@ def check_patch():
                   f"{name}: gap {found['meet_gap'][-1]} m, not {width}")
 
 
+def check_scaling():
+    """Blocks that touch without a force: displacements over the load do not depend on it, but for the rotation of surfaces and their slip along
+    each other, of the order of displacement over size. Vertices of the upper block lie above edges of the lower one, and part of it lifts off."""
+    blocks = ("-bodies a,b " + BODY.format("a", "1,1,0.5:2", "0,0,0", "linear", "1e6", "0.3")
+              + BODY.format("b", "0.8,0.8,0.4:4", "0.1,0.1,0.501", "linear", "2e6", "0.3")
+              + "-effects bottom,press,held,meet -effect_bottom_type fixed -effect_bottom_on a.zmin -effect_held_type fixed -effect_held_on b.zmax "
+              "-effect_held_components xy -effect_press_type traction -effect_press_on b.zmax -effect_meet_type contact "
+              "-effect_meet_barrier_width 1e-3 -time static -output_precision double ")
+    for response in EXACT:
+        found = []
+        for load in 1, 10, 100:
+            name = f"scaling-{response}-{load}"
+            shutil.rmtree(OUT / name, ignore_errors=True)
+            run(name, blocks + f"-effect_meet_response {response} -effect_press_vector 0;0;-{load}*(1+2*x)")
+            with h5py.File(OUT / name / "fields.h5") as f:
+                last = f["step"][sorted(f["step"])[-1]]
+                last = last[sorted(last)[-1]] if "displacement" not in last else last
+                found.append(last["displacement"][:] / load)
+        off = [abs(u - found[0]).max() / abs(found[0]).max() for u in found[1:]]
+        print(f"  scaling-{response}: displacements over loads 10 and 100 times as large differ by {off[0]:.1e} and {off[1]:.1e}")
+        check(off[0] < 1e-4 and off[1] < 1e-3, f"scaling-{response}: displacements are not proportional to the load: {off}")
+
+
 def check_flight():
     for response in ALL:
         name = f"fly-{response}"
@@ -94,6 +117,29 @@ def check_flight():
         check(moved < 1e-9, f"{name}: momentum changes by {moved:.3g} of itself")
         rise = (energy - energy[0]).max() / energy[0]
         check(rise < 1e-3, f"{name}: energy rises by {rise:.3g} of itself")
+
+
+def check_impulse():
+    """Generalized-alpha: a block lands on one that is held, so that all momentum is its own. No energy is gained (as a force of the equation
+    contact gave 2 to 7 % of it), and momentum changes by h times weight and contact force."""
+    lands = (DROP.replace("2,0,-9.6", "0,0,-9.81").replace("0.102", "0.132").replace("friction 0.4", "pairs yes").replace("euler_implicit", "genalpha")
+             .replace("-ts_dt 0.005", "-ts_dt 0.001") + "-ts_max_time 0.12 ")
+    for response in ("augmented", "multiplier", "projected"):
+        for held in ("a", "a.zmin"):
+            name = f"impulse-{response}-{held}"
+            run(name, lands.replace("a.zmin", held) + f"-effect_meet_response {response} -output_fields none ")
+            found = history(name)
+            energy = found["kinetic"] + found["strain"] - found["load_work"]
+            first = int((found["meet_contacts"] > 0).argmax())
+            fall = found["kinetic"][:first].max()
+            gain = (energy[first:].max() - energy[first - 1]) / fall
+            print(f"  {name}: energy {gain:+.1e} of that before the impact")
+            check(first > 10 and gain < 1e-3, f"{name}: energy grows by {gain:.3g} of that before the impact")
+            if held == "a":
+                force = found["meet_a_b_force_z"][1:]
+                off = abs(numpy.diff(found["momentum_z"]) / 0.001 - (force - 9.81)).max() / force.max()
+                print(f"  {name}: momentum {off:.1e} off")
+                check(off < 1e-3, f"{name}: momentum changes by {off:.3g} of the contact force too much")
 
 
 def check_fast():
@@ -112,7 +158,7 @@ def check_fast():
 
 def check_unsettled():
     """Multipliers that do not settle: a time step is cut, and said why; where it cannot be, that is an error with the pair, the place and what
-    helps; a looser tolerance goes on."""
+    helps; a looser tolerance goes on, and so does the barrier, also after a restart."""
     fast = ("-bodies a,b " + BODY.format("a", "0.1,0.1,0.1:1", "0,0,0", "neohookean", "1e5", "0.3")
             + BODY.format("b", "0.1,0.1,0.1:1", "0.02,0.03,0.11", "neohookean", "1e5", "0.3")
             + "-body_b_velocity 0,0,-20 -effects meet -effect_meet_type contact -effect_meet_verify yes -ts_dt 0.001 -ts_max_time 0.005 "
@@ -123,6 +169,21 @@ def check_unsettled():
         check(history(f"cut-{ranks}")["rejected"].max() > 0 and re.search(words, text), f"cut-{ranks}: not said why steps were cut\n{text}")
     text = run("uncut", fast + "-time_max_halvings 0", code=1)
     check(re.search("error: step .*" + words, text), f"uncut: no reason\n{text}")
+    for ranks in 1, 2:
+        text = run(f"fall-{ranks}", fast + "-effect_meet_unsettled barrier -output_fields none", ranks)
+        found = history(f"fall-{ranks}")
+        energy = found["kinetic"] + found["strain"]
+        check(re.search(words + ".*goes on with the response barrier", text) and text.count("goes on with the response barrier") == 1,
+              f"fall-{ranks}: not said that steps have the barrier\n{text}")
+        check(found["rejected"].max() == 0 and energy.max() < 201 and abs(found["momentum_z"][-1] / found["momentum_z"][0] - 1) < 1e-6,
+              f"fall-{ranks}: {found['rejected'].max()} rejected steps, energy {energy.max()} J, momentum {found['momentum_z'][-1]}")
+    check(abs(history("fall-1")["strain"] - history("fall-2")["strain"]).max() < 1e-3, "fall: ranks differ")
+    shutil.rmtree(OUT / "fall-half", ignore_errors=True)
+    half = fast + "-effect_meet_unsettled barrier -output_fields none -checkpoint_every_steps 2 "
+    run("fall-half", half.replace("-ts_max_time 0.005", "-ts_max_time 0.002"))
+    run("fall-half", half + "-restart latest", 2)
+    off = abs(history("fall-half")["strain"] - history("fall-1")["strain"]).max()
+    check(off < 1e-3, f"fall: strain {off} J off after a restart")
     text = run("loose", fast + "-effect_meet_multiplier_tolerance 1e3")
     check("updates" not in text and history("loose")["rejected"].max() == 0, f"loose: {text}")
 
@@ -178,7 +239,9 @@ def check_refusals():
 
 
 check_patch()
+check_scaling()
 check_flight()
+check_impulse()
 check_fast()
 check_unsettled()
 check_ranks()
