@@ -359,6 +359,7 @@ typedef enum {
   SB_EVENT_PROJECT,     /* within solves: into the null space of the contact constraints */
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_CONTACT_SOLVE, /* systems with blocks of contact, without PETSc's KSPSolve */
+  SB_EVENT_STABILITY,     /* negative eigenvalues of static tangents, with what that takes */
   SB_EVENT_OUTPUT,
   SB_EVENT_CHECKPOINT,
   SB_EVENT_COUNT

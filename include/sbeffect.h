@@ -31,6 +31,11 @@ typedef struct {
      chord, J */
   PetscErrorCode (*turning_work)(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
                                  const PetscReal r0[], const PetscReal r1[], PetscReal *work);
+  /* * moving supports: adds, over its own nodes with all three displacements, for their positions
+     x0 at t0 and x1 at t1 relative to any point, m: 1, x0[3], x1[3], x1 x0^T [9] (row-major); with
+     displacements times factor[2] */
+  PetscErrorCode (*moments)(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
+                            const PetscReal factor[2], PetscReal sum[16]);
   /* f += external force; of contact: but that of constraints */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), for (a, b) and for

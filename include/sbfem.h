@@ -283,6 +283,9 @@ void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscRe
 /* Adds rest volumes of owned cells of the law `linear`, m^3: of all of them, and of those that are
    turned by more than `angle`, rad. Local: reduce them. */
 void SbSpaceTurned(SbSpace space, const PetscReal u[], PetscReal angle, PetscReal volume[2]);
+/* The same of all other laws, of cells that turn by more than `angle` between two displacements. */
+void SbSpaceTurnedBetween(SbSpace space, const PetscReal u0[], const PetscReal u1[],
+                          PetscReal angle, PetscReal volume[2]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL),
    smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
 void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,

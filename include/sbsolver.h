@@ -97,6 +97,40 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace space, size_t size, char text
 */
 PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
 
+/* ---- negative eigenvalues of a symmetric matrix K (negative_modes.c) */
+
+/*
+  K and a symmetric positive definite M, the nearer to K the better; both in the subspace of
+  `start`. All operations are collective.
+
+    multiply - y = K x
+    solve    - z = M^-1 r
+*/
+typedef struct {
+  PetscErrorCode (*multiply)(void *ctx, Vec x, Vec y);
+  PetscErrorCode (*solve)(void *ctx, Vec r, Vec z);
+  void *ctx; /* of both; borrowed */
+} SbPencil;
+
+typedef struct {
+  PetscBool known;    /* all of the following, as far as `definite` */
+  PetscInt negative;  /* number of negative eigenvalues */
+  PetscBool more;     /* at least so many */
+  PetscBool definite; /* M is, as far as it was seen; else nothing is known */
+  PetscInt solves;    /* with M */
+} SbInertia;
+
+/*
+  SbNegativeModes - whether K has negative eigenvalues, how many, and the mode of the lowest one of
+  the pencil (K, M).
+
+  Collective. Input: start, a right-hand side with a part along every mode; scale, the absolute
+  values of K's diagonal, for the rounding below which an eigenvalue counts as zero; most, the
+  largest number that is looked for. Output: mode, if there is one.
+*/
+PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, PetscInt most,
+                               Vec mode, SbInertia *found);
+
 /* ---- systems with constraints outside of the matrix (constraint_operator.c) */
 
 /* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the
@@ -153,6 +187,13 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
 PetscErrorCode SbContactSystemSolve(SbContactSystem system, Mat K, const SbBlocks *blocks,
                                     PetscBool fresh, Vec F, Vec Y, KSPConvergedReason *reason,
                                     PetscInt *iterations);
+
+/* z = M^-1 r, M the factor of the last system or the preconditioner of CG for it. Collective. */
+PetscErrorCode SbContactSystemPrecondition(SbContactSystem system, Vec r, Vec z);
+
+/* A = K + blocks as a matrix, lent until the next call. Collective. */
+PetscErrorCode SbContactSystemGetMatrix(SbContactSystem system, Mat K, const SbBlocks *blocks,
+                                        Mat *A);
 
 /* Rows of constraints between any nodes, on the rank that counts them: C Y - force / stiffness =
    goal. Start with {0}; release with SbConstraintRowsFree(). */

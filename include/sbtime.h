@@ -186,6 +186,23 @@ typedef struct {
   int contact_choice; /* -contact_solver: likewise */
 } SbRunSolver;
 
+/* -static_unstable */
+typedef enum {
+  SB_UNSTABLE_WARN,
+  SB_UNSTABLE_ERROR,
+  SB_UNSTABLE_IGNORE
+} SbUnstable;
+
+/* Stability of static equilibria (stability.c). */
+typedef struct {
+  int action;                           /* SbUnstable; SB_UNSTABLE_IGNORE in a dynamic run */
+  Mat K;                                /* exact tangent; owned; NULL before the first use */
+  PetscBool warned;                     /* that the last equilibrium is unstable */
+  PetscReal since;                      /* load factor at which it became so */
+  PetscInt nknown, nunknown, nunstable; /* load steps: examined, without a result, unstable */
+  char text[512];                       /* what is unstable at the last such step */
+} SbRunStability;
+
 /* Totals of the run, kept over re-meshings; iterations are those of Newton and of linear solves. */
 typedef struct {
   PetscInt steps, newton, linear, rejected; /* accepted steps, iterations, rejected attempts */
@@ -193,6 +210,7 @@ typedef struct {
   PetscInt newton_before, linear_before; /* iterations of the runs before a re-meshing */
   PetscInt rejected_seen;                /* rejected attempts up to the last step */
   PetscInt contact_rounds; /* active-set iterations of this step, 0: without contact */
+  PetscInt turned;         /* load steps that were cut as they would turn supports or cells far */
   PetscInt bifurcations;   /* arc length: detected by changes of negative pivots */
   PetscReal seconds_solve; /* wall time of the time loop */
 } SbRunCounters;
@@ -248,6 +266,7 @@ struct _p_SbRun {
   SbRunClock clock;
   SbRunSolver solve;
   SbRunCounters counters;
+  SbRunStability stability;
   SbRunMonitors monitors;
 };
 
@@ -261,6 +280,9 @@ struct _p_SbRun {
   accumulate.
 */
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
+/* The time of the acceleration at the end of a step of length dt, less that end, s; before: the
+   same at its start. That of generalized-alpha lies within the step. Not collective. */
+PetscReal SbRunAccelerationShift(SbRun run, PetscReal dt, PetscReal before);
 /* X = (K + H)^-1 B, K the last tangent, H the Hessian of barrier contact; solved: any contact.
    Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);

@@ -16,7 +16,7 @@ PetscErrorCode SbLogInitialize(void)
     "SbMeshRead",   "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual",
     "SbTangent",    "SbEnergy",      "SbEffects",    "SbContact",     "SbSearch",
     "SbSearchHash", "SbSearchTree",  "SbProject",    "SbSolverSetUp", "SbContactSolve",
-    "SbOutput",     "SbCheckpoint",
+    "SbStability",  "SbOutput",      "SbCheckpoint",
   };
   static const char *const stages[3] = {"Setup", "Solve", "Output"};
   PetscLogStage *const numbers[3] = {&SbLogStageSetup, &SbLogStageSolve, &SbLogStageOutput};

@@ -200,6 +200,44 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode moments_support(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
+                                      const PetscReal factor[2], PetscReal sum[16])
+{
+  const Support *d = (Support *)e->data;
+  const PetscReal t[2] = {t0, t1};
+  PetscReal sine[2][2] = {{0.}};
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) {
+    PetscReal theta = 0.;
+
+    if (d->path.angle)
+      PetscCall(SbFormulaEval(d->path.angle, t[k], NULL, &theta));
+    sine[k][0] = PetscSinReal(theta * PETSC_PI / 180.);
+    sine[k][1] = PetscSinReal(theta * PETSC_PI / 360.);
+  }
+  for (PetscInt i = 0; i < d->nowned; i++) {
+    const PetscReal *X = &space->node_x[3 * d->node[i]];
+    PetscReal x[2][3];
+
+    if (d->bits[i] != 7)
+      continue;
+    for (int k = 0; k < 2; k++) {
+      PetscCall(displacement_at(d, t[k], X, sine[k], x[k]));
+      for (int c = 0; c < 3; c++)
+        x[k][c] = X[c] - d->path.point[c] + factor[k] * x[k][c];
+    }
+    sum[0] += 1.;
+    for (int c = 0; c < 3; c++) {
+      sum[1 + c] += x[0][c];
+      sum[4 + c] += x[1][c];
+      for (int q = 0; q < 3; q++)
+        sum[7 + 3 * c + q] += x[1][c] * x[0][q];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Name of the first effect that prescribes a component of a node. */
 static const char *owner(PetscInt n, SbEffect effect[], PetscInt node, int component)
 {
@@ -351,6 +389,7 @@ const SbEffectType SbEffectPrescribedDisplacement = {
           .setup = setup_support,
           .prescribe = prescribe_support,
           .turning_work = turning_work_support,
+          .moments = moments_support,
           .history = history_support,
           .destroy = destroy_support},
 };

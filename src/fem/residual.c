@@ -326,6 +326,29 @@ void SbSpaceTurned(SbSpace s, const PetscReal u[], PetscReal angle, PetscReal vo
   }
 }
 
+void SbSpaceTurnedBetween(SbSpace s, const PetscReal u0[], const PetscReal u1[], PetscReal angle,
+                          PetscReal volume[2])
+{
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    SbPack F[SB_POINTS][9], R[2][9];
+
+    if (s->batch_region[b]->material->linear)
+      continue;
+    for (int k = 0; k < 2; k++) {
+      SbBatchState(s, b, k ? u1 : u0, F, NULL, NULL, NULL);
+      SbPolar((const SbPack *)F[0], R[k]);
+    }
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      PetscReal trace = 0.;
+
+      for (int e = 0; e < 9; e++)
+        trace += R[0][e][l] * R[1][e][l];
+      volume[0] += s->batch_V[b][l];
+      volume[1] += (trace - 1.) / 2. < PetscCosReal(angle) ? s->batch_V[b][l] : 0.;
+    }
+  }
+}
+
 PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[],
                                    PetscReal *power)
 {

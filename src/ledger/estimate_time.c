@@ -12,7 +12,7 @@
 
   are also bounds; the smallest of them and of the sum is used. (With implicit Euler and j = 1 it is
   the energy dissipated by the method.) Derivatives are finite differences of the accelerations,
-  which the integrators store (second_order.c).
+  which the integrators store (second_order.c), at the times to which they belong.
 */
 #include "ledger_impl.h"
 
@@ -32,6 +32,8 @@ static PetscErrorCode derivative_energy(SbLedger l, const SbSolvedStep *step, Ve
 PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all)
 {
   const PetscReal h = step->dt;
+  const PetscReal gap =
+    l->order == 2 ? h + SbRunAccelerationShift(l->run, h, l->shift) - l->shift : h;
   Vec rate = l->w[0];
   Vec second = l->delta;
   PetscReal mass;
@@ -40,7 +42,7 @@ PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool al
   if (all)
     PetscCall(derivative_energy(l, step, step->V, step->A, &l->derivative[1]));
   PetscCall(VecWAXPY(rate, -1., step->A0, step->A));
-  PetscCall(VecScale(rate, 1. / h));
+  PetscCall(VecScale(rate, 1. / gap));
 
   /* implicit Euler starts without an acceleration; after re-meshing no integrator has a valid
      one */
@@ -52,7 +54,7 @@ PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool al
     PetscCall(VecCopy(rate, second));
     if (l->before && l->before_dt > 0.) {
       PetscCall(VecAXPBYPCZ(second, -1. / l->before_dt, 1. / l->before_dt, 1., l->kept, l->before));
-      PetscCall(VecScale(second, 2. / (h + l->before_dt)));
+      PetscCall(VecScale(second, 2. / (gap + l->before_dt)));
     } else
       PetscCall(VecZeroEntries(second));
     PetscCall(derivative_energy(l, step, rate, second, &l->derivative[3]));

@@ -94,8 +94,13 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   if (step->A0 && l->order == 2 && (!l->kept || step->t != l->kept_t)) {
     Vec spare = l->before;
 
-    if (l->kept)
+    if (l->kept) {
+      const PetscReal shift = l->shift;
+
       l->before_dt = step->t - l->kept_t;
+      l->shift = SbRunAccelerationShift(run, l->before_dt, shift);
+      l->before_dt += l->shift - shift;
+    }
     l->before = l->kept;
     l->kept = spare;
     if (!l->kept)

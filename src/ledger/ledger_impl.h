@@ -107,9 +107,10 @@ struct _p_SbLedger {
   PetscBool anew;      /* after re-meshing: old accelerations are not in equilibrium */
 
   Vec kept, before; /* accelerations at the start of this step and of the one before, m/s^2 */
-  PetscReal kept_t, before_dt; /* time of `kept`; length of the step before, 0: none; s */
-  Vec w[3];                    /* work vectors */
-  Vec delta;                   /* error of the solve, m, for the quantity */
+  PetscReal kept_t; /* start of the step, whose acceleration is `kept`, s */
+  PetscReal shift, before_dt; /* time of `kept` less that; less the time of `before`, 0: none; s */
+  Vec w[3];                   /* work vectors */
+  Vec delta;                  /* error of the solve, m, for the quantity */
 
   PetscReal work,
     own_work; /* work of the run and of estimates, in residual evaluations: reproducible */

@@ -311,6 +311,17 @@ PetscErrorCode SbReportSummary(SbRun run)
         "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
         " Newton and %" PetscInt_FMT " linear iterations",
         run->counters.steps, run->counters.rejected, run->counters.newton, run->counters.linear);
+  if (run->counters.turned)
+    entry("",
+          "%" PetscInt_FMT " load steps were cut, in which supports would turn by more than 30 "
+          "degrees, or cells turned by more than 90 (-static_adapt)",
+          run->counters.turned);
+  if (run->stability.nunstable)
+    entry("", "%" PetscInt_FMT " of %" PetscInt_FMT " equilibria examined are unstable",
+          run->stability.nunstable, run->stability.nknown);
+  if (run->stability.nunknown)
+    entry("", "the stability of %" PetscInt_FMT " of %" PetscInt_FMT " equilibria is not known",
+          run->stability.nunknown, run->stability.nknown + run->stability.nunknown);
   if (run->solve.solver_parts[0]) {
     PetscCall(SbSolverDescribe(run->solve.snes, run->model->space, sizeof(solver), solver));
     if (strcmp(solver, run->solve.solver_parts))

@@ -134,6 +134,12 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   if (out->nremeshed)
     put(f, "\n  ],\n");
 
+  // stability of static equilibria
+  if (phases && !m->dynamic)
+    put(f, "  'equilibria': {'known': $d, 'unstable': $d, 'unknown': $d},\n  'steps_cut': $d,\n",
+        run->stability.nknown, run->stability.nunstable, run->stability.nunknown,
+        run->counters.turned);
+
   // cost: steps, iterations, seconds, memory, files
   if (phases) {
     SbOutputFileSize *file;

@@ -430,6 +430,30 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSystemPrecondition(SbContactSystem c, Vec r, Vec z)
+{
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (c->factor && !c->stale_values[FACTOR])
+    PetscCall(SbBlockSolverSolve(c->factor, r, z));
+  else if (c->ksp && !c->stale_values[MATRIX]) {
+    PetscCall(KSPGetPC(c->ksp, &pc));
+    PetscCall(PCApply(pc, r, z));
+  } else
+    PetscCall(VecSet(z, PETSC_INFINITY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSystemGetMatrix(SbContactSystem c, Mat K, const SbBlocks *blocks, Mat *A)
+{
+  PetscFunctionBeginUser;
+  PetscCall(merge(c, K, blocks));
+  PetscCall(set_up_iteration(c));
+  *A = c->A;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* z = M^-1 r by the factor. */
 static PetscErrorCode apply_factor(PC pc, Vec r, Vec z)
 {

@@ -421,6 +421,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   PetscInt its;
   PetscBool last = (PetscBool)(factor == 1.);
   PetscBool known = PETSC_FALSE;
+  PetscBool unstable = PETSC_FALSE;
   PetscBool ok;
   Path p = {.run = run, .negative = -1};
 
@@ -476,11 +477,14 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     }
     if (!last)
       PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
-    last = (PetscBool)(last || clock->stopped);
+    PetscCall(SbRunCheckStable(run, p.factor, last, &unstable));
+    last = (PetscBool)(last || clock->stopped || unstable);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;
   }
-  if (clock->stop_reason[0] && !clock->stopped && !run->solve.rejected_inverted)
+  if (unstable)
+    PetscCall(SbRunFail(run, "%s", run->stability.text));
+  else if (clock->stop_reason[0] && !clock->stopped && !run->solve.rejected_inverted)
     PetscCall(explain_end(run, factor, l));
   for (int k = 0; k < 9; k++)
     PetscCall(VecDestroy(&p.all[k]));

@@ -296,6 +296,11 @@ PetscErrorCode SbPotentialDestroy(SbPotential *potential)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+SbContactSystem SbPotentialContactSystem(SbPotential q)
+{
+  return q && q->nblock ? q->system : NULL;
+}
+
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved)
 {
   const SbPotential q = run->solve.potential;

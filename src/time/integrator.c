@@ -93,6 +93,10 @@ const SbOption SbTimeRows[] = {
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
    "static: smallest load increment, as a fraction of a load step; below it the run stops, and "
    "says whether a limit load is likely"},
+  {"static_unstable", SB_OPTION_CHOICE, 1, "", "warn", "warn|error|ignore",
+   "static: what to do where the equilibrium of a load step is unstable, as that of a straight "
+   "column above its buckling load: the tangent has negative eigenvalues. warn: say so, with the "
+   "mode's place; error: the run ends there, after its output; ignore: do not look"},
   {"static_control", SB_OPTION_CHOICE, 1, "", "load", "load|arc_length",
    "static: load control, or arc-length control along the equilibrium path, which continues past "
    "limit points; both end where the load factor reaches 1"},
@@ -181,6 +185,15 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
     break;
   }
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
+}
+
+/* The equation of motion holds at a fraction of the step, m ((1 - a_m) a_0 + a_m a_1) = f(t_0 + a_f
+   h): with a_0 and a_1 the accelerations at t_0 + before and t_1 + shift, linear in time. */
+PetscReal SbRunAccelerationShift(SbRun run, PetscReal dt, PetscReal before)
+{
+  const SbMethodSettings s = method_settings(run);
+
+  return ((s.alpha_f - s.alpha_m) * dt - (1. - s.alpha_m) * before) / s.alpha_m;
 }
 
 static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)

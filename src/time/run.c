@@ -61,6 +61,7 @@ static PetscErrorCode read_static(SbRun r)
   PetscCall(SbOptionBool(&SbRunScope, "static_adapt", &r->clock.adapt));
   PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->clock.min_increment));
   PetscCall(SbOptionSecond(&SbRunScope, "static_control", &r->clock.arc.on));
+  PetscCall(SbOptionChoice(&SbRunScope, "static_unstable", &r->stability.action));
   r->clock.t_end = 1.;
   r->clock.dt = 1. / (PetscReal)r->clock.static_steps;
   if (r->clock.arc.on)
@@ -365,6 +366,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   if (!r->solve.ts)
     PetscCall(SNESDestroy(&r->solve.snes));
   PetscCall(TSDestroy(&r->solve.ts));
+  PetscCall(MatDestroy(&r->stability.K));
   PetscCall(MatDestroy(&r->solve.system));
   PetscCall(MatDestroy(&r->solve.unprojected));
   PetscCall(MatDestroy(&r->solve.J));

@@ -422,13 +422,15 @@ static PetscReal shorter_length(TS ts, PetscInt *halvings)
   return next;
 }
 
-/* Back to the start of the step, to repeat it with the length `next`, s; *again: that may help. */
-static PetscErrorCode reject_attempt(TS ts, PetscReal next, PetscInt *halvings, PetscBool *again)
+/* Back to the start of the step, to repeat it with the length `next`, s; *again: that may help.
+   solved: its error alone was too large; an explicit step that failed fails with any length. */
+static PetscErrorCode reject_attempt(TS ts, PetscBool solved, PetscReal next, PetscInt *halvings,
+                                     PetscBool *again)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
   SbRunClock *clock = &run->clock;
-  const PetscBool hopeless = (PetscBool)(!ts->usessnes || clock->stopped);
+  const PetscBool hopeless = (PetscBool)((!ts->usessnes && !solved) || clock->stopped);
 
   PetscFunctionBeginUser;
   PetscCall(VecCopy(so->X0, ts->vec_sol));
@@ -487,7 +489,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       PetscCall(accept_step(ts, next));
       break;
     }
-    PetscCall(reject_attempt(ts, next, &halvings, &again));
+    PetscCall(reject_attempt(ts, ok, next, &halvings, &again));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

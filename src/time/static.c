@@ -7,6 +7,9 @@
   With -static_adapt a step without contact that converges slowly is given up early and halved, at
   most EARLY times in a row: beyond a limit load the energy has to be searched.
 
+  So is one in which supports or cells turn far (turn.c), where a motion has other ends than its
+  displacements tell. The state after each step is examined for its stability (stability.c).
+
   Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be
   halved forever. Below -static_min_increment the run stops; the growth of displacements with the
   load, over its minimum of all steps, tells a limit load from other failures. A shortened step
@@ -21,6 +24,8 @@
   25 /* iterations of a load step, failed attempts included, after which its length doubles */
 #define PUSH \
   1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
+#define SHARE 0.01 /* of the volume, above which cells that turn far matter */
+#define CUTS 6     /* halvings of a load step for their sake, then it is accepted with a warning */
 #define EXCESS \
   0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
@@ -214,6 +219,31 @@ static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal len
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a step to X at the load factor `to` has to be repeated with half its length, as cells
+   turned far in it; after CUTS of them they jump, with a warning. */
+static PetscErrorCode turned_far(SbRun run, Vec X, PetscReal to, PetscInt cuts, PetscBool *far)
+{
+  PetscReal share;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunTurned(run, run->state.U, X, &share));
+  *far = (PetscBool)(share > SHARE && cuts < CUTS);
+  if (*far) {
+    run->counters.rejected++;
+    run->counters.turned++;
+    run->solve.tangent_known = PETSC_FALSE;
+    PetscCall(PetscInfo(run->solve.snes, "load factor %g: %g of the volume turned far\n",
+                        (double)to, (double)share));
+  } else if (share > SHARE)
+    PetscCall(SbWarning(run->model->comm,
+                        "load factor %.6g: %.2g of the volume turned by more than %g degrees in a "
+                        "load step, and in shorter ones, too: the bodies jump to another "
+                        "equilibrium; a dynamic run with damping, or -static_control arc_length, "
+                        "tells to which one",
+                        (double)to, (double)share, (double)(SB_TURN_CELLS * 180. / PETSC_PI)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStaticSolve(SbRun run)
 {
   const PetscReal nominal = 1. / (PetscReal)run->clock.static_steps;
@@ -224,6 +254,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
   PetscReal slowest = 0.;
   PetscInt step = run->clock.step0;
   PetscInt halvings = 0;
+  PetscInt jumps = 0; /* how often the step was repeated as cells turned far */
+  const PetscBool follow = (PetscBool)(run->clock.adapt && !run->model->linear);
   const PetscBool contact =
     (PetscBool)(run->model->contacts.nactive_set || run->model->contacts.npotential);
   Vec X;
@@ -232,13 +264,16 @@ PetscErrorCode SbStaticSolve(SbRun run)
   PetscCall(VecDuplicate(run->state.U, &X));
   run->model->load = factor;
   PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_FALSE));
+  if (follow)
+    PetscCall(SbRunCutTurn(run, factor, least, &length));
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
     LoadStep load = {run, next, next - factor, X, contact};
     const SbSolvedStep end = {factor, next - factor, run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE;
-    PetscBool found, easy;
+    PetscBool found, easy, unstable;
+    PetscBool far = PETSC_FALSE;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure
        takes long */
@@ -247,6 +282,16 @@ PetscErrorCode SbStaticSolve(SbRun run)
     run->clock.may_give_up = (PetscBool)(run->clock.adapt && !contact && halvings < EARLY);
     if (!run->solve.free_body)
       PetscCall(SbRunAttempt(run, &attempt, &ok));
+
+    /* halve a step in which cells turned far: it may have found another equilibrium */
+    if (ok && follow) {
+      PetscCall(turned_far(run, X, next, jumps, &far));
+      if (far) {
+        jumps++;
+        length *= 0.5;
+        continue;
+      }
+    }
 
     /* halve a failed step, if that may help */
     if (!ok) {
@@ -279,6 +324,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (slowest > 0. && run->counters.newton_step)
       run->solve.softening = rate / slowest;
     PetscCall(VecCopy(X, run->state.U));
+    PetscCall(SbRunCheckStable(run, next, (PetscBool)(next >= 1.), &unstable));
 
     /* re-meshing, effects and monitors */
     run->monitors.post_step.dt = next - factor;
@@ -290,14 +336,20 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (run->counters.newton_step)
       halvings = 0;
     easy = (PetscBool)(run->counters.newton_step <= EASY);
-    PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
-    if (run->clock.paused || run->clock.stopped)
+    PetscCall(
+      SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1. || unstable)));
+    if (unstable)
+      PetscCall(SbRunFail(run, "%s", run->stability.text));
+    if (run->clock.paused || run->clock.stopped || unstable)
       break;
 
     /* lengthen the next step */
     factor = next;
+    jumps = 0;
     if (!run->clock.adapt || easy)
       length = PetscMin(2. * length, nominal);
+    if (follow && factor < 1.)
+      PetscCall(SbRunCutTurn(run, factor, least, &length));
   }
   PetscCall(VecDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -6,6 +6,8 @@
 
 #define SB_MAX_RESOLVES 4 /* most repetitions of a step by a post-solve callback */
 #define SB_TS_SECOND_ORDER "sb_second_order"
+#define SB_TURN (30. * PETSC_PI / 180.)       /* of supports in a load step, rad */
+#define SB_TURN_CELLS (90. * PETSC_PI / 180.) /* of cells, rad */
 
 extern const char *const SbIntegrators; /* "euler_implicit|newmark|..." in the order of the enum */
 
@@ -69,6 +71,9 @@ PetscErrorCode SbPotentialDestroy(SbPotential *potential);
    Collective. */
 PetscErrorCode SbPotentialBegin(SbPotential potential, const SbSolvedStep *step, PetscBool warm);
 
+/* The last system with barrier contact, borrowed; NULL: none in the last solve. Not collective. */
+SbContactSystem SbPotentialContactSystem(SbPotential potential);
+
 /* stop.c: early end of runs. */
 /* Options -wall_time and -stop_grace. */
 PetscErrorCode SbRunReadStop(SbRun run);
@@ -114,6 +119,20 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: load steps */
+/* turn.c. The largest angle, rad, by which moving supports turn a set of nodes from the load factor
+   `from` to `to`, and the effect that does. Collective. */
+PetscErrorCode SbRunSupportsTurn(SbRun run, PetscReal from, PetscReal to, PetscReal *angle,
+                                 SbEffect *effect);
+/* Length of a load step from there, at most `length` and not below `least`, in which supports turn
+   by less than SB_TURN. Collective. */
+PetscErrorCode SbRunCutTurn(SbRun run, PetscReal from, PetscReal least, PetscReal *length);
+/* Share of the volume that turns by more than SB_TURN_CELLS between two displacements.
+   Collective. */
+PetscErrorCode SbRunTurned(SbRun run, Vec U0, Vec U1, PetscReal *share);
+/* stability.c, after a static solve, before the step is accepted: warns if the equilibrium
+   run->state.U at this load factor is unstable. stop: the run has to end after this step, with
+   run->stability.text. Collective. */
+PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, PetscBool *stop);
 /* arc_length.c: equilibrium path with the load factor as an unknown. Collective. Check: after the
    solver is set up; PETSC_ERR_USER_INPUT for contact, and solvers for definite matrices only. */
 PetscErrorCode SbArcLengthCheck(SbRun run);

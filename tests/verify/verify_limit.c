@@ -97,8 +97,12 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
     PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
     element, nu, pressure, (int)t.run->counters.newton, (int)t.run->counters.linear,
     (int)t.run->counters.rejected));
-  SB_CHECK(t.run->clock.t == 1. && !t.run->counters.rejected, "%s: load factor %g, %d rejected",
-           element, t.run->clock.t, (int)t.run->counters.rejected);
+
+  /* the end of P1's curls by more than 90 degrees in one of the load steps, which is repeated for
+     that, and for nothing else */
+  SB_CHECK(t.run->clock.t == 1. && t.run->counters.rejected == t.run->counters.turned,
+           "%s: load factor %g, %d rejected", element, t.run->clock.t,
+           (int)t.run->counters.rejected);
   SB_CHECK(t.run->counters.newton <= iterations, "%s: %d Newton iterations", element,
            (int)t.run->counters.newton);
   PetscCall(test_scene_close(&t));
