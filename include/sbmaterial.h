@@ -42,7 +42,7 @@ typedef enum {
     psi = psi_mu(F) + lambda/2 theta(F)^2,
 
   theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
-  (corotated), tr(E) (stvk), J - 1 (neohookean); and lambda Lame's first parameter at rest
+  (corotated), tr(E) (stvk), J - 1 (stable_neohookean); and lambda Lame's first parameter at rest
   (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
 */
 typedef struct {

@@ -10,7 +10,7 @@
   LAW(SbMaterialLinear)       \
   LAW(SbMaterialCorotated)    \
   LAW(SbMaterialStVK)         \
-  LAW(SbMaterialNeoHookean)
+  LAW(SbMaterialStableNeoHookean)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;
 SB_MATERIAL_LAWS(SB_DECLARE_LAW)

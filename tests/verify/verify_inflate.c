@@ -213,7 +213,8 @@ static PetscErrorCode check(PetscInt k, const char *element, const char *mesh, c
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %.17g "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material stable_neohookean -body_a_young "
+    "%.17g "
     "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type fixed "
     "-effect_x_on x0 "
     "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "

@@ -24,8 +24,8 @@
 /* Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H +
    |H|^2 and J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing
    cancels at small strains. */
-SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                        SbPack psi)
+SB_KERNEL static void energy_stable(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack psi)
 {
   const PetscReal a = 4 * m->rest->mu / 3;
   const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
@@ -50,8 +50,8 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbP
     psi[l] += a / 2 * (x[l] - log1p(x[l]));
 }
 
-SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                        SbPack P[restrict 9])
+SB_KERNEL static void stress_stable(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack P[restrict 9])
 {
   const PetscReal a = 4 * m->rest->mu / 3;
   const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
@@ -70,8 +70,8 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbP
 }
 
 /* theta = J - 1, from H = F - I as in the energy. */
-SB_KERNEL static void dilatation_neohookean(const struct _p_SbMaterial *m,
-                                            const SbPack F[restrict 9], SbPack theta)
+SB_KERNEL static void dilatation_stable(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                        SbPack theta)
 {
   (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
@@ -117,8 +117,8 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[
   SbSpectralTangent(U, V, hessian, flip, twist, C);
 }
 
-SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                         SbPack C[restrict 81])
+SB_KERNEL static void tangent_stable(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                     SbPack C[restrict 81])
 {
   const PetscReal a = 4 * m->rest->mu / 3;
   const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
@@ -160,9 +160,8 @@ SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const Sb
 }
 
 /* d theta/dF = cof F */
-SB_KERNEL static void dilatation_gradient_neohookean(const struct _p_SbMaterial *m,
-                                                     const SbPack F[restrict 9],
-                                                     SbPack D[restrict 9])
+SB_KERNEL static void dilatation_gradient_stable(const struct _p_SbMaterial *m,
+                                                 const SbPack F[restrict 9], SbPack D[restrict 9])
 {
   (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
@@ -190,8 +189,8 @@ SB_KERNEL void SbAddCofactorTangent(const SbPack F[restrict 9], const SbPack p,
   }
 }
 
-static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m, const SbPack F[9],
-                                          const SbPack p, SbPack C[81])
+static void dilatation_hessian_stable(const struct _p_SbMaterial *m, const SbPack F[9],
+                                      const SbPack p, SbPack C[81])
 {
   (void)m;
   SbAddCofactorTangent(F, p, C);
@@ -199,16 +198,16 @@ static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m, const S
 
 static const SbOption rows[] = {SB_MATERIAL_TANGENT_ROW};
 
-const SbMaterialType SbMaterialNeoHookean = {
-  .name = "neohookean",
+const SbMaterialType SbMaterialStableNeoHookean = {
+  .name = "stable_neohookean",
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .jacobian = PETSC_TRUE,
   .share = 5. / 6.,
-  .ops = {.energy = energy_neohookean,
-          .stress = stress_neohookean,
-          .tangent = tangent_neohookean,
-          .dilatation = dilatation_neohookean,
-          .dilatation_gradient = dilatation_gradient_neohookean,
-          .dilatation_hessian = dilatation_hessian_neohookean},
+  .ops = {.energy = energy_stable,
+          .stress = stress_stable,
+          .tangent = tangent_stable,
+          .dilatation = dilatation_stable,
+          .dilatation_gradient = dilatation_gradient_stable,
+          .dilatation_hessian = dilatation_hessian_stable},
 };
