@@ -10,6 +10,7 @@
   LAW(SbMaterialLinear)       \
   LAW(SbMaterialCorotated)    \
   LAW(SbMaterialStVK)         \
+  LAW(SbMaterialNeoHookean)   \
   LAW(SbMaterialStableNeoHookean)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;

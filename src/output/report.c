@@ -267,7 +267,7 @@ PetscErrorCode SbReportSummary(SbRun run)
     PetscCall(SbWarning(run->model->comm,
                         "%.3g %% of what has -body_NAME_material linear is turned by more than %g "
                         "degrees at the end: the law is one of small rotations, and takes a turn "
-                        "for a strain; corotated or stable_neohookean do not",
+                        "for a strain; corotated or neohookean do not",
                         (double)(100. * turned), TURNED));
   if (out->quiet)
     PetscFunctionReturn(PETSC_SUCCESS);
