@@ -265,7 +265,6 @@ static PetscErrorCode bracket(Search *q, PetscBool *again)
 static PetscErrorCode improve_direction(Search *q, PetscBool *again)
 {
   const SNES snes = q->snes;
-  const SbNewtonProblem *p = q->n->problem;
 
   PetscFunctionBeginUser;
   PetscCall(SbNewtonSolveAccurately(snes, &q->slope, again));
