@@ -126,6 +126,7 @@ struct _p_SbSpace {
     block_scale;    /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
+  PetscBool positive; /* a region's law has infinite energy where det F <= 0 */
   SbPack
     *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
@@ -286,6 +287,13 @@ void SbSpaceTurned(SbSpace space, const PetscReal u[], PetscReal angle, PetscRea
 /* The same of all other laws, of cells that turn by more than `angle` between two displacements. */
 void SbSpaceTurnedBetween(SbSpace space, const PetscReal u0[], const PetscReal u1[],
                           PetscReal angle, PetscReal volume[2]);
+/* Where laws have infinite energies for det F <= 0 (src/fem/admissible.c): the longest step s in
+   [0, 1] from X to X - s scale Y, X being admissible, that stays clear of that; 1 with other laws.
+   Collective. */
+PetscErrorCode SbSpaceLongestStep(SbSpace space, Vec X, Vec Y, PetscReal scale, PetscReal *part);
+/* The worst tet with det F <= 0 of such a law: its number, body and place, for a message; "" if
+   there is none. Collective. */
+PetscErrorCode SbSpaceDescribeInverted(SbSpace space, Vec U, size_t size, char text[]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL),
    smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
 void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,

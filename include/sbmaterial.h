@@ -42,8 +42,9 @@ typedef enum {
     psi = psi_mu(F) + lambda/2 theta(F)^2,
 
   theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
-  (corotated), tr(E) (stvk), J - 1 (neohookean); and lambda Lame's first parameter at rest
-  (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
+  (corotated), tr(E) (stvk), ln J (neohookean), J - 1 (stable_neohookean); and lambda Lame's first
+  parameter at rest (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law
+  with lambda = 0.
 */
 typedef struct {
   /* reads the options of the law's rows into m->data, and may replace the stiffness at rest, which
@@ -85,8 +86,10 @@ typedef struct {
 
     linear   - stress is linear in F: K is constant, and the law has a frame
     softens  - stress has a maximum in compression, beyond which cells invert
-    jacobian - theta is J - 1, cubic in the displacement; of other laws it is at most quadratic, or
-               that of a spin
+    jacobian - theta is J - 1, cubic in the displacement; the mean over a P2 cell is exact. Of other
+               laws theta is at most quadratic, that of a spin, or no polynomial, with the mean of
+               the points of the law
+    positive - psi is infinite where det F <= 0, and stress and tangent are no numbers there
     share    - psi_mu has the part share mu/2 theta^2
 */
 typedef struct {
@@ -94,7 +97,7 @@ typedef struct {
   size_t size; /* bytes of `data`, zero at first */
   PetscInt nrow;
   const SbOption *row; /* [nrow] */
-  PetscBool linear, softens, jacobian;
+  PetscBool linear, softens, jacobian, positive;
   PetscReal share;
   SbMaterialOps ops;
 } SbMaterialType;
@@ -104,8 +107,8 @@ struct _p_SbMaterial {
   char name[SB_NAME_MAX]; /* of the body or inclusion */
   PetscLogEvent
     event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
-  SbMaterialOps ops;                   /* of the type; frame only with the warped tangent */
-  PetscBool linear, softens, jacobian; /* of the type */
+  SbMaterialOps ops; /* of the type; frame only with the warped tangent */
+  PetscBool linear, softens, jacobian, positive; /* of the type */
   struct _p_SbElastic *rest; /* stiffness at rest: SbMaterialShearModulus() and others; owned */
   PetscReal density;         /* kg/m^3 */
   PetscBool

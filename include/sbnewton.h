@@ -22,8 +22,7 @@ typedef struct {
   length. X: an iterate, Y: a direction, X - s Y the next iterate, m. All are collective.
 
     max_step         - part: largest s in [0, 1] without a collision; nactive: number of pairs
-    within
-                       a barrier, all ranks (may be NULL)
+                       within a barrier, all ranks (may be NULL)
     advance          - obstacles move to this fraction of their motion in the step
     inverted         - strain energy at X, J, and number of inverted cells, all ranks
     hessian          - assembles the Hessian of the barriers at X, or its substitute; nblock: number
@@ -60,6 +59,8 @@ typedef struct {
     negative_eigenvalues - NULL: unknown. Number in the last factorisation, -1: unknown
     linearise            - NULL: nothing to linearise. Tangents take the stresses linearised at X,
                            or at X for the step to X - s Y; X NULL: of the iterate again
+    longest              - NULL: any. part: the longest s in [0, 1] for which E stays finite from X
+                           to X - s Y
     prescribed_part      - sets all of D but the prescribed unknowns to zero
     interrupted          - NULL: never. Whether the solve is to be given up
 */
@@ -68,6 +69,7 @@ typedef struct {
   PetscErrorCode (*filter)(void *ctx, PetscBool filtered, PetscBool required);
   PetscErrorCode (*negative_eigenvalues)(void *ctx, PetscInt *n);
   PetscErrorCode (*linearise)(void *ctx, Vec X, Vec Y, PetscReal s);
+  PetscErrorCode (*longest)(void *ctx, Vec X, Vec Y, PetscReal *part);
   PetscErrorCode (*prescribed_part)(void *ctx, Vec D);
   PetscErrorCode (*interrupted)(void *ctx, PetscBool *is);
   const SbNewtonBarrier *barrier; /* borrowed; NULL: none */

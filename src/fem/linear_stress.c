@@ -112,6 +112,13 @@ void SbLinearStressTangent(const struct _p_SbMaterial *m, const SbPack F[9],
   }
 }
 
+/* From a value a part of the way to the goal; the whole way forgets the value, which may be that of
+   an iterate without finite stress. */
+SB_INLINE PetscReal go(PetscReal from, PetscReal goal, PetscReal part)
+{
+  return part == 1. ? goal : from + part * (goal - from);
+}
+
 /* The stress of a law after a step with the gradient H (NULL: before one), a part of the way from
    the last one; mean: its pressure at F, that of the last tangent, its change. */
 static void linearise(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack *H,
@@ -160,9 +167,9 @@ static void linearise(const struct _p_SbMaterial *m, const SbPack F[9], const Sb
     for (int k = 0; k < 6; k++) {
       const PetscReal goal = 0.5 * (s[3 * row[k] + column[k]] + s[3 * column[k] + row[k]]);
 
-      stress->S[k][l] += part * (goal - stress->S[k][l]);
+      stress->S[k][l] = go(stress->S[k][l], goal, part);
     }
-    stress->p[l] += part * (modulus * (theta[l] + change) - stress->p[l]);
+    stress->p[l] = go(stress->p[l], modulus * (theta[l] + change), part);
   }
 }
 
@@ -183,7 +190,7 @@ static void linearise_mean(const SbMaterial m, const SbPoints *at, const SbPack 
       mean[2][l] += b[k][l] * dx[k][l];
   for (int l = 0; l < SB_BATCH; l++) {
     mean[2][l] *= (*at->V)[l] > 0. ? lambda / (*at->V)[l] : 0.;
-    pressure[l] += part * (mean[0][l] + mean[2][l] - pressure[l]);
+    pressure[l] = go(pressure[l], mean[0][l] + mean[2][l], part);
   }
 }
 

@@ -43,6 +43,8 @@ static PetscErrorCode find_regions(SbSpace s)
   s->linear = PETSC_TRUE;
   for (PetscInt k = 0; k < nmaterial; k++)
     s->linear = (PetscBool)(s->linear && s->material[k]->linear);
+  for (PetscInt k = 0; k < nmaterial; k++)
+    s->positive = (PetscBool)(s->positive || s->material[k]->positive);
   PetscCall(PetscCalloc1(4 * nmaterial, &s->region));
   most = mesh->ncell / SB_BATCH + 4 * nmaterial;
   PetscCall(PetscMalloc3(most, &s->batch_region, most, &s->batch_cell, most, &s->batch_n));

@@ -81,6 +81,7 @@ static PetscErrorCode create(const SbMaterialType *type, PetscReal E, PetscReal 
   m->linear = type->linear;
   m->softens = type->softens;
   m->jacobian = type->jacobian;
+  m->positive = type->positive;
   PetscCall(SbLogNamed("Mat", type->name, &m->event));
   m->density = density;
   PetscCall(PetscNew(&m->rest));

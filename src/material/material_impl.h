@@ -10,7 +10,8 @@
   LAW(SbMaterialLinear)       \
   LAW(SbMaterialCorotated)    \
   LAW(SbMaterialStVK)         \
-  LAW(SbMaterialNeoHookean)
+  LAW(SbMaterialNeoHookean)   \
+  LAW(SbMaterialStableNeoHookean)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;
 SB_MATERIAL_LAWS(SB_DECLARE_LAW)

@@ -1,165 +1,96 @@
 /*
-  Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation",
-  2018, equation 14, with the logarithmic term that makes F = 0 no stationary point). With I1 =
-  |F|^2, J = det F:
+  Classical compressible neo-Hookean material (Simo and Pister 1984; Bonet and Wood, "Nonlinear
+  continuum mechanics for finite element analysis", 2008, section 6.4.3), as FEBio, dolfinx and
+  others have it under this name. With I1 = |F|^2, J = det F, theta = ln J and D = d theta/dF =
+  F^-T:
 
-    psi = a/2 (I1 - 3) - a/2 log((I1 + 1)/4) + b/2 (J - 1)^2 - 3a/4 (J - 1)
-    P   = a (1 - 1/(I1 + 1)) F + (b (J - 1) - 3a/4) cof F
+    psi = mu/2 (I1 - 3) - mu theta + lambda/2 theta^2
+    P   = mu F + q D,   q = lambda theta - mu
+    dP/dF_(ij)(kl) = mu identity - q D_il D_kj + lambda D_ij D_kl.
 
-  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is
-  finite for every F, also an inverted one. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8)
-  tr(H) I, so that
+  psi grows without bound as J falls to zero, for lambda >= 0, and is infinite for J <= 0, where
+  stress and tangent are no numbers: Newton's steps end before (src/fem/admissible.c). In stretches:
+  flips mu - q / (s_i s_j), twists mu + q / (s_i s_j). lambda/2 theta^2 is not convex beyond J = e:
+  the stress of a uniaxial strain falls beyond a stretch of e (lambda >> mu).
 
-    a = 4/3 mu,   b = lambda + 5/6 mu
-
-  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0
-  there). This b is for psi with the log term; without it the constants differ.
-
-  Tangent, exact: with g = 1/(I1 + 1), p = b (J - 1) - 3a/4, c = cof F
-    dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF (SbAddCofactorTangent()).
-  In signed stretches: flips a (1 - g) - p s_k, twists a (1 - g) + p s_k (section 4 of the paper).
+  Laws that other programs give this name: Abaqus and SOFA split psi into a part of the shape,
+  J^(-2/3) I1, and one of the volume; all agree at small strains, and for nu near 1/2.
 */
 #include "material_impl.h"
 
-/* Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H +
-   |H|^2 and J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing
-   cancels at small strains. */
+/* J, theta and D of a lane; theta is -inf where J <= 0. From H = F - I at small strains, where the
+   rounding of det F would be that of theta. */
+SB_INLINE PetscReal log_det(const PetscReal f[9], PetscReal c[9], PetscReal *theta)
+{
+  const PetscReal h[9] = {f[0] - 1, f[1], f[2], f[3], f[4] - 1, f[5], f[6], f[7], f[8] - 1};
+  PetscReal m[9];
+
+  SbMatCofactor(h, m);
+  SbMatCofactor(f, c);
+  const PetscReal J = SbDot3(f, c);
+  const PetscReal j = h[0] + h[4] + h[8] + m[0] + m[4] + m[8] + SbDot3(h, m);
+  *theta = J > 0.5 ? log1p(j) : J > 0 ? log(J) : -INFINITY;
+  return J;
+}
+
+/* With j = J - 1 = tr H + minors, minors the rest of the expansion of det(I + H): mu tr H - mu
+   theta = mu (j - theta) - mu minors has no terms of first order left. */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack psi)
 {
-  const PetscReal a = 4 * m->rest->mu / 3;
-  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
-  SbPack x;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal h[9], c[9];
+    PetscReal f[9], c[9], h[9], theta;
 
-    SbPackGet(9, F, l, h);
+    SbPackGet(9, F, l, f);
+    const PetscReal J = log_det(f, c, &theta);
+    memcpy(h, f, sizeof(h));
     h[0] -= 1;
     h[4] -= 1;
     h[8] -= 1;
     SbMatCofactor(h, c);
-    const PetscReal tr = h[0] + h[4] + h[8];
-    const PetscReal square = SbDot9(h, h);
-    const PetscReal rest = c[0] + c[4] + c[8] + SbDot3(h, c);
-    const PetscReal j = tr + rest;
-    x[l] = (2 * tr + square) / 4;
-    psi[l] = 3 * a / 8 * square - 3 * a / 4 * rest + b / 2 * j * j;
+    const PetscReal minors = c[0] + c[4] + c[8] + SbDot3(h, c);
+    const PetscReal j = h[0] + h[4] + h[8] + minors;
+    const PetscReal value =
+      mu * (SbDot9(h, h) / 2 - minors + (j - theta)) + lambda / 2 * theta * theta;
+
+    psi[l] = J > 0 ? value : INFINITY;
   }
-  for (int l = 0; l < SB_BATCH; l++)
-    psi[l] += a / 2 * (x[l] - log1p(x[l]));
 }
 
 SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack P[restrict 9])
 {
-  const PetscReal a = 4 * m->rest->mu / 3;
-  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], c[9];
+    PetscReal f[9], c[9], theta;
 
     SbPackGet(9, F, l, f);
-    SbMatCofactor(f, c);
-    const PetscReal I1 = SbDot9(f, f);
-    const PetscReal shear = a * I1 / (I1 + 1);
-    const PetscReal p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
+    const PetscReal J = log_det(f, c, &theta);
+    const PetscReal q = J > 0 ? (lambda * theta - mu) / J : NAN;
     for (int k = 0; k < 9; k++)
-      P[k][l] = shear * f[k] + p * c[k];
+      P[k][l] = mu * f[k] + q * c[k];
   }
 }
 
-/* theta = J - 1, from H = F - I as in the energy. */
 SB_KERNEL static void dilatation_neohookean(const struct _p_SbMaterial *m,
                                             const SbPack F[restrict 9], SbPack theta)
 {
   (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal h[9], c[9];
-
-    SbPackGet(9, F, l, h);
-    h[0] -= 1;
-    h[4] -= 1;
-    h[8] -= 1;
-    SbMatCofactor(h, c);
-    theta[l] = h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c);
-  }
-}
-
-SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                  SbPack C[restrict 81])
-{
-  const PetscReal a = 4 * m->rest->mu / 3;
-  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
-  SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
-
-  SbStretches(F, U, s, V);
-  for (int l = 0; l < SB_BATCH; l++) {
-    const PetscReal x = s[0][l];
-    const PetscReal y = s[1][l];
-    const PetscReal z = s[2][l];
-    const PetscReal g = 1 / (x * x + y * y + z * z + 1);
-    const PetscReal p = b * (x * y * z - 1) - 3 * a / 4;
-    const PetscReal shear = a * (1 - g);
-    const PetscReal stretch = 2 * a * g * g;
-
-    hessian[0][l] = shear + stretch * x * x + b * (y * z) * (y * z);
-    hessian[1][l] = stretch * x * y + b * (y * z) * (z * x) + p * z;
-    hessian[2][l] = stretch * x * z + b * (y * z) * (x * y) + p * y;
-    hessian[3][l] = shear + stretch * y * y + b * (z * x) * (z * x);
-    hessian[4][l] = stretch * y * z + b * (z * x) * (x * y) + p * x;
-    hessian[5][l] = shear + stretch * z * z + b * (x * y) * (x * y);
-    for (int k = 0; k < 3; k++) {
-      flip[k][l] = shear - p * s[k][l];
-      twist[k][l] = shear + p * s[k][l];
-    }
-  }
-  SbSpectralTangent(U, V, hessian, flip, twist, C);
-}
-
-SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                         SbPack C[restrict 81])
-{
-  const PetscReal a = 4 * m->rest->mu / 3;
-  const PetscReal b = m->rest->lambda + 5 * m->rest->mu / 6;
-  SbPack cof[9], pF[9], shear, stretch;
-
-  if (m->tangent == SB_TANGENT_EXACT_SPD) {
-    tangent_spd(m, F, C);
-    return;
-  }
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], c[9];
+    PetscReal f[9], c[9], value;
 
     SbPackGet(9, F, l, f);
-    SbMatCofactor(f, c);
-    const PetscReal g = 1 / (SbDot9(f, f) + 1);
-    const PetscReal p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
-    shear[l] = a * (1 - g);
-    stretch[l] = 2 * a * g * g;
-    SbPackPut(9, c, l, cof);
-    for (int k = 0; k < 9; k++)
-      pF[k][l] = p * f[k];
-  }
-  for (int ij = 0; ij < 9; ij++) {
-    for (int kl = ij; kl < 9; kl++) {
-      const int row = kl / 3 - ij / 3,
-                column = (kl % 3 - ij % 3 + 3) % 3; /* 0 same, 1 next, 2 previous */
-      const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
-      const PetscReal same = ij == kl;
-      const PetscReal sign = row && column ? (row == column ? 1 : -1) : 0;
-      SbPack c;
-
-      for (int l = 0; l < SB_BATCH; l++) {
-        c[l] = b * cof[ij][l] * cof[kl][l] + stretch[l] * F[ij][l] * F[kl][l] +
-               sign * pF[third][l] + same * shear[l];
-      }
-      SbTangentPut(c, ij, kl, C);
-    }
+    (void)log_det(f, c, &value);
+    theta[l] = value;
   }
 }
 
-/* d theta/dF = cof F */
+/* D = cof F / J */
 SB_KERNEL static void dilatation_gradient_neohookean(const struct _p_SbMaterial *m,
                                                      const SbPack F[restrict 9],
                                                      SbPack D[restrict 9])
@@ -170,31 +101,103 @@ SB_KERNEL static void dilatation_gradient_neohookean(const struct _p_SbMaterial 
 
     SbPackGet(9, F, l, f);
     SbMatCofactor(f, c);
-    SbPackPut(9, c, l, D);
+    const PetscReal J = SbDot3(f, c);
+    for (int k = 0; k < 9; k++)
+      D[k][l] = J > 0 ? c[k] / J : NAN;
   }
 }
 
-SB_KERNEL void SbAddCofactorTangent(const SbPack F[restrict 9], const SbPack p,
-                                    SbPack C[restrict 81])
+/* The tangent mu identity - q D_il D_kj + lambda D_ij D_kl, its negative eigenvalues raised to
+   zero. */
+SB_KERNEL static void projected(PetscReal mu, PetscReal lambda, const SbPack q,
+                                const SbPack F[restrict 9], SbPack C[restrict 81])
+{
+  SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
+
+  SbStretches(F, U, s, V);
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal r[3] = {1 / s[0][l], 1 / s[1][l], 1 / s[2][l]};
+
+    hessian[0][l] = mu + (lambda - q[l]) * r[0] * r[0];
+    hessian[1][l] = lambda * r[0] * r[1];
+    hessian[2][l] = lambda * r[0] * r[2];
+    hessian[3][l] = mu + (lambda - q[l]) * r[1] * r[1];
+    hessian[4][l] = lambda * r[1] * r[2];
+    hessian[5][l] = mu + (lambda - q[l]) * r[2] * r[2];
+    for (int k = 0; k < 3; k++) {
+      const PetscReal pair = q[l] * r[(k + 1) % 3] * r[(k + 2) % 3];
+
+      flip[k][l] = mu - pair;
+      twist[k][l] = mu + pair;
+    }
+  }
+  SbSpectralTangent(U, V, hessian, flip, twist, C);
+}
+
+/* C = mu identity - q D_il D_kj + lambda D_ij D_kl */
+SB_KERNEL static void exact(PetscReal mu, PetscReal lambda, const SbPack q,
+                            const SbPack D[restrict 9], SbPack C[restrict 81])
 {
   for (int ij = 0; ij < 9; ij++) {
-    for (int kl = 0; kl < 9; kl++) {
-      const int row = (kl / 3 - ij / 3 + 3) % 3;
-      const int column = (kl % 3 - ij % 3 + 3) % 3;
-      const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
-      const PetscReal sign = row && column ? (row == column ? 1 : -1) : 0;
+    for (int kl = ij; kl < 9; kl++) {
+      const int il = 3 * (ij / 3) + kl % 3;
+      const int kj = 3 * (kl / 3) + ij % 3;
+      const PetscReal same = ij == kl ? mu : 0;
+      SbPack c;
 
-      for (int l = 0; l < SB_BATCH && sign != 0.; l++)
-        C[9 * ij + kl][l] += sign * p[l] * F[third][l];
+      for (int l = 0; l < SB_BATCH; l++)
+        c[l] = same - q[l] * D[il][l] * D[kj][l] + lambda * D[ij][l] * D[kl][l];
+      SbTangentPut(c, ij, kl, C);
     }
   }
 }
 
-static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m, const SbPack F[9],
-                                          const SbPack p, SbPack C[81])
+SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                         SbPack C[restrict 81])
 {
-  (void)m;
-  SbAddCofactorTangent(F, p, C);
+  const PetscReal mu = m->rest->mu;
+  const PetscReal lambda = m->rest->lambda;
+  SbPack D[9], q;
+
+  dilatation_neohookean(m, F, q);
+  for (int l = 0; l < SB_BATCH; l++)
+    q[l] = lambda * q[l] - mu;
+  if (m->tangent == SB_TANGENT_EXACT_SPD) {
+    projected(mu, lambda, q, F, C);
+    return;
+  }
+  dilatation_gradient_neohookean(m, F, D);
+  exact(mu, lambda, q, (const SbPack *)D, C);
+}
+
+/* d^2 theta/dF_(ij)(kl) = -D_il D_kj; twists have the eigenvalues 1 / (s_i s_j), flips -1 / (s_i
+   s_j), stretches -1 / s_i^2. */
+SB_KERNEL static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m,
+                                                    const SbPack F[restrict 9], const SbPack p,
+                                                    SbPack C[restrict 81])
+{
+  SbPack D[9], H[81];
+
+  if (m->tangent == SB_TANGENT_EXACT_SPD)
+    projected(0, 0, p, F, H);
+  else {
+    dilatation_gradient_neohookean(m, F, D);
+    exact(0, 0, p, (const SbPack *)D, H);
+  }
+  for (int k = 0; k < 81; k++)
+    for (int l = 0; l < SB_BATCH; l++)
+      C[k][l] += H[k][l];
+}
+
+/* With lambda < 0 the energy would fall without bound as J falls to zero. */
+static PetscErrorCode set_up_neohookean(SbMaterial m, const SbScope *scope)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(m->rest->nu >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s_%s_poisson %g with the law neohookean: its energy has no least value for a "
+             "negative Poisson's ratio; take one in [0, 0.5), or the law stable_neohookean",
+             scope->klass, scope->instance[0] ? scope->instance : "<name>", (double)m->rest->nu);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static const SbOption rows[] = {SB_MATERIAL_TANGENT_ROW};
@@ -203,9 +206,9 @@ const SbMaterialType SbMaterialNeoHookean = {
   .name = "neohookean",
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
-  .jacobian = PETSC_TRUE,
-  .share = 5. / 6.,
-  .ops = {.energy = energy_neohookean,
+  .positive = PETSC_TRUE,
+  .ops = {.setfromoptions = set_up_neohookean,
+          .energy = energy_neohookean,
           .stress = stress_neohookean,
           .tangent = tangent_neohookean,
           .dilatation = dilatation_neohookean,

@@ -208,6 +208,20 @@ static PetscErrorCode update_friction(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbNewtonLongestStep(SNES snes, PetscReal *s)
+{
+  const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
+  const Vec X = snes->vec_sol;
+  const Vec Y = snes->vec_sol_update;
+
+  PetscFunctionBeginUser;
+  if (p->barrier)
+    PetscCall((*p->barrier->max_step)(p->ctx, X, Y, s, NULL));
+  else if (p->longest)
+    PetscCall((*p->longest)(p->ctx, X, Y, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
@@ -232,8 +246,10 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, largest safe step, line search */
     PetscCall(SbNewtonFindDirection(snes, &slope));
     s = 1.;
-    if (p->barrier && !snes->reason)
-      PetscCall((*p->barrier->max_step)(p->ctx, X, Y, &s, NULL));
+    if (!snes->reason)
+      PetscCall(SbNewtonLongestStep(snes, &s));
+    if (!snes->reason && !p->barrier && s < SHORTEST)
+      snes->reason = SNES_DIVERGED_LINE_SEARCH;
     if (!snes->reason)
       PetscCall(SbNewtonSearch(snes, slope, &s));
     if (snes->reason)

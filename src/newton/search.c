@@ -265,14 +265,12 @@ static PetscErrorCode bracket(Search *q, PetscBool *again)
 static PetscErrorCode improve_direction(Search *q, PetscBool *again)
 {
   const SNES snes = q->snes;
-  const SbNewtonProblem *p = q->n->problem;
 
   PetscFunctionBeginUser;
   PetscCall(SbNewtonSolveAccurately(snes, &q->slope, again));
   if (!*again)
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (p->barrier)
-    PetscCall((*p->barrier->max_step)(p->ctx, snes->vec_sol, snes->vec_sol_update, &q->s, NULL));
+  PetscCall(SbNewtonLongestStep(snes, &q->s));
   PetscCall(find_slopes(snes->vec_sol_update, &q->n->from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -355,7 +353,7 @@ PetscErrorCode SbNewtonSearch(SNES snes, PetscReal slope, PetscReal *s)
 
   PetscFunctionBeginUser;
   q.circulatory = (PetscBool)(p->nonsymmetric && p->dt == 0. && !p->barrier);
-  q.monotone = (PetscBool)(n->nblock > 0 || q.s < 1.);
+  q.monotone = (PetscBool)(p->barrier && (n->nblock > 0 || q.s < 1.));
 
   /* where it begins */
   n->from.x = snes->vec_sol;

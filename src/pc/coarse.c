@@ -445,7 +445,9 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   Vec from;
 
   PetscFunctionBeginUser;
-  if (!c->N)
+
+  /* without a solver, as where the matrix is not finite: its owner reports that */
+  if (!c->N || !c->ok)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (c->direct)
     PetscCall(SbBlockSolverSolve(c->direct, c->c, c->y));

@@ -107,12 +107,34 @@ static PetscErrorCode interrupted(void *ctx, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No tet is inverted whose law does not admit it, neither at X nor at the stage. */
+static PetscErrorCode longest(void *ctx, Vec X, Vec Y, PetscReal *part)
+{
+  const SbRun run = ((SbPotential)ctx)->run;
+  const SbSpace space = run->model->space;
+  const Vec stage = run->solve.stage.U;
+  const PetscReal at = run->solve.stage.part;
+  PetscReal there;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceLongestStep(space, X, Y, 1., part));
+  if (!stage || !space->positive)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecAXPBYPCZ(stage, 1. - at, at, 0., run->solve.stage.start, X));
+  PetscCall(SbSpaceLongestStep(space, stage, Y, at, &there));
+  *part = PetscMin(*part, there);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode max_step(void *ctx, Vec X, Vec Y, PetscReal *part, PetscInt *nactive)
 {
   PetscInt n;
+  PetscReal admissible;
 
   PetscFunctionBeginUser;
   PetscCall(SbContactSetMaxStep(&((SbPotential)ctx)->run->model->contacts, X, Y, part, &n));
+  PetscCall(longest(ctx, X, Y, &admissible));
+  *part = PetscMin(*part, admissible);
   if (nactive)
     *nactive = n;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -245,6 +267,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
                                  .filter = m->may_filter ? filter : NULL,
                                  .negative_eigenvalues = negative_eigenvalues,
                                  .linearise = m->dynamic || nodes ? NULL : linearise,
+                                 .longest = m->space->positive ? longest : NULL,
                                  .prescribed_part = prescribed_part,
                                  .interrupted = interrupted,
                                  .barrier = m->contacts.npotential ? &q->barrier : NULL,

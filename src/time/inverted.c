@@ -1,5 +1,6 @@
 /*
-  Rejects steps that invert tets, with -time_inverted reject.
+  Rejects steps that invert tets, with -time_inverted reject; and those that invert a tet of a law
+  whose energy is infinite there, which has no forces to start the next step from.
 
   det F <= 0 in a tet is no admissible deformation; with laws of finite energy a run could go on,
   with meaningless results. A step that increases the number of such tets is rejected, so inverted
@@ -7,6 +8,18 @@
   nominal length the run stops: shorter steps would only approach the flat tet.
 */
 #include "time_impl.h"
+
+PetscErrorCode SbRunDescribeDivergence(SbRun run, Vec X, SNESConvergedReason reason, size_t size,
+                                       char text[])
+{
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  if (reason == SNES_DIVERGED_FNORM_NAN)
+    PetscCall(SbSpaceDescribeInverted(run->model->space, X, size, text));
+  if (!text[0])
+    PetscCall(PetscStrncpy(text, SNESConvergedReasons[reason], size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
                                    PetscBool *ok)
@@ -16,6 +29,18 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
 
   PetscFunctionBeginUser;
   run->solve.rejected_inverted = PETSC_FALSE;
+  if (*ok && run->model->space->positive) {
+    char inverted[512];
+
+    PetscCall(SbSpaceDescribeInverted(run->model->space, U[1], sizeof(inverted), inverted));
+    if (inverted[0]) {
+      *ok = PETSC_FALSE;
+      run->solve.rejected_inverted = PETSC_TRUE;
+      PetscCall(SbRunFail(run, "%s %g to %g: %s",
+                          run->solve.ts ? "the step from t, s =" : "the step from the load factor",
+                          (double)t, (double)(t + dt), inverted));
+    }
+  }
   if (!run->solve.reject_inverted || !*ok)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) {

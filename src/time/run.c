@@ -102,6 +102,13 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
              PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
              "same method");
+  for (PetscInt k = 0; k < model->nmaterial; k++)
+    PetscCheck(
+      !model->material[k]->positive || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
+      PETSC_ERR_USER,
+      "-body_%s_material %s: -time alpha2 cannot reject steps that invert a tet, which the "
+      "law does not admit; take genalpha, which is the same method",
+      model->material[k]->name, model->material[k]->type->name);
   for (PetscInt e = 0; e < model->neffect; e++) {
     r->solve.saddle = (PetscBool)(r->solve.saddle ||
                                   (model->effect[e]->contact && model->effect[e]->contact->saddle));
@@ -309,6 +316,7 @@ PetscErrorCode SbRunSolve(SbRun run)
 {
   const SbModel m = run->model;
   const char *unit = m->dynamic ? " s" : "";
+  char inverted[512];
 
   PetscFunctionBeginUser;
 
@@ -328,6 +336,8 @@ PetscErrorCode SbRunSolve(SbRun run)
   run->clock.paused = PETSC_FALSE;
   run->monitors.last.U = NULL;
   PetscCall(start_contacts(run));
+  PetscCall(SbSpaceDescribeInverted(m->space, run->state.U, sizeof(inverted), inverted));
+  PetscCheck(!inverted[0], m->comm, PETSC_ERR_USER_INPUT, "The run cannot start: %s", inverted);
   if (run->solve.ts)
     PetscCall(SbRunIntegrate(run));
   else if (run->clock.arc.on)

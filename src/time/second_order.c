@@ -184,6 +184,7 @@ static PetscErrorCode predict(void *ctx)
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
   const PetscReal h = ts->time_step;
+  PetscReal part;
   PetscBool warm;
   KSP ksp;
 
@@ -197,8 +198,12 @@ static PetscErrorCode predict(void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecCopy(so->X0, so->X1));
-  if (run->solve.velocity_predictor)
-    PetscCall(VecAXPY(so->X1, h, so->V0));
+  if (run->solve.velocity_predictor) {
+    /* unless that inverts a tet whose law does not admit it */
+    PetscCall(SbSpaceLongestStep(run->model->space, so->X0, so->V0, -h, &part));
+    if (part == 1.)
+      PetscCall(VecAXPY(so->X1, h, so->V0));
+  }
   PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
 
   /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
@@ -299,17 +304,28 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->free1));
     PetscCall(VecAXPY(so->A1, 1. / h, so->work));
   }
-  if (!*ok && !ts->usessnes)
-    PetscCall(
-      SbRunFail(run,
-                "step %" PetscInt_FMT
-                " at t = %g s: the explicit solution is not finite, or beyond 1e15 m; its step "
-                "of %g s is beyond the stable one (see the header)",
-                ts->steps + 1, (double)ts->ptime, (double)h));
-  else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
-    char why[512] = "";
-    const char *what = SNESConvergedReasons[reason];
+  if (!*ok && !ts->usessnes) {
+    char inverted[512];
 
+    PetscCall(SbSpaceDescribeInverted(run->model->space, so->X1, sizeof(inverted), inverted));
+    if (inverted[0])
+      PetscCall(SbRunFail(run,
+                          "step %" PetscInt_FMT
+                          " at t = %g s with a length of %g s: %s, as may be a shorter -ts_dt",
+                          ts->steps + 1, (double)ts->ptime, (double)h, inverted));
+    else
+      PetscCall(
+        SbRunFail(run,
+                  "step %" PetscInt_FMT
+                  " at t = %g s: the explicit solution is not finite, or beyond 1e15 m; its step "
+                  "of %g s is beyond the stable one (see the header)",
+                  ts->steps + 1, (double)ts->ptime, (double)h));
+  } else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
+    char why[512] = "";
+    char diverged[512];
+    const char *what = diverged;
+
+    PetscCall(SbRunDescribeDivergence(run, so->X1, reason, sizeof(diverged), diverged));
     if (unsettled[0])
       what = unsettled;
     else if (reason > 0)

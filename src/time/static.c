@@ -166,15 +166,16 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     if (found && unsettled[0])
       SbAppend(sizeof(l->run->clock.stop_reason), l->run->clock.stop_reason, "; %s", unsettled);
     if (!found) {
-      char near[512];
+      char near[512], what[512];
 
       if (reason == SNES_DIVERGED_LINEAR_SOLVE)
         PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
       PetscCall(SbContactSetNearest(&l->run->model->contacts, sizeof(near), near));
       SbRunSuspects(l->run, sizeof(near), near);
+      PetscCall(SbRunDescribeDivergence(l->run, l->X, reason, sizeof(what), what));
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
-                          unsettled[0] ? unsettled : SNESConvergedReasons[reason], why,
-                          near[0] ? "; " : "", near));
+                          unsettled[0] ? unsettled : what, why, near[0] ? "; " : "",
+                          near));
     }
   }
 

@@ -87,10 +87,15 @@ void SbRunSuspects(SbRun run, size_t size, char text[]);
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /* inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted
-   reject. U: displacements at its start and end. Not ok: it inverted tets; sets
-   run->solve.rejected_inverted, stop_reason. */
+   reject or a law that does not admit inverted tets. U: displacements at its start and end. Not ok:
+   it inverted tets; sets run->solve.rejected_inverted, stop_reason. */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
                                    PetscBool *ok);
+
+/* Why Newton's method diverged: its reason, or that the first iterate X has an inverted tet whose
+   law does not admit it. Collective. */
+PetscErrorCode SbRunDescribeDivergence(SbRun run, Vec X, SNESConvergedReason reason, size_t size,
+                                       char text[]);
 
 /* callbacks.c: the model for PETSc's TS and SNES. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);

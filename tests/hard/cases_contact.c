@@ -5,8 +5,8 @@
 #include "hard.h"
 
 /* A material for a body: modulus (Pa) and density (kg/m^3). */
-#define FLESH(body, young, density)                                               \
-  "-body_" body "_material neohookean -body_" body "_young " young " -body_" body \
+#define FLESH(body, young, density)                                                      \
+  "-body_" body "_material stable_neohookean -body_" body "_young " young " -body_" body \
   "_poisson 0.3 -body_" body "_density " density " "
 #define FLOOR                                                                           \
   "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle " \

@@ -42,12 +42,12 @@
 
 const HardCase HardCasesMaterial[] = {
   INCOMPRESSIBLE("p1", "corotated", "2", "0.4", 1),
-  INCOMPRESSIBLE("p1", "neohookean", "2", "0.4", 0),
+  INCOMPRESSIBLE("p1", "stable_neohookean", "2", "0.4", 0),
   INCOMPRESSIBLE("cr", "corotated", "1", "0.1", 0),
   INCOMPRESSIBLE("dg", "corotated", "1", "0.1 -solver pressure", 0),
   INCOMPRESSIBLE("p2", "corotated", "1", "0.1", 0),
   INCLUSION("p1", "corotated", 1),
-  INCLUSION("p1", "neohookean", 0),
+  INCLUSION("p1", "stable_neohookean", 0),
   INCLUSION("cr", "corotated", 0),
   INCLUSION("dg", "corotated", 0),
   INCLUSION("p2", "corotated", 0),

@@ -26,7 +26,7 @@
 
 const HardCase HardCasesMesh[] = {
   BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "p1", "corotated", 1),
-  BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "p1", "neohookean", 0),
+  BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "p1", "stable_neohookean", 0),
   BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "cr", "corotated", 0),
   BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "dg", "corotated", 0),
   BLOCK("sliver", SLIVER, HardMeshSliver, "2e5", "p2", "corotated", 0),

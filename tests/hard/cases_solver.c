@@ -181,7 +181,7 @@ const HardCase HardCasesSolver[] = {
               {HARD_STEPS, '<', 40}}},
   FREE("p1", "linear", 1),
   FREE("p1", "corotated", 1),
-  FREE("p1", "neohookean", 0),
+  FREE("p1", "stable_neohookean", 0),
   FREE("cr", "linear", 0),
   FREE("dg", "corotated", 0),
   FREE("p2", "corotated", 0),

@@ -41,7 +41,7 @@
 
 const HardCase HardCasesTime[] = {
   COARSE("p1", "euler_implicit", "corotated", 1),
-  COARSE("p1", "euler_implicit", "neohookean", 0),
+  COARSE("p1", "euler_implicit", "stable_neohookean", 0),
   COARSE("cr", "euler_implicit", "corotated", 0),
   COARSE("dg", "euler_implicit", "corotated", 0),
   COARSE("p2", "euler_implicit", "corotated", 0),

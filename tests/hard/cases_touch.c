@@ -9,7 +9,7 @@
 
 #define BLOCK(body, cells, at, velocity, law)                                                 \
   "-body_" body "_mesh box:0.1,0.1,0.1:" cells " -body_" body "_translate " at " -body_" body \
-  "_velocity " velocity " -body_" body "_material neohookean -body_" body                     \
+  "_velocity " velocity " -body_" body "_material stable_neohookean -body_" body              \
   "_poisson 0.3 -body_" body "_density 1000 -body_" body "_young " law " "
 
 /* Two blocks of the same mesh, the upper one initially in exact contact, and moving down
@@ -46,14 +46,15 @@
   }
 
 /* All lengths scale with L, and times with the same wave speed: the same solution, scaled. */
-#define SCALE(L, near, at, dt, end)                                                          \
-  "-bodies a,b -body_a_mesh box:" L "," L "," L ":3 -body_b_mesh box:" L "," L "," L         \
-  ":2 -body_b_translate " near "," near "," at                                               \
-  " -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 "  \
-  "-body_b_velocity "                                                                        \
-  "0.2,0,-1 -effects floor,meet -effect_floor_type contact "                                 \
-  "-effect_floor_obstacle plane:0,0,1,0 -effect_meet_type contact "                          \
+#define SCALE(L, near, at, dt, end)                                                                \
+  "-bodies a,b -body_a_mesh box:" L "," L "," L ":3 -body_b_mesh box:" L "," L "," L               \
+  ":2 -body_b_translate " near "," near "," at                                                     \
+  " -body_a_material stable_neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density "     \
+  "1000 "                                                                                          \
+  "-body_b_material stable_neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 " \
+  "-body_b_velocity "                                                                              \
+  "0.2,0,-1 -effects floor,meet -effect_floor_type contact "                                       \
+  "-effect_floor_obstacle plane:0,0,1,0 -effect_meet_type contact "                                \
   "-effect_meet_friction 0.3 -ts_dt " dt " -ts_max_time " end
 #define SCALE_LIMITS                                                            \
   {                                                                             \
@@ -66,15 +67,16 @@
 
 /* A fine body below a coarse one: 169 vertices of the fine surface are in contact with one face of
    the coarse one. */
-#define HUNDRED(friction)                                                                         \
-  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 "             \
-  "-body_b_translate "                                                                            \
-  "0,0,0.0201 -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density " \
-  "1000 "                                                                                         \
-  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 "       \
-  "-effects "                                                                                     \
-  "gravity,floor,meet -effect_floor_type contact -effect_floor_obstacle "                         \
-  "plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact "                           \
+#define HUNDRED(friction)                                                                          \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 "              \
+  "-body_b_translate "                                                                             \
+  "0,0,0.0201 -body_a_material stable_neohookean -body_a_young 1e5 -body_a_poisson 0.3 "           \
+  "-body_a_density "                                                                               \
+  "1000 "                                                                                          \
+  "-body_b_material stable_neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 " \
+  "-effects "                                                                                      \
+  "gravity,floor,meet -effect_floor_type contact -effect_floor_obstacle "                          \
+  "plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact "                            \
   "-effect_meet_friction " friction " -ts_dt 0.005 -ts_max_time 0.03"
 #define HUNDRED_LIMITS                                                         \
   {                                                                            \

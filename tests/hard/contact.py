@@ -48,7 +48,7 @@ class Scene:
         meshes.write_msh(path, mesh)
         return str(path)
 
-    def body(self, name, mesh, young=1e5, poisson=0.4, law="neohookean", density=1000, **more):
+    def body(self, name, mesh, young=1e5, poisson=0.4, law="stable_neohookean", density=1000, **more):
         """mesh: points and tets, or the value of -body_NAME_mesh."""
         self.bodies.append(name)
         options = dict(mesh=mesh if isinstance(mesh, str) else self.file(name, mesh), young=young, poisson=poisson, material=law,

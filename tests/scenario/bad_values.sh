@@ -7,7 +7,7 @@ source tests/scenario/scenario_common.sh
 cat >block.opts <<'END2'
 -bodies block
 -body_block_mesh box:0.1,0.1,0.1:1
--body_block_material neohookean
+-body_block_material stable_neohookean
 -body_block_young 1e5
 -body_block_poisson 0.3
 -sets top

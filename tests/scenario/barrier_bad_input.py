@@ -12,7 +12,7 @@ from pathlib import Path
 
 SUPPLE, OUT = os.environ["SB_SUPPLE"], Path(os.environ["SB_OUT"])
 MPI = [*os.environ["SB_MPI"].split(), os.environ["SB_RANKS"]]
-BLOCK = "-bodies block -body_block_mesh box:0.1,0.1,0.1:3 -body_block_material neohookean -body_block_young 1e5 -body_block_poisson 0.3 -body_block_density 1000"
+BLOCK = "-bodies block -body_block_mesh box:0.1,0.1,0.1:3 -body_block_material stable_neohookean -body_block_young 1e5 -body_block_poisson 0.3 -body_block_density 1000"
 HELD = "-effects hold,plate -effect_hold_type fixed -effect_hold_on zmin"
 PLATE = "-effect_plate_type contact -effect_plate_response barrier -effect_plate_verify yes"
 ABOVE = "-effect_plate_obstacle box:-0.1,-0.1,0.11,0.2,0.2,0.13"
@@ -55,7 +55,7 @@ code, text, _ = run("open", BLOCK, "-effects plate", PLATE, f"-effect_plate_obst
 expect("open", text, code != 0 and "open.off" in text and "edge" in text)
 
 # bodies whose surfaces that may touch are open there, of each one side: the upper one hangs over the border
-two = BLOCK.replace("-bodies block", "-bodies block,high") + (" -body_high_mesh box:0.1,0.1,0.1:3 -body_high_material neohookean -body_high_young 1e5 -body_high_poisson 0.3"
+two = BLOCK.replace("-bodies block", "-bodies block,high") + (" -body_high_mesh box:0.1,0.1,0.1:3 -body_high_material stable_neohookean -body_high_young 1e5 -body_high_poisson 0.3"
                                                               " -body_high_density 1000 -body_high_translate 0.07,0.03,0.105 -body_high_velocity 0,0,-1")
 code, text, rows = run("border", two, "-sets base,top,under -set_base_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -set_under_at plane:0,0,1,0.105",
                        "-effects hold,gravity,meet -effect_hold_type fixed -effect_hold_on base -effect_meet_type contact -effect_meet_response barrier",

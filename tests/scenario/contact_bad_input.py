@@ -16,7 +16,7 @@ from pathlib import Path
 SUPPLE, OUT = os.environ["SB_SUPPLE"], Path(os.environ["SB_OUT"])
 MPI = [*os.environ["SB_MPI"].split(), os.environ["SB_RANKS"]]
 ALL = ("barrier", "projected", "multiplier", "augmented", "penalty")
-BODY = ("-body_{0}_mesh box:{1} -body_{0}_translate {2} -body_{0}_material neohookean -body_{0}_young 1e5 -body_{0}_poisson 0.3 "
+BODY = ("-body_{0}_mesh box:{1} -body_{0}_translate {2} -body_{0}_material stable_neohookean -body_{0}_young 1e5 -body_{0}_poisson 0.3 "
         "-body_{0}_density 1000 ")
 TIME = "-time euler_implicit -ts_dt 0.01 -ts_max_time 0.05 "
 A = BODY.format("a", "0.1,0.1,0.1:2", "0,0,0")

@@ -40,7 +40,7 @@ echo '-time static' >>pressed.opts
 cat >bar.opts <<'END'
 -bodies a
 -body_a_mesh box:0.4,0.1,0.1:3
--body_a_material neohookean
+-body_a_material stable_neohookean
 -body_a_young 1e6
 -body_a_poisson 0.45
 -effects gravity,clamp

@@ -31,7 +31,7 @@ def run(name: str, depth: float, hold: str, cells: str, ranks: int, extra: str) 
     done = subprocess.run(
         [*os.environ["SB_MPI"].split(), str(ranks), os.environ["SB_SUPPLE"], *(
             f"-bodies a,b -body_a_mesh box:0.1,0.1,0.1:{one} -body_b_mesh box:0.1,0.1,0.1:{two} -body_b_translate {SIZE - depth:.17g},0,0 "
-            f"-body_default_material neohookean -body_default_young {YOUNG} -body_default_poisson 0.4 -body_default_density 1000 "
+            f"-body_default_material stable_neohookean -body_default_young {YOUNG} -body_default_poisson 0.4 -body_default_density 1000 "
             f"-effects meet{fixed} -effect_meet_type contact -time euler_implicit -ts_dt {STEP} -ts_max_time {time} "
             f"-output_every 0 -output_dir {OUT / name} {extra}").split()], capture_output=True, text=True, check=False)
     rows = list(csv.reader(open(OUT / name / "history.csv", encoding="utf-8"))) if done.returncode == 0 else []

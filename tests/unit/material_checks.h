@@ -479,6 +479,33 @@ static inline void check_inversion(SbMaterial m, PetscBool recovers)
   }
 }
 
+/* A law that does not admit det F <= 0: the energy grows without bound towards it, and is infinite
+   from there on, where no stress is a number. */
+static inline void check_barrier(SbMaterial m)
+{
+  PetscReal before = 0;
+
+  for (int t = 0; t < 40; t++) {
+    const PetscReal s = pow(0.5, t);
+    PetscReal F[9], P[9];
+
+    with_stretches(1.1, 0.9, s, F);
+    const PetscReal energy = energy_of(m, F);
+    stress_of(m, F, P);
+    SB_CHECK(isfinite(energy) && (t < 1 || energy > before), "%s: energy %g of the stretch %g",
+             m->type->name, energy, s);
+    SB_CHECK(isfinite(SbDot9(P, P)), "%s: no stress of the stretch %g", m->type->name, s);
+    before = energy;
+    with_stretches(1.1, 0.9, t == 0 ? 0 : -s, F);
+    if (t == 0)
+      memset(F, 0, 3 * sizeof(*F));
+    stress_of(m, F, P);
+    SB_CHECK(isinf(energy_of(m, F)) && energy_of(m, F) > 0, "%s: energy %g of the stretch %g",
+             m->type->name, energy_of(m, F), -s);
+    SB_CHECK(!isfinite(SbDot9(P, P)), "%s: stress %g of the stretch %g", m->type->name, P[0], -s);
+  }
+}
+
 /* Jacobi's method: eigenvalues w and eigenvectors (rows of V) of a symmetric 9x9 matrix. */
 static inline void eigen9(const PetscReal C[81], PetscReal w[9], PetscReal V[81])
 {
@@ -558,6 +585,8 @@ static inline PetscErrorCode check_spd(SbMaterial m)
       with_stretches(1 + 0.6 * uniform(), 0.8 + 0.5 * uniform(),
                      0.5 + (t % 4 == 2 ? 0.7 : 0.3) * uniform(), F);
     }
+    if (m->type->positive && SbMatDet(F) <= 0)
+      continue;
     PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
     tangent_of(m, F, exact);
     PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT_SPD));
@@ -675,13 +704,16 @@ static inline PetscErrorCode check_law(SbMaterial m)
   if (m->linear)
     PetscFunctionReturn(PETSC_SUCCESS);
   check_rotations(m);
-  check_inversion(m, PETSC_FALSE);
+  if (m->type->positive)
+    check_barrier(m);
+  else
+    check_inversion(m, PETSC_FALSE);
   for (int t = 0; t < 100; t++) {
     random_deformation(0.25, F);
     check_invariance(m, F);
     check_damping(m, F);
   }
-  for (int t = 0; t < 100; t++) {
+  for (int t = 0; t < 100 && !m->type->positive; t++) {
     with_stretches(1.2 + 0.3 * uniform(), 1, -0.3 + 0.2 * uniform(), F);
     check_derivatives(m, F, "order of the Taylor remainder, inverted");
     check_invariance(m, F);

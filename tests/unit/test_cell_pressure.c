@@ -98,7 +98,7 @@ static PetscErrorCode test_scene(void)
     "-bodies a,b,c -body_a_mesh box:1,1,1:2 -body_b_mesh box:1,1,1:2 -body_c_mesh box:1,1,1:2 "
     "-body_a_element p1 -body_b_element cr -body_c_element dg -body_a_material linear "
     "-body_b_material stvk "
-    "-body_c_material neohookean -body_a_young 1000 -body_a_poisson 0.3 -body_b_young 5000 "
+    "-body_c_material stable_neohookean -body_a_young 1000 -body_a_poisson 0.3 -body_b_young 5000 "
     "-body_b_poisson 0.25 -body_c_young 2000 -body_c_poisson 0.4 -time newmark -ts_dt 0.1 "
     "-ts_max_time 1",
     &scene));

@@ -122,7 +122,8 @@ static const SbEffectType type = {
 
 static const char bodies[] =
   "-bodies a,b -body_a_mesh box:1,1,1:2 -body_b_mesh box:1,1,1:2 -body_b_translate 3,0,0 "
-  "-body_a_material neohookean -body_b_material neohookean -body_a_young 1e4 -body_b_young 2e4 "
+  "-body_a_material stable_neohookean -body_b_material stable_neohookean -body_a_young 1e4 "
+  "-body_b_young 2e4 "
   "-body_a_poisson 0.3 -body_b_poisson 0.3 -body_a_density 1000 -body_b_density 1000 "
   "-effect_left_type fixed -effect_left_on a.xmin -effect_right_type fixed -effect_right_on b.xmax "
   "-time static -static_steps 2 -validate yes ";

@@ -181,7 +181,8 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[4 * NVALUE])
     comm,
     "-bodies a,b,c,d -body_d_mesh box:1,1,1:2 -body_d_element p2 -body_d_translate 6,0,0 "
     "-body_d_material "
-    "neohookean -body_d_young 1e3 -body_d_poisson 0.49 -body_d_density 1 -body_a_mesh box:1,1,1:4 "
+    "stable_neohookean -body_d_young 1e3 -body_d_poisson 0.49 -body_d_density 1 -body_a_mesh "
+    "box:1,1,1:4 "
     "-body_b_mesh box:1,1,1:3 -body_c_mesh box:1,1,1:2 "
     "-body_b_element cr -body_c_element dg -body_b_translate 2,0,0 -body_c_translate 4,0,0 "
     "-body_a_material linear -body_b_material corotated -body_c_material linear -body_a_young 1e3 "

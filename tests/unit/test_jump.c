@@ -13,7 +13,7 @@ static const char *const scene =
   "-bodies a,b -body_a_mesh box:0.5,0.4,0.3:2 -body_a_material corotated -body_a_young 1e5 "
   "-body_a_poisson 0.3 -body_a_density 1000 -body_a_element %s -body_a_gamma1 0.7 %s "
   "-body_b_mesh tests/data/two_cubes_41.msh -body_b_scale 0.1 -body_b_translate 0,0,2 "
-  "-body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 -body_b_density 500 "
+  "-body_b_material stable_neohookean -body_b_young 3e5 -body_b_poisson 0.45 -body_b_density 500 "
   "-body_b_element %s "
   "-effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type fixed -effect_clamp_on "
   "a.xmin";

@@ -265,7 +265,7 @@ static PetscErrorCode check_barrier(void)
 {
   static const Case barrier = {"barrier",
                                "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_element cr "
-                               "-body_a_material neohookean -body_a_young "
+                               "-body_a_material stable_neohookean -body_a_young "
                                "1e6 -body_a_poisson 0.3 -effects gravity,clamp,floor " HELD
                                "-effect_floor_type contact -effect_floor_response barrier "
                                "-effect_floor_obstacle box:0.2,-1,-1,1,1,-0.003 -time static ",

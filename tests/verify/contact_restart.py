@@ -31,19 +31,19 @@ DEEP = ("-bodies a -body_a_mesh box:0.1,0.1,0.05:2 " + BOX.format("a", "corotate
         "-effect_floor_friction 0.3 -ts_dt 0.005 -ts_max_time {end} -effect_floor_response ")
 # a block on its corner hits a floor at 100 m/s, nodes at faces; half of it is squeezed when the checkpoint is written
 CORNER = ("-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element cr -body_a_rotate 1,-1,0,54.7356 "
-          "-body_a_translate 0,0,0 -body_a_velocity 3,0,-100 " + BOX.format("a", "neohookean", "1e9")
+          "-body_a_translate 0,0,0 -body_a_velocity 3,0,-100 " + BOX.format("a", "stable_neohookean", "1e9")
           + "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
           "-effect_floor_friction 0.2 -ts_dt 1e-5 -ts_max_time {end} -effect_floor_response ")
 # pressed to a fifth of its height, and half-way back when the checkpoint is written
-PRESSED = ("-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element cr " + BOX.format("a", "neohookean", "1e4")
+PRESSED = ("-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element cr " + BOX.format("a", "stable_neohookean", "1e4")
            + "-effects high,low -effect_high_type contact -effect_high_obstacle plane:0,0,-1,-0.0501 -effect_high_displacement "
            "0;0;-0.04*min(1,t/0.1)+0.04*max(0,min(1,(t-0.12)/0.1)) -effect_low_type contact -effect_low_obstacle plane:0,0,1,-0.0001 "
            "-time newmark -ts_dt 0.004 -ts_max_time {end} -snes_rtol 1e-10")
 # a bar of CR that swings up again: at the checkpoint, step 24, its faces have just lost their pressure
-SWING = ("-bodies a -body_a_mesh box:0.4,0.1,0.1:1 -body_a_element cr -body_a_material neohookean -body_a_young 3e4 -body_a_poisson 0.45 "
+SWING = ("-bodies a -body_a_mesh box:0.4,0.1,0.1:1 -body_a_element cr -body_a_material stable_neohookean -body_a_young 3e4 -body_a_poisson 0.45 "
          "-body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on xmin "
          "-time newmark -ts_dt 0.01 -ts_max_time {end}")
-CUBE = ("-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element cr -body_a_material neohookean -body_a_young 1e4 -body_a_poisson 0.45 "
+CUBE = ("-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element cr -body_a_material stable_neohookean -body_a_young 1e4 -body_a_poisson 0.45 "
         "-body_a_density 1000 -effects low,high -effect_low_type fixed -effect_low_on zmin -effect_high_type prescribed_displacement -effect_high_on zmax "
         "-effect_high_displacement ")
 COMMON = ("-time euler_implicit -snes_rtol 1e-12 -ksp_rtol 1e-12 -quiet -output_fields none -checkpoint_keep 1 "

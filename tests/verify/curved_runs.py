@@ -13,7 +13,7 @@ import numpy
 from output_common import MPI, OUT, SUPPLE
 
 TOOL = str(Path(SUPPLE).with_name("supple-mesh"))
-SCENE = ["-bodies", "a", "-body_a_element", "p2", "-body_a_material", "neohookean", "-body_a_young", "1e5", "-body_a_poisson", "0.45", "-body_a_density", "1000",
+SCENE = ["-bodies", "a", "-body_a_element", "p2", "-body_a_material", "stable_neohookean", "-body_a_young", "1e5", "-body_a_poisson", "0.45", "-body_a_density", "1000",
          "-body_a_angular_velocity", "0.5,1,2", "-sets", "foot", "-set_foot_at", "plane:1,0,0,0,0.1", "-effects", "hold,weight", "-effect_hold_type", "fixed", "-effect_hold_on", "foot",
          "-effect_weight_type", "gravity", "-time", "newmark", "-ts_dt", "0.005", "-ts_max_time", "0.04", "-solver", "direct", "-snes_rtol", "1e-13", "-remesh_times", "0.02",
          "-checkpoint_every_steps", "1", "-checkpoint_keep", "20", "-output_quadratic", "yes", "-output_precision", "double", "-output_fields", "displacement,velocity", "-quiet"]

@@ -88,7 +88,7 @@ for i, element in enumerate(("p1", "p2", "cr", "dg")):
         CASES.append((f"{element}_{tets}", ranks, f"-bodies a {body('a', tets, element)} {HANG} {TIGHT}"))
     CASES.append((f"static_{element}", 7, f"-bodies a {body('a', 6, element)} {HANG} {TIGHT} -time static -effect_clamp_on foot,xmin"))
     CASES.append((f"free_{element}", 3, f"-bodies a {body('a', 1, element)} -effects gravity {TIGHT} -body_a_angular_velocity 0,0,9"))
-for law in ("linear", "stvk", "neohookean"):
+for law in ("linear", "stvk", "stable_neohookean"):
     CASES.append((law, 3, f"-bodies a {body('a', 2, 'p1', f'-body_a_material {law}')} {HANG} {TIGHT}"))
 
 # Effects.

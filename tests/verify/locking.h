@@ -321,7 +321,8 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
   PetscFunctionBeginUser;
   PetscCall(locking_run(
     &t, cost, more,
-    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material stable_neohookean -body_a_young "
+    "1e5 "
     "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned -effect_held_type fixed "
     "-effect_held_on xmin -effect_turned_type prescribed_displacement -effect_turned_on xmax "
     "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "

@@ -53,7 +53,7 @@ def check_bars(response):
 def check_stack(response):
     """Static, held by friction alone; then in time: nothing moves."""
     sizes = ("0.3,0.3,0.1:4", "0.2,0.2,0.1:3", "0.1,0.12,0.1:2")
-    options = "-bodies a,b,c " + "".join(BODY.format(k, "box:" + s, "neohookean", "1e6", "0.3") for k, s in zip("abc", sizes))
+    options = "-bodies a,b,c " + "".join(BODY.format(k, "box:" + s, "stable_neohookean", "1e6", "0.3") for k, s in zip("abc", sizes))
     options += ("-body_b_translate 0.05,0.04,0.1003 -body_c_translate 0.11,0.07,0.2006 -effects g,hold,meet -effect_g_type gravity "
                 "-effect_hold_type fixed -effect_hold_on a.zmin -effect_meet_type contact -effect_meet_friction 0.5 -effect_meet_pairs yes "
                 f"-effect_meet_barrier_width 3e-4 -effect_meet_response {response} ")
@@ -86,7 +86,7 @@ def check_arch(response, stones=7, gap=1e-4, young="1e8", name="arch"):
                 tet = tet if numpy.dot(numpy.cross(b - a, c - a), d - a) > 0 else (tet[1], tet[0], *tet[2:])
                 f.write(f"{i + 1} 4 2 0 1 " + " ".join(str(j + 1) for j in tet) + "\n")
             f.write("$EndElements\n")
-        options += BODY.format(f"s{k}", path, "neohookean", young, "0.2")
+        options += BODY.format(f"s{k}", path, "stable_neohookean", young, "0.2")
     options += (f"-sets left,right -set_left_at plane:0,0,1,0 -set_right_at plane:0,0,1,0 -effects g,hold,meet -effect_g_type gravity "
                 "-effect_hold_type fixed -effect_hold_on left -effect_meet_type contact -effect_meet_friction 0.6 -effect_meet_pairs yes "
                 f"-effect_meet_barrier_width {gap} -effect_meet_response {response} -effect_meet_verify yes -time static")

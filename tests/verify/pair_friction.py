@@ -12,7 +12,7 @@ import numpy
 from output_common import MPI, OUT, SUPPLE
 
 BLOCKS = ("-bodies a,b -body_a_mesh box:0.4,0.2,0.05:6,3,1 -body_b_mesh box:0.1,0.1,0.05:3,3,2 -body_b_translate 0.05,0.05,0.05015 "
-          + "".join(f"-body_{k}_material neohookean -body_{k}_young 1e6 -body_{k}_poisson 0.3 -body_{k}_density 1000 " for k in "ab")
+          + "".join(f"-body_{k}_material stable_neohookean -body_{k}_young 1e6 -body_{k}_poisson 0.3 -body_{k}_density 1000 " for k in "ab")
           + "-effects g,hold,meet -effect_g_type gravity -effect_g_vector 4.905,0,-8.4957 -effect_hold_type fixed -effect_hold_on a.zmin "
           "-effect_meet_type contact -effect_meet_verify yes -output_fields none -probes p -probe_p_on b -quiet -reproducible ")
 STEPS = "-time euler_implicit -ts_dt 0.005 "

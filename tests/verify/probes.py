@@ -17,7 +17,7 @@ MPI = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
 OUT = Path(os.environ.get("SB_OUT", "build/test-out/probes")).resolve()
 SCENE = """-bodies cube
 -body_cube_mesh box:0.1,0.1,0.1:4
--body_cube_material neohookean
+-body_cube_material stable_neohookean
 -body_cube_young 1e4
 -body_cube_poisson 0.3
 -body_cube_density 1000

@@ -331,7 +331,7 @@ static PetscErrorCode check_ranks(void)
 
       PetscCall(test_open_on(
         r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
-        "-bodies a" VERIFY_BODY("a", "%s", "neohookean", "1e6",
+        "-bodies a" VERIFY_BODY("a", "%s", "stable_neohookean", "1e6",
                                 "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 "
                                         "-effects f,g -effect_f_type "
                                         "fixed -effect_f_on foot -effect_g_type gravity "

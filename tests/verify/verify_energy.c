@@ -210,7 +210,8 @@ static PetscErrorCode check_swing(const char *element)
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_element %s -body_a_material neohookean "
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_element %s -body_a_material "
+    "stable_neohookean "
     "-body_a_young "
     "3e4 -body_a_poisson 0.45 -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector "
     "0,0,-9.81 "
@@ -321,7 +322,7 @@ static PetscErrorCode check_turning(const char *time, const char *element)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.3,0.1,0.1:2" BODY
-    "-body_a_element %s -body_a_material neohookean -effects "
+    "-body_a_element %s -body_a_material stable_neohookean -effects "
     "clamp,end -effect_clamp_type fixed -effect_clamp_on "
     "xmin -effect_end_type prescribed_displacement -effect_end_on xmax -effect_end_displacement "
     "0;0;0.01*t -effect_end_angle 90*t -effect_end_axis 1,0,0 -effect_end_axis_point 0,0.05,0.05 "
@@ -359,12 +360,12 @@ int main(int argc, char **argv)
   PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
   PetscCall(check_turning("euler_implicit -ts_dt 0.1 -ts_max_time 1", "p1"));
   PetscCall(check_turning("static -static_steps 10", "p2"));
-  PetscCall(
-    check_gain("grip", 9.5e-4,
-               "-bodies a -body_a_mesh box:0.1,0.1,0.3:2,2,6 -body_a_translate -0.05,-0.05,0" BODY
-               "-body_a_material neohookean -effects clamp,left,right -effect_clamp_type fixed "
-               "-effect_clamp_on zmin -time static -static_steps 20" ROD("left", "-0.0612")
-                 ROD("right", "0.0612")));
+  PetscCall(check_gain(
+    "grip", 9.5e-4,
+    "-bodies a -body_a_mesh box:0.1,0.1,0.3:2,2,6 -body_a_translate -0.05,-0.05,0" BODY
+    "-body_a_material stable_neohookean -effects clamp,left,right -effect_clamp_type fixed "
+    "-effect_clamp_on zmin -time static -static_steps 20" ROD("left", "-0.0612")
+      ROD("right", "0.0612")));
   PetscCall(check_swing("cr"));
   PetscCall(check_swing("dg"));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
@@ -376,10 +377,10 @@ int main(int argc, char **argv)
   PetscCall(check_flight("newmark", "p2", "corotated", 2e-3, 2));
   if (test_size > 1)
     SB_TEST_END(); /* materials and short steps do not depend on ranks */
-  PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
+  PetscCall(check_flight("newmark", "p1", "stable_neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "linear", 2e-3, -1));
   PetscCall(check_flight("alpha2", "p1", "corotated", 2e-3, -1));
-  PetscCall(check_flight("euler_symplectic", "p1", "neohookean", 2e-4, 0));
+  PetscCall(check_flight("euler_symplectic", "p1", "stable_neohookean", 2e-4, 0));
   PetscCall(check_flight("euler_explicit", "p1", "corotated", 5e-5, 1));
   for (int e = 0; e < 3; e++) {
     static const char *const elements[] = {"cr", "dg", "p2"};
@@ -388,7 +389,7 @@ int main(int argc, char **argv)
     PetscCall(check_flight("genalpha", element, "stvk", 2e-3, 2));
     PetscCall(check_flight("newmark", element, "linear", 2e-3, -1));
     PetscCall(check_flight("euler_symplectic", element, "corotated", 1e-4, 0));
-    PetscCall(check_flight("euler_symplectic", element, "neohookean", 1e-4, 0));
+    PetscCall(check_flight("euler_symplectic", element, "stable_neohookean", 1e-4, 0));
   }
   SB_TEST_END();
 }

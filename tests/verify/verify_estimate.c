@@ -546,7 +546,7 @@ static const Problem corotated = {
   NULL};
 static const Problem neohookean = {
   "turned, neo-Hookean",
-  BAR "-body_a_material neohookean -effect_weight_vector 0,0,-2 -solver direct",
+  BAR "-body_a_material stable_neohookean -effect_weight_vector 0,0,-2 -solver direct",
   {4, 1, 1},
   {0.4, 0.1, 0.1},
   NULL};

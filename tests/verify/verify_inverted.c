@@ -11,9 +11,9 @@
 */
 #include "scene.h"
 
-#define BOX                                                                                 \
-  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e4 " \
-  "-body_a_poisson "                                                                        \
+#define BOX                                                                                        \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material stable_neohookean -body_a_young 1e4 " \
+  "-body_a_poisson "                                                                               \
   "0.3 -body_a_density 1000 "
 #define PRESS \
   BOX "-effects press -effect_press_type prescribed_displacement -effect_press_on boundary "

@@ -87,7 +87,7 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
+    "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material stable_neohookean -body_a_young "
     "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
     "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
     "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
@@ -123,7 +123,7 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
   PetscFunctionBeginUser;
   PetscCall(
     test_open(&t,
-              "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
+              "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material stable_neohookean "
               "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
               "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
               "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "

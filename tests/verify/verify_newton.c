@@ -40,7 +40,7 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
   PetscCall(
     test_open(&t,
               "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
-              "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
+              "-body_bar_material stable_neohookean -body_bar_young 5e5 -body_bar_poisson %g "
               "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
               "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
               poisson, (int)steps, extra));

@@ -97,7 +97,8 @@ static PetscReal cofactor(const PetscReal F[9], PetscReal c[9])
   return F[0] * c[0] + F[1] * c[1] + F[2] * c[2];
 }
 
-/* First Piola-Kirchhoff stress by the formulas of linear, corotated, stvk and neohookean. */
+/* First Piola-Kirchhoff stress by the formulas of linear, corotated, stvk, neohookean and
+   stable_neohookean. */
 static void exact_stress(const char *law, PetscReal E, PetscReal nu, const PetscReal F[9],
                          PetscReal P[9])
 {
@@ -109,7 +110,7 @@ static void exact_stress(const char *law, PetscReal E, PetscReal nu, const Petsc
 
   for (int k = 0; k < 9; k++)
     R[k] = F[k];
-  if (!strcmp(law, "neohookean")) {
+  if (!strcmp(law, "stable_neohookean")) {
     const PetscReal a = 4. * mu / 3.;
     const PetscReal b = lambda + 5. * mu / 6.;
     const PetscReal J = cofactor(F, C);
@@ -118,6 +119,14 @@ static void exact_stress(const char *law, PetscReal E, PetscReal nu, const Petsc
       I1 += F[k] * F[k];
     for (int k = 0; k < 9; k++)
       P[k] = a * (1. - 1. / (I1 + 1.)) * F[k] + (b * (J - 1.) - 0.75 * a) * C[k];
+    return;
+  }
+
+  if (!strcmp(law, "neohookean")) {
+    const PetscReal J = cofactor(F, C);
+
+    for (int k = 0; k < 9; k++)
+      P[k] = mu * F[k] + (lambda * PetscLogReal(J) - mu) * C[k] / J;
     return;
   }
 
@@ -274,7 +283,8 @@ typedef struct {
 static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu, PetscBool pulled,
                                   const PetscReal F[9], const PetscReal known[2])
 {
-  static const char *const with_formula[] = {"linear", "corotated", "stvk", "neohookean"};
+  static const char *const with_formula[] = {"linear", "corotated", "stvk", "neohookean",
+                                             "stable_neohookean"};
   const PetscReal E = 1e6;
   const PetscReal stiff = PetscMax(1., nu / (1. - 2. * nu));
   TestScene t;

@@ -24,7 +24,8 @@ static PetscErrorCode solve(const char *element, int n, const char *on, PetscRea
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_element %s -body_a_material neohookean "
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_element %s -body_a_material "
+    "stable_neohookean "
     "-body_a_young %g -body_a_poisson %.17g -body_a_density 1000 -effects gravity,clamp,fluid "
     "-effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on xmin "
     "-effect_fluid_type pressure -effect_fluid_on %s -effect_fluid_value %.17g -time static "

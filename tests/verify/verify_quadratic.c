@@ -120,7 +120,8 @@ static PetscErrorCode solve(PetscInt n, PetscReal nu, const char *volume, PetscR
 
 int main(int argc, char **argv)
 {
-  static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
+  static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean",
+                                     "stable_neohookean"};
   char curved[512];
   PetscReal finest[2], fine[2], near[2], nearer[2], locked[2];
 

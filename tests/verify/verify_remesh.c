@@ -18,10 +18,11 @@
 #include "../remesh.h"
 #include "curved.h"
 
-#define TWO                                                                                       \
-  "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,2,2 -body_a_material neohookean -body_a_young 1e4 " \
-  "-body_a_poisson 0.3 -body_a_density 900 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate "     \
-  "0,1,0 "                                                                                        \
+#define TWO                                                                                   \
+  "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,2,2 -body_a_material stable_neohookean "        \
+  "-body_a_young 1e4 "                                                                        \
+  "-body_a_poisson 0.3 -body_a_density 900 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate " \
+  "0,1,0 "                                                                                    \
   "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_density 700 "
 #define EULER "-time euler_implicit -ts_dt 0.01 -ts_max_time 0.05 "
 

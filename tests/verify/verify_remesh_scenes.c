@@ -15,9 +15,9 @@
 #include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"
 
-#define STUFF(b)                                                                                \
-  " -body_" #b "_material neohookean -body_" #b "_young 2e4 -body_" #b "_poisson 0.3 -body_" #b \
-  "_density 1000 "
+#define STUFF(b)                                                              \
+  " -body_" #b "_material stable_neohookean -body_" #b "_young 2e4 -body_" #b \
+  "_poisson 0.3 -body_" #b "_density 1000 "
 #define FLOOR                                                                           \
   "-bodies a -body_a_mesh box:0.2,0.15,0.1:4,3,2 -body_a_translate 0,0,0.002" STUFF(    \
     a) "-body_a_velocity 0.5,0,-0.3 -effects weight,floor -effect_weight_type gravity " \
@@ -272,7 +272,8 @@ static PetscErrorCode check_inclusion(const char *more)
     &s,
     "-bodies a -body_a_mesh box:0.2,0.2,0.2:5,5,5" STUFF(
       a) "-body_a_angular_velocity 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 "
-         "-body_a_inclusions core -inclusion_core_material neohookean -inclusion_core_young 1e5 "
+         "-body_a_inclusions core -inclusion_core_material stable_neohookean -inclusion_core_young "
+         "1e5 "
          "-inclusion_core_poisson 0.3 -inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 "
          "-remesh_times 0.01,0.02 %s",
     more));

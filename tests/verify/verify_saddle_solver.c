@@ -133,15 +133,15 @@ static const char *const alpha[] = {"-effect_tool_response projected -time genal
 
 /* ------------------------------------------------------------------ bent */
 
-#define BENT                                                                                \
-  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e5 " \
-  "-body_a_poisson "                                                                        \
-  "0.3 "                                                                                    \
-  "-body_a_density 1000 -time static -effects clamp,load,floor -effect_clamp_type fixed "   \
-  "-effect_clamp_on "                                                                       \
-  "xmin "                                                                                   \
-  "-effect_load_type pressure -effect_load_on zmax -effect_floor_type contact "             \
-  "-effect_floor_obstacle "                                                                 \
+#define BENT                                                                                       \
+  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_material stable_neohookean -body_a_young 1e5 " \
+  "-body_a_poisson "                                                                               \
+  "0.3 "                                                                                           \
+  "-body_a_density 1000 -time static -effects clamp,load,floor -effect_clamp_type fixed "          \
+  "-effect_clamp_on "                                                                              \
+  "xmin "                                                                                          \
+  "-effect_load_type pressure -effect_load_on zmax -effect_floor_type contact "                    \
+  "-effect_floor_obstacle "                                                                        \
   "plane:0,0,1,-0.02 "
 
 static PetscErrorCode bend(const char *more, PetscReal *strain, PetscInt *newton)

@@ -65,7 +65,8 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   PetscCall(verify_mesh_write(n, cushion, NULL, path));
   PetscCall(test_open(
     &t,
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %g "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material stable_neohookean -body_a_young "
+    "%g "
     "-body_a_poisson %g -sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -effects "
     "x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type "
     "fixed "
@@ -124,7 +125,8 @@ static PetscErrorCode check_springs(const char *element)
   verify_case("springs, %s", element);
   PetscCall(record_run(
     &r,
-    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material neohookean "
+    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material "
+    "stable_neohookean "
     "-body_a_young 1e4 -body_a_poisson 0.4999 -body_a_density 1000 -sets top -set_top_at "
     "plane:0,0,1,0.1 -effects hold,weight,floor -effect_hold_type fixed -effect_hold_on top "
     "-effect_weight_type gravity -effect_floor_type contact -effect_floor_response penalty "
@@ -160,7 +162,8 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
   PetscCall(verify_mesh_write(n, block, NULL, path));
   PetscCall(record_run(
     &r,
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young 1e4 "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material stable_neohookean -body_a_young "
+    "1e4 "
     "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor "
     "-effect_floor_type "
     "contact -effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt %g -ts_max_time "
@@ -182,16 +185,17 @@ static PetscErrorCode check_released(const char *element)
 
   PetscFunctionBeginUser;
   verify_case("released, %s", element);
-  PetscCall(record_run(
-    &r,
-    "-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 -body_a_poisson 0.45 -body_a_density 1000 -effects high,low "
-    "-effect_high_type contact "
-    "-effect_high_obstacle plane:0,0,-1,-0.0501 -effect_high_displacement "
-    "0;0;-0.04*min(1,t/0.2)+0.04*max(0,min(1,(t-0.3)/0.2)) -effect_low_type contact "
-    "-effect_low_obstacle "
-    "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.004 -ts_max_time 0.6",
-    element));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element %s -body_a_material "
+               "stable_neohookean "
+               "-body_a_young 1e4 -body_a_poisson 0.45 -body_a_density 1000 -effects high,low "
+               "-effect_high_type contact "
+               "-effect_high_obstacle plane:0,0,-1,-0.0501 -effect_high_displacement "
+               "0;0;-0.04*min(1,t/0.2)+0.04*max(0,min(1,(t-0.3)/0.2)) -effect_low_type contact "
+               "-effect_low_obstacle "
+               "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.004 -ts_max_time 0.6",
+               element));
 
   /* the compressed body has 1 J; the integrator adds 0.035 J, most of it in one step at the fastest
      compression */
@@ -211,16 +215,17 @@ static PetscErrorCode check_waves(const char *element)
 
   PetscFunctionBeginUser;
   verify_case("waves, %s", element);
-  PetscCall(test_open(
-    &t,
-    "-bodies a -body_a_mesh box:0.06,0.05,0.04:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 -body_a_poisson 0.499 -body_a_density 1000 -effects high,low "
-    "-effect_high_type "
-    "contact -effect_high_obstacle plane:0,0,-1,-0.0401 -effect_high_displacement "
-    "0;0;-0.02*min(1,t/0.05)+0.02*max(0,min(1,(t-0.06)/0.05)) -effect_low_type contact "
-    "-effect_low_obstacle "
-    "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.003 -ts_max_time 0.2",
-    element));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:0.06,0.05,0.04:2 -body_a_element %s -body_a_material "
+              "stable_neohookean "
+              "-body_a_young 1e4 -body_a_poisson 0.499 -body_a_density 1000 -effects high,low "
+              "-effect_high_type "
+              "contact -effect_high_obstacle plane:0,0,-1,-0.0401 -effect_high_displacement "
+              "0;0;-0.02*min(1,t/0.05)+0.02*max(0,min(1,(t-0.06)/0.05)) -effect_low_type contact "
+              "-effect_low_obstacle "
+              "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.003 -ts_max_time 0.2",
+              element));
   PetscCall(record_solve(&t, &r));
   VERIFY_LESS(-t.run->state.energies.integrator_loss, 0.06,
               "energy given, J, of 0.25 J when pressed");

@@ -192,9 +192,9 @@ static PetscErrorCode check_formulas(void)
   PetscInt steps[3];
 
   PetscFunctionBeginUser;
-  PetscCall(twist("p1", "neohookean", turn, 1, "", &energy[0], &steps[0]));
-  PetscCall(twist("p1", "neohookean", turn, 16, "", &energy[1], &steps[1]));
-  PetscCall(twist("p1", "neohookean", turn, 1, "-static_adapt false", &energy[2], &steps[2]));
+  PetscCall(twist("p1", "stable_neohookean", turn, 1, "", &energy[0], &steps[0]));
+  PetscCall(twist("p1", "stable_neohookean", turn, 16, "", &energy[1], &steps[1]));
+  PetscCall(twist("p1", "stable_neohookean", turn, 1, "-static_adapt false", &energy[2], &steps[2]));
   test_print("  by formulas: %g J in %d steps, %g J in %d; not cut %g J in %d\n", (double)energy[0],
              (int)steps[0], (double)energy[1], (int)steps[1], (double)energy[2], (int)steps[2]);
   SB_CHECK_NEAR(energy[0] / energy[1], 1., 1e-6, "energy");
@@ -226,10 +226,10 @@ int main(int argc, char **argv)
                        BLOCK "-effects foot,press -effect_foot_type fixed -effect_foot_on xmin "
                              "-effect_press_type pressure -effect_press_on zmax "
                              "-effect_press_value 2e3"));
-  PetscCall(check_twist("cr", "neohookean", 180));
-  PetscCall(check_twist("cr", "neohookean", 210));
+  PetscCall(check_twist("cr", "stable_neohookean", 180));
+  PetscCall(check_twist("cr", "stable_neohookean", 210));
   PetscCall(check_twist("dg", "corotated", 270));
-  PetscCall(check_twist("p2", "neohookean", 360));
+  PetscCall(check_twist("p2", "stable_neohookean", 360));
   PetscCall(check_formulas());
   SB_TEST_END();
 }

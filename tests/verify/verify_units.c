@@ -186,7 +186,7 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
       PetscCall(
         add(text,
             "-body_%s_mesh box:%.17g,%.17g,%.17g:2 -body_%s_young %.17g -body_%s_poisson 0.3 "
-            "-body_%s_density %.17g -body_%s_material neohookean ",
+            "-body_%s_density %.17g -body_%s_material stable_neohookean ",
             name, 0.1 * m, 0.1 * m, 0.1 * m, name, 1e5 * pa, name, name, 1e3 * rho, name));
       PetscCall(add(text, "-body_%s_translate %.17g,%.17g,%.17g -body_%s_velocity %.17g,0,%.17g ",
                     name, 0.013 * b * m, 0.021 * b * m, (0.001 + 0.112 * b) * m, name,
@@ -229,19 +229,19 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check("p1", "linear", "-time static", 0.));
-  PetscCall(check("p1", "neohookean", "-time static", 0.));
+  PetscCall(check("p1", "stable_neohookean", "-time static", 0.));
   PetscCall(check("p1", "corotated", "-time newmark -snes_rtol 1e-8", 0.3));
   PetscCall(check("p1", "stvk", "-time genalpha -snes_rtol 1e-8", 0.3));
   PetscCall(check("p1", "corotated", "-time newmark -ts_adapt_type basic -snes_rtol 1e-8", 0.3));
-  PetscCall(check("p1", "neohookean", "-time euler_symplectic", 0.1));
-  PetscCall(check("p2", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
+  PetscCall(check("p1", "stable_neohookean", "-time euler_symplectic", 0.1));
+  PetscCall(check("p2", "stable_neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
   PetscCall(check("p2", "corotated", "-time newmark -snes_rtol 1e-10 -solver direct", 0.05));
   PetscCall(check("p2", "stvk", "-time euler_symplectic", 0.002));
-  PetscCall(check("cr", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
-  PetscCall(check("dg", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
+  PetscCall(check("cr", "stable_neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
+  PetscCall(check("dg", "stable_neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
   PetscCall(check("cr", "corotated", "-time newmark -snes_rtol 1e-10 -solver direct", 0.05));
   PetscCall(check("dg", "stvk", "-time genalpha -snes_rtol 1e-10 -solver direct", 0.05));
-  PetscCall(check("dg", "neohookean", "-time euler_symplectic", 0.002));
+  PetscCall(check("dg", "stable_neohookean", "-time euler_symplectic", 0.002));
   PetscCall(contact("friction", 0.3, 0.4, 0.1));
   PetscCall(contact("impact", 5., 0., 0.05));
   SB_TEST_END();
