@@ -46,7 +46,8 @@ struct _p_SbElement {
     nodes_per[4];   /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
   PetscReal gamma0; /* DG: factor on the penalty of mean jumps */
   PetscReal gamma1; /* CR and DG: factor on the penalty of jumps */
-  PetscBool mean_volume; /* P2: the volumetric part of the energy is that of the mean of the cell */
+  PetscBool
+    mean_volume; /* P2: most of the volumetric part of the energy is that of the mean of the cell */
   PetscBool
     weak; /* DG: a prescribed boundary face gets a node of its own, to which the cell is tied */
   SbElementOps ops;

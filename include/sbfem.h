@@ -41,9 +41,8 @@ typedef struct {
   /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points
      [batch][SB_POINTS]([9]), lumped mass / (density V) [batch][10]; their memory is the space's */
   SbPack *curve_g, *curve_weight, *curve_mass;
-  SbMaterial
-    pointwise;    /* the law at the points, less its volumetric part where that is of the mean */
-  PetscInt nnode; /* of a cell: 4, of P2 SB_CELL_NODES */
+  SbMaterial pointwise; /* the law at the points, less what of its volumetric part is of the mean */
+  PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
   SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
 } SbRegion;
 

@@ -179,7 +179,7 @@ static void linearise_mean(const SbMaterial m, const SbPoints *at, const SbPack 
                            const SbPack F[SB_POINTS][9], const SbPack *dx, PetscReal part,
                            SbPack pressure, SbPack mean[3])
 {
-  const PetscReal lambda = SbMaterialVolumetricModulus(m);
+  const PetscReal lambda = SbMaterialMeanModulus(m);
   SbPack b[30];
 
   SbQuadraticVolume(m, at, x, F, mean[0], dx ? b : NULL);

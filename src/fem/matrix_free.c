@@ -26,7 +26,8 @@ typedef struct {
   void *memory; /* allocation that contains R and h */
   SbPack *R;    /* [nbatch][sb_rotation_points()][9] rotations */
   SbPack *h;    /* [nbatch][sb_rotation_points()][9] rotated gradients of nodes 1..3, 1/m */
-  PetscReal *lambda, *mu; /* [nregion] Lame constants times the factor of the stiffness, Pa */
+  PetscReal *lambda, *mu; /* [nregion] Lame constants times the factor of the stiffness, Pa, */
+  PetscReal *mean;        /* and of P2 what acts on the mean, besides lambda at the points */
   PetscReal *inertia;     /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
   PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
   Vec ghosted;                   /* ghosted work vector; NULL on one rank */
@@ -231,8 +232,7 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
     const SbRegion *region = &s->region[r];
     const PetscInt b = region->bstart;
     const PetscInt n = region->bend - b;
-    const PetscReal lambda[2] = {region->pointwise == region->material ? o->lambda[r] : 0.,
-                                 region->pointwise == region->material ? 0. : o->lambda[r]};
+    const PetscReal lambda[2] = {o->lambda[r], o->mean[r]};
     const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
     const SbPack *V = (const SbPack *)s->batch_V + b;
 
@@ -267,7 +267,7 @@ static PetscErrorCode MatDestroy_Frames(Mat A)
   PetscCall(MatShellGetContext(A, &o));
   PetscCall(VecDestroy(&o->ghosted));
   PetscCall(PetscFree(o->memory));
-  PetscCall(PetscFree3(o->lambda, o->mu, o->inertia));
+  PetscCall(PetscFree4(o->lambda, o->mean, o->mu, o->inertia));
   PetscCall(PetscFree(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -304,7 +304,8 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
     const SbMaterial m = region->material;
     const PetscReal factor = stage->shift_k + stage->shift_v * s->beta[region->body];
 
-    o->lambda[r] = factor * SbMaterialVolumetricModulus(m);
+    o->lambda[r] = factor * SbMaterialVolumetricModulus(region->pointwise);
+    o->mean[r] = region->pointwise != m ? factor * SbMaterialMeanModulus(m) : 0.;
     o->mu[r] = factor * SbMaterialShearModulus(m);
     stiffest = PetscMax(stiffest, factor * SbMaterialYoungModulus(m));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
@@ -359,7 +360,8 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   o->p = (PetscReal *)(o->h + packs);
   o->q = o->p + 4 * s->nnode;
   PetscCall(PetscArrayzero(o->p, 8 * s->nnode));
-  PetscCall(PetscMalloc3(s->nregion, &o->lambda, s->nregion, &o->mu, s->nnode_owned, &o->inertia));
+  PetscCall(PetscMalloc4(s->nregion, &o->lambda, s->nregion, &o->mean, s->nregion, &o->mu,
+                         s->nnode_owned, &o->inertia));
   if (s->ghosted)
     PetscCall(SbSpaceCreateVec(s, &o->ghosted));
   PetscCall(MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE,
@@ -434,14 +436,14 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       SbPack V;
 
       SbPointVolume(&points, q, V);
-      SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
+      SbCellBlocksIsotropic(points.g, V, o->lambda[r], o->mu[r], R, B[q]);
       if (region->quadratic)
         SbPointForce(&points, q, R, volume);
     }
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscReal V = s->batch_V[b][l];
 
-      factor[l] = mean && V > 0. ? o->lambda[r] / V : 0.;
+      factor[l] = mean && V > 0. ? o->mean[r] / V : 0.;
     }
     if (region->quadratic)
       SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);

@@ -5,9 +5,13 @@
   points all of them would be constrained near nu = 1/2, and the element would lock. Here the energy
   of a cell is
 
-    W = sum_q w_q V psi_mu(F_q) + V lambda/2 m^2,   m = (1/V) int theta dV:
+    W = sum_q w_q V (psi_mu(F_q) + lambda_p/2 theta(F_q)^2) + V lambda_m/2 m^2,
+    m = (1/V) int theta dV,   lambda_p = min(lambda, SB_POINT_MODULUS mu),   lambda_m = lambda -
+    lambda_p:
 
   one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1).
+  With all of lambda by the mean, what theta varies by within a cell would have no stiffness but
+  that of the shape, and the cell would be too soft in bending: lambda_p is of the points.
   Force, tangent and stress follow from W. Where theta is J - 1, m is the exact change of the volume
   of the cell: det F is cubic. Otherwise m is that of the four points, exact for linear and stvk.
 
@@ -77,7 +81,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   const PetscBool cubic =
     (PetscBool)(m->jacobian && !at->step); /* det F is cubic: more points than the law's */
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
-  const PetscReal lambda = SbMaterialVolumetricModulus(m);
+  const PetscReal lambda = SbMaterialMeanModulus(m);
 
   for (int l = 0; l < SB_BATCH; l++)
     pressure[l] = 0.;
@@ -102,7 +106,9 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
         for (int l = 0; l < SB_BATCH; l++)
           p[l] -= lambda * D[k][l] * here[k][l];
     } else {
-      SbMaterialPressure(m, here, p);
+      m->ops.dilatation(m, here, p);
+      for (int l = 0; l < SB_BATCH; l++)
+        p[l] *= -lambda;
       if (b)
         m->ops.dilatation_gradient(m, here, D);
     }
@@ -169,7 +175,7 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
     return;
 
   /* contribution of the mean theta */
-  const PetscReal lambda = SbMaterialVolumetricModulus(region->material);
+  const PetscReal lambda = SbMaterialMeanModulus(region->material);
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   for (int q = 0; q < at.n; q++) {
@@ -184,7 +190,7 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
       if (psi)
         psi[q][l] += p[l] * p[l] / (2. * lambda);
       if (pressure)
-        pressure[q][l] = -p[l];
+        pressure[q][l] -= p[l];
     }
   }
 }

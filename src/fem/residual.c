@@ -14,13 +14,14 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-/* P2: each point with its fraction of the volume; the volumetric part by the mean of the cell.
-   Damping likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H. */
+/* P2: each point with its fraction of the volume; most of the volumetric part by the mean of the
+   cell. Damping likewise: mu (H + R H^T R) + lambda_p (R : H) R at the points, lambda_m times the
+   mean of R : H. */
 void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[])
 {
   const SbMaterial m = region->pointwise;
-  const PetscReal lambda = SbMaterialVolumetricModulus(region->material);
+  const PetscReal lambda = SbMaterialMeanModulus(region->material);
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {

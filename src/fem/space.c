@@ -61,8 +61,8 @@ static PetscErrorCode find_regions(SbSpace s)
       r->broken = (PetscBool)(r->element->nodes_per[3] > 0);
       r->quadratic = (PetscBool)(r->element->nodes_per[1] > 0);
       r->nnode = r->quadratic ? SB_CELL_NODES : 4;
-      if (r->quadratic && r->element->mean_volume && SbMaterialVolumetricModulus(r->material) != 0.)
-        PetscCall(SbMaterialGetShear(r->material, &r->pointwise));
+      if (r->quadratic && r->element->mean_volume)
+        PetscCall(SbMaterialGetPointwise(r->material, &r->pointwise));
     }
     if (r->bstart == r->bend || s->batch_n[s->nbatch - 1] == SB_BATCH) {
       s->batch_region[s->nbatch] = r;

@@ -147,16 +147,7 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
     SbCellBlocksIsotropic(g, W, lambda, x->mu, (const SbPack *)R, K);
   } else if (m->ops.spin && x->stiffness != 0.) {
     /* the same plus a tensor T on the spins (sbelement.h); damping has this form, T = -mu I */
-    m->ops.spin(m, F, R, T);
-
-    /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
-    for (int l = 0; x->pressure && l < SB_BATCH; l++) {
-      const PetscReal p =
-        m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
-
-      for (int k = 0; k < 9; k++)
-        T[k][l] *= 1. - p / (2. * x->mu);
-    }
+    m->ops.spin(m, F, x->pressure ? *x->pressure : NULL, R, T);
     for (int k = 0; x->damping != 0. && k < 9; k++) {
       const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
 
@@ -229,9 +220,9 @@ SB_INLINE PetscBool has_linear_stress(SbSpace s, const SbRegion *region)
 }
 
 /* Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta
-   times the mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2
+   times the mean pressure; lambda_m/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda_m m d^2
    m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
-   there and lambda/V b b^T is not added. */
+   there and lambda_m/V b b^T is not added. */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
                              const Factors *x, PetscInt batch, const SbVolumetric *out,
                              SbPack K[SB_PAIRS][9])
@@ -242,7 +233,8 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   const SbPack *V = points.V;
   const PetscBool mean = (PetscBool)(law != m);
   const PetscBool one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
-  const PetscBool split = (PetscBool)(out && mean && x->lambda > 0.);
+  const PetscReal lambda_m = mean ? SbMaterialMeanModulus(m) : 0.;
+  const PetscBool split = (PetscBool)(out && mean && lambda_m > 0.);
   SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
     b[30] = {{0}};
   Factors at = *x;
@@ -252,7 +244,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     if (s->linear_stress)
       memcpy(p, s->pressure[batch], sizeof(p));
-    at.lambda = 0.;
+    at.lambda = SbMaterialVolumetricModulus(law);
     at.pressure =
       m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
     at.mean = m->jacobian && law->tangent == SB_TANGENT_EXACT_SPD ? NULL : &p;
@@ -265,11 +257,11 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal both = x->stiffness + (one_D ? x->damping : 0.);
-    const PetscReal kept = split ? PetscMin(KEPT_MOST * x->lambda, KEPT * x->mu) : x->lambda;
+    const PetscReal kept = split ? PetscMin(KEPT_MOST * lambda_m, KEPT * x->mu) : lambda_m;
 
     factor[l] = (*V)[l] > 0. ? kept * both / (*V)[l] : 0.;
     if (out)
-      out->modulus[batch][l] = split ? both * (x->lambda - kept) : 0.;
+      out->modulus[batch][l] = split ? both * (lambda_m - kept) : 0.;
     if (out)
       out->shear[batch][l] = split ? both * (x->mu + 0.75 * kept) : 0.;
   }
@@ -305,7 +297,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     SbPointForce(&points, q, (const SbPack *)R, b);
   }
   for (int l = 0; l < SB_BATCH; l++)
-    factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
+    factor[l] = (*V)[l] > 0. ? lambda_m * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
 }
 

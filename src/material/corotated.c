@@ -138,7 +138,7 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
 }
 
 SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                     SbPack R[restrict 9], SbPack W[restrict 9])
+                                     const SbPack p, SbPack R[restrict 9], SbPack W[restrict 9])
 {
   const PetscReal mu = m->rest->mu;
   const PetscReal lambda = m->rest->lambda;
@@ -151,6 +151,8 @@ SB_KERNEL static void spin_corotated(const struct _p_SbMaterial *m, const SbPack
     SbStretchTensor(F, R, l, r, S);
     kappa[l] = lambda * (S[0][l] + S[3][l] + S[5][l] - 3) - 2 * mu;
   }
+  for (int l = 0; p && l < SB_BATCH; l++)
+    kappa[l] += p[l];
   if (m->tangent == SB_TANGENT_EXACT_SPD)
     twist_spd(mu, S, kappa, W);
   else
@@ -166,7 +168,7 @@ SB_KERNEL static void tangent_corotated(const struct _p_SbMaterial *m, const SbP
   const PetscReal lambda = m->rest->lambda;
   SbPack R[9], W[9], ZW[27];
 
-  spin_corotated(m, F, R, W);
+  spin_corotated(m, F, NULL, R, W);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], w[9];
 

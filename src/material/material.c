@@ -146,22 +146,44 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   if (!*m)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
+  PetscCall(SbMaterialDestroy(&(*m)->point));
   PetscCall(PetscFree((*m)->rest));
   PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* m with another lambda, in *other, which m owns. */
+static PetscErrorCode with_lambda(SbMaterial m, PetscReal lambda, SbMaterial *other)
+{
+  PetscFunctionBeginUser;
+  if (*other)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(create(m->type, 2 * m->rest->mu, 0., m->density, other));
+  if (lambda != 0.)
+    SbMaterialSetLame(*other, lambda, m->rest->mu);
+  PetscCall(SbMaterialSetTangent(*other, m->tangent));
+  if (m->type->size)
+    PetscCall(PetscMemcpy((*other)->data, m->data, m->type->size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
-  if (!m->shear) {
-    PetscCall(create(m->type, 2 * m->rest->mu, 0., m->density, &m->shear));
-    PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
-    if (m->type->size)
-      PetscCall(PetscMemcpy(m->shear->data, m->data, m->type->size));
-  }
+  PetscCall(with_lambda(m, 0., &m->shear));
   *shear = m->shear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point)
+{
+  const PetscReal mean = SbMaterialMeanModulus(m);
+
+  PetscFunctionBeginUser;
+  if (mean != 0.)
+    PetscCall(with_lambda(m, m->rest->lambda - mean, &m->point));
+  *point = mean != 0. ? m->point : m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,6 +213,11 @@ PetscReal SbMaterialShearModulus(const struct _p_SbMaterial *m)
 PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m)
 {
   return m->rest->lambda;
+}
+
+PetscReal SbMaterialMeanModulus(const struct _p_SbMaterial *m)
+{
+  return PetscMax(0., m->rest->lambda - SB_POINT_MODULUS * m->rest->mu);
 }
 
 PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
@@ -227,6 +254,8 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
     m->ops.frame = kind == SB_TANGENT_WARPED ? m->ops.dilatation_gradient : NULL;
   if (m->shear)
     PetscCall(SbMaterialSetTangent(m->shear, kind));
+  if (m->point)
+    PetscCall(SbMaterialSetTangent(m->point, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

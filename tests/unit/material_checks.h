@@ -307,7 +307,7 @@ static inline void check_special_tangent(SbMaterial m, const PetscReal F[9])
     W[k] = k % 4 == 0 ? -mu : 0;
   }
   if (m->ops.spin) {
-    m->ops.spin(m, (const SbPack *)f, r, w);
+    m->ops.spin(m, (const SbPack *)f, NULL, r, w);
     SbPackGet(9, (const SbPack *)w, 2, W);
   } else
     m->ops.frame(m, (const SbPack *)f, r);
@@ -623,7 +623,7 @@ static inline int all_operations(SbMaterial m, const SbPack f[9], SbPack what[OP
   m->ops.stress(m, f, what + 1);
   m->ops.tangent(m, f, what + 10);
   if (m->ops.spin)
-    m->ops.spin(m, f, what + n, what + n + 9);
+    m->ops.spin(m, f, NULL, what + n, what + n + 9);
   n += m->ops.spin ? 18 : 0;
   m->ops.dilatation(m, f, what[n++]);
   m->ops.dilatation_gradient(m, f, what + n);

@@ -219,7 +219,7 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
     if (m->ops.spin) {
       SbPack R[9], W[9];
 
-      m->ops.spin(m, (const SbPack *)F, R, W);
+      m->ops.spin(m, (const SbPack *)F, NULL, R, W);
       SbCellBlocksCorotated((const SbPack *)c.g, c.V, SbMaterialVolumetricModulus(m),
                             SbMaterialShearModulus(m), (const SbPack *)R, (const SbPack *)W, J);
       check_block_sums((const SbPack(*)[9])J, stress_scale(m) * size);

@@ -113,8 +113,8 @@ static PetscErrorCode check_supports(void)
     SB_CHECK_NEAR(strain[kind][1] / strain[3][1], 1, 2e-3, kinds[kind][0]);
   SB_CHECK(strain[0][1] < strain[1][1], "P1 is softer than CR");
 
-  /* DG on this mesh is softer than the limit by the same amount */
-  SB_CHECK_NEAR(strain[4][1] / strain[3][1], 1, 1e-2, "P2");
+  /* P2 against itself on 12 cells across: -0.19 % on 4, where DG has +1.05 % */
+  SB_CHECK_NEAR(strain[4][1] / 0.038789, 1, 3e-3, "P2");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
