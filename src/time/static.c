@@ -174,8 +174,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
       SbRunSuspects(l->run, sizeof(near), near);
       PetscCall(SbRunDescribeDivergence(l->run, l->X, reason, sizeof(what), what));
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
-                          unsettled[0] ? unsettled : what, why, near[0] ? "; " : "",
-                          near));
+                          unsettled[0] ? unsettled : what, why, near[0] ? "; " : "", near));
     }
   }
 

@@ -6,8 +6,7 @@
   and Newton's method finds the equilibrium of that. A bar twisted by up to 180 degrees in one step
   came out right with every element and law, by 210 degrees or more in most cases not: another
   torque, even of the other sign, with exit code 0. So load steps are cut where supports turn by
-  more than SB_TURN. This costs nothing: six steps of 30 degrees take as many iterations as one of
-  180 that is halved (24 and 28, cr).
+  more than SB_TURN.
 
   Before a step. The motion from x0 to x1 of the nodes of a support turns by the rotation nearest to
   the sum of (x1 - c1) (x0 - c0)^T, c the centres (Kabsch 1976). Angles of PARTS parts of the step

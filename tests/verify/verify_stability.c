@@ -194,7 +194,8 @@ static PetscErrorCode check_formulas(void)
   PetscFunctionBeginUser;
   PetscCall(twist("p1", "stable_neohookean", turn, 1, "", &energy[0], &steps[0]));
   PetscCall(twist("p1", "stable_neohookean", turn, 16, "", &energy[1], &steps[1]));
-  PetscCall(twist("p1", "stable_neohookean", turn, 1, "-static_adapt false", &energy[2], &steps[2]));
+  PetscCall(
+    twist("p1", "stable_neohookean", turn, 1, "-static_adapt false", &energy[2], &steps[2]));
   test_print("  by formulas: %g J in %d steps, %g J in %d; not cut %g J in %d\n", (double)energy[0],
              (int)steps[0], (double)energy[1], (int)steps[1], (double)energy[2], (int)steps[2]);
   SB_CHECK_NEAR(energy[0] / energy[1], 1., 1e-6, "energy");
