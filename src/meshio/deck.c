@@ -80,6 +80,7 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
   const PetscBool all =
     (PetscBool)(length > numbers->n); /* then test nodes or elements, not labels */
   const int64_t n = all ? numbers->n : length;
+  const PetscInt before = d->nfound.n;
 
   PetscFunctionBeginUser;
 
@@ -108,6 +109,15 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
       continue;
     PetscCall(SbImportGrow(im, &d->nfound, sizeof(*d->found), &d->found));
     d->found[d->nfound.n - 1] = at;
+  }
+
+  // what a set lists and the file does not hold is not left out silently
+  if (d->strict && length > d->nfound.n - before) {
+    if (set->of_nodes)
+      SB_SCAN_ERROR(&im->scan, "group '%s' lists nodes %lld to %lld, of which only %lld are there",
+                    set->name, (long long)r->first, (long long)r->last,
+                    (long long)(d->nfound.n - before));
+    PetscCall(SbImportSkip(im, "list with missing elements of group '%.40s'", set->name));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -83,6 +83,9 @@ static const char *const bad[][2] = {
                "<NodeSet name=\"p\">1,8</NodeSet></Mesh></febio_spec>",
    "'p'|node 8"},
   {SPEC("4.0") "<Mesh>" NODES "<Elements type=\"tet4\"><elem id=\"9\">1,2,3,4</elem></Elements>"
+               "<NodeSet name=\"p\">1:4000</NodeSet></Mesh></febio_spec>",
+   "'p'|1 to 4000"},
+  {SPEC("4.0") "<Mesh>" NODES "<Elements type=\"tet4\"><elem id=\"9\">1,2,3,4</elem></Elements>"
                "<Surface name=\"s\"><tri3 id=\"1\">1,2,8</tri3></Surface></Mesh></febio_spec>",
    "'s'|node 8"},
   {SPEC("2.5") "<Geometry from=\"other.feb\"/></febio_spec>", "other.feb"},
@@ -153,6 +156,25 @@ static PetscErrorCode test_second_order(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A set that lists an element which is not there is said. */
+static PetscErrorCode test_missing_element(void)
+{
+  char path[600];
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/a.feb", folder);
+  PetscCall(test_file_put(
+    path, SPEC("4.0") "<Mesh>" NODES
+                      "<Elements type=\"tet4\"><elem id=\"9\">1,2,3,4</elem></Elements><ElementSet "
+                      "name=\"some\">9,10</ElementSet></Mesh></febio_spec>"));
+  PetscCall(test_import(path, &im));
+  SB_CHECK(test_count(&im, 3, "some") == 1 && strstr(im.note, "missing elements of group 'some'"),
+           "note '%s'", im.note);
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   char path[600];
@@ -161,6 +183,7 @@ int main(int argc, char **argv)
   PetscCall(test_file_folder(folder));
   PetscCall(test_read());
   PetscCall(test_second_order());
+  PetscCall(test_missing_element());
   (void)snprintf(path, sizeof(path), "%s/b.feb", folder);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(bad); k++) {
     PetscCall(test_file_put(path, bad[k][0]));
