@@ -61,9 +61,10 @@
 #define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
 #define FLAT \
   2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
-#define MANY 0.1     /* part of the tets of a body, likewise: few slivers do no harm */
-#define RENEWED 0.01 /* relative change of a penalty that is reported */
-#define SAME 1e-12   /* relative change that is rounding */
+#define MANY 0.1 /* part of the tets of a body, likewise: few slivers do no harm */
+#define SETTLED \
+  1e-3 /* change of the energy of jumps by new penalties, over the strain energy, that is reported */
+#define SAME 1e-12 /* relative change that is rounding */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */
 typedef struct {
@@ -297,6 +298,18 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
+/* |J|^2 + |sum J|^2 of J less r. */
+static PetscReal squares_of(const PetscReal J[9])
+{
+  PetscReal squares = 0.;
+
+  for (int k = 0; k < 9; k++)
+    squares += J[k] * J[k];
+  for (int k = 0; k < 3; k++)
+    squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
+  return squares;
+}
+
 /* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J =
    0. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
@@ -325,26 +338,27 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0.
-   changed: set if one changed on this rank by a percent or more. */
-static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
+/* Updates the penalties. keep: the faces' energies at x are kept or, first, their forces; else r =
+   0. moved: by how much the energy of this rank's jumps at x changes, J, face by face. */
+static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool first,
+                            PetscReal *moved)
 {
   const SbJump j = s->jump;
   PetscReal J[9];
 
   PetscFunctionBeginUser;
-  if (x && !j->r)
+  *moved = 0.;
+  if (keep && !j->r)
     PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
-      const PetscReal part = x ? held_part(j, b, l, x, J) : 1.;
+      const PetscReal part = held_part(j, b, l, x, J);
       PetscReal c0, least, held, kept;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
-      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before)
-        *changed = PETSC_TRUE;
-      if (!x || j->c1[b][l] == 0.)
+      *moved += 0.5 * j->share[b][l] * PetscAbsReal(j->c1[b][l] - before) * squares_of(J);
+      if (!keep || j->c1[b][l] == 0.)
         continue;
 
       /* scale the jumps so that the face keeps its energy or, in the first step, its force */
@@ -560,7 +574,8 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
   PetscBool any, first;
-  PetscBool mine = PETSC_FALSE;
+  PetscReal moved = 0.;
+  PetscReal energy[2] = {0.};
 
   PetscFunctionBeginUser;
   if (changed)
@@ -574,15 +589,23 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   if (in_time)
     s->jump->began = PETSC_TRUE;
   if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
-    PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
+    PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE, &moved));
   any = follow(s, x, even, steps);
   if (any)
-    PetscCall(renew(s, in_time ? x : NULL, first, &mine));
+    PetscCall(renew(s, x, in_time, first, &energy[0]));
+  if (changed && !in_time) {
+    PetscReal least, volume;
+    PetscInt inverted;
+
+    SbSpaceStrainEnergy(s, x, NULL, &energy[1], &least, &inverted, &volume);
+  }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  if (in_time)
-    mine = any;
-  if (changed)
-    PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (changed && in_time)
+    PetscCallMPI(MPI_Allreduce(&any, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (changed && !in_time) {
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
+    *changed = (PetscBool)(energy[0] > SETTLED * energy[1]);
+  }
   if (s->plan && any)
     SbJumpSumTerms(s);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -666,15 +689,10 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
       PetscReal J[9], sum[3];
-      PetscReal squares = 0.;
 
       gather_jumps(j->node + 8 * SB_BATCH * b, x, r, l, J, sum);
-      for (int k = 0; k < 9; k++)
-        squares += J[k] * J[k];
-      for (int k = 0; k < 3; k++)
-        squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
-      energy +=
-        0.5 * scale * j->share[b][l] * (j->c1[b][l] * squares + j->c0[b][l] * SbDot3(sum, sum));
+      energy += 0.5 * scale * j->share[b][l] *
+                (j->c1[b][l] * squares_of(J) + j->c0[b][l] * SbDot3(sum, sum));
     }
     if (body)
       body[j->body[b]] += energy - before;
