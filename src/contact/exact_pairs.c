@@ -51,14 +51,31 @@ static void find_tangents(const PetscReal n[3], PetscReal t[2][3])
   SbCross(n, t[0], t[1]);
 }
 
-/* Normals of pairs that press, and tangents where they have friction. */
+/* Whether some pair sticks where surfaces were last. Collective. */
+static PetscErrorCode some_stick(const Surfaces *b, MPI_Comm comm, PetscBool *some)
+{
+  PetscBool mine = PETSC_FALSE;
+  PetscReal q[3];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < b->friction.pairs.n && b->motion.begun; i++) {
+    const FrictionPair *friction = &b->friction.pairs.pair[i];
+
+    mine = (PetscBool)(mine || SbFrictionSticks(b, friction, SbPairSticking(b, friction, q)));
+  }
+  PetscCallMPI(MPI_Allreduce(&mine, some, 1, SB_MPI_BOOL, MPI_LOR, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Normals of pairs that press at u, and their tangents unless all slid at the iterate before. */
 PetscErrorCode SbContactHolding_Pairs(SbContact contact, SbSpace s, const PetscReal u[],
                                       SbConstraintRows *rows)
 {
   Surfaces *b = (Surfaces *)contact;
+  PetscBool sticks;
 
   PetscFunctionBeginUser;
-  (void)s;
+  PetscCall(some_stick(b, s->comm, &sticks));
   PetscCall(SbSurfacesUpdate(b, u));
   for (PetscInt i = 0; i < b->active.n && b->motion.begun; i++) {
     const Active *a = &b->active.pair[i];
@@ -70,7 +87,7 @@ PetscErrorCode SbContactHolding_Pairs(SbContact contact, SbSpace s, const PetscR
       continue;
     PetscCall(add_row(b, a, a->at.n, 0., 1., 1., rows));
     find_tangents(a->at.n, t);
-    for (int k = 0; k < 2 && b->contact.friction.mu > 0.; k++)
+    for (int k = 0; k < 2 && sticks; k++)
       PetscCall(add_row(b, a, t[k], 0., 1., 1., rows));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -208,20 +208,6 @@ static PetscErrorCode update_friction(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbNewtonLongestStep(SNES snes, PetscReal *s)
-{
-  const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
-  const Vec X = snes->vec_sol;
-  const Vec Y = snes->vec_sol_update;
-
-  PetscFunctionBeginUser;
-  if (p->barrier)
-    PetscCall((*p->barrier->max_step)(p->ctx, X, Y, s, NULL));
-  else if (p->longest)
-    PetscCall((*p->longest)(p->ctx, X, Y, s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;

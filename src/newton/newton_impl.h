@@ -71,7 +71,7 @@ PetscErrorCode SbNewtonFindDirection(SNES snes, PetscReal *slope);
 /* Solves once more, accurately; `better`: the old direction was less accurate. Collective. */
 PetscErrorCode SbNewtonSolveAccurately(SNES snes, PetscReal *slope, PetscBool *better);
 
-/* newton.c: the longest safe fraction s of the step Y from the iterate; left as it is where nothing
+/* direction.c: the longest safe fraction s of the step Y from the iterate; left as it is where nothing
    limits it. Collective. */
 PetscErrorCode SbNewtonLongestStep(SNES snes, PetscReal *s);
 

@@ -446,8 +446,8 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
 
   PetscFunctionBeginUser;
 
-  /* without a solver, as where the matrix is not finite: its owner reports that */
-  if (!c->N || !c->ok)
+  /* without a solver, as where the first matrix is not finite: its owner reports that */
+  if (!c->N || (!c->direct && !c->ready))
     PetscFunctionReturn(PETSC_SUCCESS);
   if (c->direct)
     PetscCall(SbBlockSolverSolve(c->direct, c->c, c->y));

@@ -60,9 +60,10 @@ struct _p_SbCoarse {
   PetscBool spread; /* multigrid approximates E^-1 */
   Mat E;
   PC solver;
-  Vec c, y;       /* restricted residual, correction */
-  PetscBool wide; /* nodes move by units of other ranks, too: c and y have ghosts */
-  Vec s, t, w;    /* work vectors of the nodes */
+  PetscBool ready; /* the latter has been set up */
+  Vec c, y;        /* restricted residual, correction */
+  PetscBool wide;  /* nodes move by units of other ranks, too: c and y have ghosts */
+  Vec s, t, w;     /* work vectors of the nodes */
 };
 
 /* Collective. wanted: number of aggregates on this rank, negative: no node is aggregated; vertices:

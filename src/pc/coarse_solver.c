@@ -139,6 +139,7 @@ PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCSetOperators(c->solver, c->E, c->E));
   PetscCall(PCSetUp(c->solver));
+  c->ready = PETSC_TRUE;
   PetscCall(PCGetFailedReason(c->solver, &reason));
   PetscCall(SbPCDirectCountNegative(c->solver, &negative));
   c->ok = (PetscBool)(reason == PC_NOERROR && negative <= 0);
