@@ -163,8 +163,8 @@ CASES = [
      "-body_default_poisson 0.3 -body_default_density 1000 -body_b_translate 0.02,0.03,0.11 -body_b_velocity 0,0,-20 -effects meet -effect_meet_type contact "
      "-effect_meet_response augmented -effect_meet_stiffness 1e-5 -time euler_implicit -ts_dt 0.001 -ts_max_time 0.005 -time_max_halvings 0",
      ["meet", "of a with b", "barrier", "-effect_meet_multiplier_tolerance", "-ts_dt"]),
-    ("R15", "warning", "cube.opts -body_a_mesh box:0.05,0.05,1:1,1,10 -body_a_element p2 -body_a_material corotated -body_a_young 1e6 -effects hold,push "
-     "-effect_hold_type fixed -effect_hold_on zmin -effect_push_type traction -effect_push_on zmax -effect_push_total 0,0,-2", ["negative eigenvalue", "-static_unstable"]),
+    ("R15", "warning", "cube.opts -body_a_mesh box:1,0.05,0.04:10,1,1 -body_a_element p2 -body_a_material corotated -body_a_young 1e6 -body_a_poisson 0 -effects hold,push "
+     "-effect_hold_type fixed -effect_hold_on xmin -effect_push_type traction -effect_push_on xmax -effect_push_total -0.79,0,0", ["1 negative eigenvalue", "-static_unstable"]),
     ("P1", "error", "bar.opts -pc_type lu -pc_factor_mat_solver_type mkl_pardiso", ["-pc_type lu", "mkl_pardiso", "-solver"]),
 ]
 FAILS_TOO = {"R11"}  # a warning before an error
