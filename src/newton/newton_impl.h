@@ -71,8 +71,8 @@ PetscErrorCode SbNewtonFindDirection(SNES snes, PetscReal *slope);
 /* Solves once more, accurately; `better`: the old direction was less accurate. Collective. */
 PetscErrorCode SbNewtonSolveAccurately(SNES snes, PetscReal *slope, PetscBool *better);
 
-/* direction.c: the longest safe fraction s of the step Y from the iterate; left as it is where nothing
-   limits it. Collective. */
+/* direction.c: the longest safe fraction s of the step Y from the iterate; left as it is where
+   nothing limits it. Collective. */
 PetscErrorCode SbNewtonLongestStep(SNES snes, PetscReal *s);
 
 /* search.c: line search from X along -Y, where E has this slope, J, to the next X and F; s:
