@@ -124,6 +124,8 @@ typedef struct {
   /* where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it and sets
      `text` to the pair, in words */
   PetscErrorCode (*nearest)(SbContact c, SbSpace space, PetscReal *gap, size_t size, char text[]);
+  /* warns of what a run leaves unfinished */
+  PetscErrorCode (*warn_at_end)(SbContact c, SbSpace space);
   /* f += the load that closes the gaps at u to first order; bound += half of force times gap, which
      bounds the energy of the error by gaps, J */
   PetscErrorCode (*gap_forces)(SbContact c, SbSpace space, const PetscReal u[], PetscReal f[],
@@ -276,12 +278,14 @@ PetscReal SbContactSetWork(const SbContactSet *contacts);
   Force   - F = contact forces on the nodes, N.
   Points  - appends the active contact points of this rank.
   Nearest - the closest pair in the last attempt at a step, in words; "": none.
+  WarnAtEnd - of what a run leaves unfinished: surfaces that are still in each other.
 */
 PetscErrorCode SbContactSetGap(const SbContactSet *contacts, PetscReal t, Vec U, Vec G);
 PetscErrorCode SbContactSetForce(const SbContactSet *contacts, PetscReal t, Vec U, Vec F);
 PetscErrorCode SbContactSetPoints(const SbContactSet *contacts, PetscReal t, Vec U,
                                   SbContactPoints *list);
 PetscErrorCode SbContactSetNearest(const SbContactSet *contacts, size_t size, char text[]);
+PetscErrorCode SbContactSetWarnAtEnd(const SbContactSet *contacts);
 
 /* For the estimate of contact's error; collective. GapForces: F = nodal forces of potentials that
    the gaps at U leave beyond exact contact, N, zero at prescribed unknowns; bound on their energy

@@ -337,6 +337,14 @@ PetscErrorCode SbContactSetNearest(const SbContactSet *contacts, size_t size, ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSetWarnAtEnd(const SbContactSet *contacts)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < contacts->n; k++)
+    PHASE_CALL(contacts->contact[k], warn_at_end, contacts->space);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSetGapForces(const SbContactSet *contacts, Vec U, Vec F, PetscReal *bound)
 {
   const SbSpace s = contacts->space;

@@ -302,6 +302,25 @@ PetscErrorCode SbEffectSummary_Surfaces(SbEffect e, SbSpace s, size_t size, char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactWarnAtEnd_Surfaces(SbContact contact, SbSpace s)
+{
+  const Surfaces *b = (const Surfaces *)contact;
+  const SbEffect e = contact->effect;
+
+  PetscFunctionBeginUser;
+  if (b->separation.overlapping)
+    PetscCall(SbWarning(
+      s->comm,
+      "effect %s: surfaces that were in each other when the run began still are at the end, by "
+      "%" PetscInt_FMT
+      " intersections: what pushes them there are springs, not contact. Let the run go on, give "
+      "more -static_steps or a smaller -effect_%s_separation_steps, or move the bodies apart in "
+      "the "
+      "meshes",
+      e->name, b->separation.overlap.ncrossing, e->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
                                          char text[])
 {

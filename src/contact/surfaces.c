@@ -852,6 +852,7 @@ static const SbContactOps surface_ops = {
   .gap = SbContactGap_Surfaces,
   .points = SbContactPoints_Surfaces,
   .nearest = SbContactNearest_Surfaces,
+  .warn_at_end = SbContactWarnAtEnd_Surfaces,
   .gap_forces = SbContactGapForces_Surfaces,
   .scale_width = scale_width_surfaces,
 };

@@ -398,6 +398,7 @@ PetscErrorCode SbContactGap_Surfaces(SbContact contact, SbSpace s, const SbStage
                                      PetscReal gap[], PetscReal normal[]);
 PetscErrorCode SbContactPoints_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
                                         SbContactPoints *list);
+PetscErrorCode SbContactWarnAtEnd_Surfaces(SbContact contact, SbSpace s);
 PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
                                          char text[]);
 PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *stage,
