@@ -63,7 +63,7 @@
   2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
 #define MANY 0.1 /* part of the tets of a body, likewise: few slivers do no harm */
 #define SETTLED \
-  1e-3 /* change of the energy of jumps by new penalties, over the strain energy, that is reported */
+  1e-4 /* change of the energy of jumps by new penalties, over the strain energy, that is reported */
 #define SAME 1e-12 /* relative change that is rounding */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */

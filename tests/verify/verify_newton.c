@@ -110,7 +110,8 @@ static PetscErrorCode check_bend_far(const char *element)
 
 /* A soft bar that its weight bends by its length, in one load step: all stresses, the pressure
    among them, are linearised. With those of the states CR took 121, DG 174 and P2 62 iterations at
-   0.4999, with rejected load steps. The limits are the measured numbers and a little. */
+   0.4999, with rejected load steps. The limits are the measured numbers and a little; five and more
+   of CR and DG settle the penalty on jumps. */
 static PetscErrorCode check_soft(const char *element, PetscReal poisson, PetscInt most)
 {
   char extra[64];
@@ -140,7 +141,7 @@ static PetscErrorCode check_adapt(void)
              (int)o.rejected, (int)by_hand.iterations);
   SB_CHECK(o.rejected > 0 && o.rejected <= 2 && o.iterations <= 40, "%d iterations, %d rejected",
            (int)o.iterations, (int)o.rejected);
-  SB_CHECK(by_hand.rejected == 0 && by_hand.iterations <= 30, "%d iterations, %d rejected",
+  SB_CHECK(by_hand.rejected == 0 && by_hand.iterations <= 33, "%d iterations, %d rejected",
            (int)by_hand.iterations, (int)by_hand.rejected);
   SB_CHECK_NEAR(o.strain, by_hand.strain, 1e-3 * by_hand.strain, "strain energy");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,8 +236,8 @@ int main(int argc, char *argv[])
   PetscCall(check_bend_far("p2"));
   PetscCall(check_bend_far("cr"));
   for (size_t k = 0; k < 3; k++) {
-    PetscCall(check_soft("cr", soft[k], soft[k] > 0.4999 ? 19 : 16));
-    PetscCall(check_soft("dg", soft[k], soft[k] > 0.4999 ? 19 : 16));
+    PetscCall(check_soft("cr", soft[k], soft[k] > 0.4999 ? 23 : 18));
+    PetscCall(check_soft("dg", soft[k], soft[k] > 0.4999 ? 23 : 18));
     PetscCall(check_soft("p2", soft[k], 12));
   }
   PetscCall(check_adapt());
