@@ -338,16 +338,32 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
+/* By how much new penalties change the energy of this rank's jumps at x, J, face by face. */
+static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
+{
+  const SbJump j = s->jump;
+  PetscReal change = 0.;
+
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      PetscReal J[9], c0, c1;
+
+      (void)held_part(j, b, l, x, J);
+      face_factors(s, j, &j->face[i], PETSC_FALSE, &c0, &c1);
+      change += 0.5 * j->share[b][l] * PetscAbsReal(c1 - j->c1[b][l]) * squares_of(J);
+    }
+  }
+  return change;
+}
+
 /* Updates the penalties. keep: the faces' energies at x are kept or, first, their forces; else r =
-   0. moved: by how much the energy of this rank's jumps at x changes, J, face by face. */
-static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool first,
-                            PetscReal *moved)
+   0. */
+static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool first)
 {
   const SbJump j = s->jump;
   PetscReal J[9];
 
   PetscFunctionBeginUser;
-  *moved = 0.;
   if (keep && !j->r)
     PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
@@ -357,7 +373,6 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, Pets
       PetscReal c0, least, held, kept;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
-      *moved += 0.5 * j->share[b][l] * PetscAbsReal(j->c1[b][l] - before) * squares_of(J);
       if (!keep || j->c1[b][l] == 0.)
         continue;
 
@@ -574,8 +589,6 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
   PetscBool any, first;
-  PetscReal moved = 0.;
-  PetscReal energy[2] = {0.};
 
   PetscFunctionBeginUser;
   if (changed)
@@ -589,23 +602,27 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   if (in_time)
     s->jump->began = PETSC_TRUE;
   if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
-    PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE, &moved));
+    PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE));
   any = follow(s, x, even, steps);
-  if (any)
-    PetscCall(renew(s, x, in_time, first, &energy[0]));
-  if (changed && !in_time) {
-    PetscReal least, volume;
-    PetscInt inverted;
-
-    SbSpaceStrainEnergy(s, x, NULL, &energy[1], &least, &inverted, &volume);
-  }
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (changed && in_time)
     PetscCallMPI(MPI_Allreduce(&any, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+
+  /* the equilibrium at the end of a load step keeps its penalties if new ones would change
+     little */
   if (changed && !in_time) {
+    PetscReal energy[2], least, volume;
+    PetscInt inverted;
+
+    energy[0] = any ? change_of_energy(s, x) : 0.;
+    SbSpaceStrainEnergy(s, x, NULL, &energy[1], &least, &inverted, &volume);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
     *changed = (PetscBool)(energy[0] > SETTLED * energy[1]);
+    s->jump->renew = (PetscBool)(any && !*changed);
+    any = (PetscBool)(any && *changed);
   }
+  if (any)
+    PetscCall(renew(s, x, in_time, first));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (s->plan && any)
     SbJumpSumTerms(s);
   PetscFunctionReturn(PETSC_SUCCESS);
