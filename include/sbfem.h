@@ -184,17 +184,17 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace space, Vec U, Vec step, PetscReal 
 /* Adapts the penalty on jumps of CR and DG to the state U, m (src/fem/jump.c). steps: load steps,
    with the energies of full jumps; time steps, where the energy of each face at U is kept within
    bounds; time steps without damping, where no penalty falls. changed (or NULL): some penalty did;
-   in load steps, the energy of jumps by more than 1e-4 of the strain energy. Until the next call
-   the face terms are constant; at first they are those of the rest state. even[nbody], Pa: pressure
-   of loads that work on the volume of all cells, which balances as much of their stress; NULL:
-   none. Collective. */
+   in load steps, the energy of jumps by more than `enough`, J, on all ranks, else penalties stay.
+   Until the next call the face terms are constant; at first they are those of the rest state.
+   even[nbody], Pa: pressure of loads that work on the volume of all cells, which balances as much
+   of their stress; NULL: none. Collective. */
 typedef enum {
   SB_STEPS_OF_LOAD,
   SB_STEPS_IN_TIME,
   SB_STEPS_UNDAMPED
 } SbStepsOf;
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, const PetscReal even[], SbStepsOf steps,
-                                  PetscBool *changed);
+                                  PetscReal enough, PetscBool *changed);
 /* Warns of bodies of CR and DG with many tets of shapes for which the penalty on jumps is not
    verified. Collective. */
 PetscErrorCode SbSpaceWarnShapes(SbSpace space);

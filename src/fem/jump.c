@@ -61,9 +61,7 @@
 #define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
 #define FLAT \
   2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
-#define MANY 0.1 /* part of the tets of a body, likewise: few slivers do no harm */
-#define SETTLED \
-  1e-4 /* change of the energy of jumps by new penalties, over the strain energy, that is reported */
+#define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
 #define SAME 1e-12 /* relative change that is rounding */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */
@@ -584,7 +582,7 @@ void SbJumpSumTerms(SbSpace s)
 }
 
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbStepsOf steps,
-                                  PetscBool *changed)
+                                  PetscReal enough, PetscBool *changed)
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
@@ -610,13 +608,10 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   /* the equilibrium at the end of a load step keeps its penalties if new ones would change
      little */
   if (changed && !in_time) {
-    PetscReal energy[2], least, volume;
-    PetscInt inverted;
+    PetscReal change = any ? change_of_energy(s, x) : 0.;
 
-    energy[0] = any ? change_of_energy(s, x) : 0.;
-    SbSpaceStrainEnergy(s, x, NULL, &energy[1], &least, &inverted, &volume);
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
-    *changed = (PetscBool)(energy[0] > SETTLED * energy[1]);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change, 1, MPIU_REAL, MPI_SUM, s->comm));
+    *changed = (PetscBool)(change > enough);
     s->jump->renew = (PetscBool)(any && !*changed);
     any = (PetscBool)(any && *changed);
   }

@@ -7,6 +7,10 @@
 */
 #include "model_impl.h"
 
+#define SETTLED \
+  1e-4 /* change of the energy of jumps by new penalties, over the strain energy, for which a load \
+          step is repeated */
+
 PetscErrorCode SbModelDestroy(SbModel *model)
 {
   SbModel m = *model;
@@ -353,8 +357,20 @@ PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps
 {
   PetscReal *even = NULL;
   PetscReal *all;
+  PetscReal enough = 0.;
 
   PetscFunctionBeginUser;
+  if (changed && m->space->jump && steps == SB_STEPS_OF_LOAD) {
+    const PetscReal *u;
+    PetscReal least, volume;
+    PetscInt inverted;
+
+    PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+    SbSpaceStrainEnergy(m->space, u, NULL, &enough, &least, &inverted, &volume);
+    PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &enough, 1, MPIU_REAL, MPI_SUM, m->comm));
+    enough *= SETTLED;
+  }
   if (m->nvolume_pressure && m->space->jump)
     PetscCall(PetscCalloc1(2 * m->nbody, &even));
   all = even ? even + m->nbody : NULL;
@@ -368,7 +384,7 @@ PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps
     for (PetscInt b = 0; b < m->nbody; b++)
       all[b] += (effect->steady && !m->dynamic ? t : 1.) * even[b];
   }
-  PetscCall(SbSpaceFollowJumps(m->space, U, all, steps, changed));
+  PetscCall(SbSpaceFollowJumps(m->space, U, all, steps, enough, changed));
   PetscCall(PetscFree(even));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

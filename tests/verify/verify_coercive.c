@@ -170,7 +170,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++)
     u[i] = -eps * t.model->space->node_x[i];
   PetscCall(VecRestoreArray(t.run->state.U, &u));
-  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->state.U, NULL, SB_STEPS_OF_LOAD, NULL));
+  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->state.U, NULL, SB_STEPS_OF_LOAD, 0., NULL));
   PetscCall(spectrum(&t, &n, &w));
   *smallest = w[0] / w[n - 1];
   PetscCall(PetscFree(w));
