@@ -37,7 +37,7 @@
 #define RANDOM 0.05 /* of the difference between two parts: largest random displacement */
 #define FLAT 1e-7   /* of the trace: directions in which normals hardly differ */
 #define SPIKE 4.    /* largest displacement of a corner over that of its planes */
-#define COMMON 1.5  /* longest common way out over the longest of single points */
+#define COMMON 1.5 /* longest distance along a common direction over the longest of single points */
 #define KEPT \
   0.5              /* of its way, for the direction of the steps before: bodies that are held deform
                          meanwhile, and are let go of when it changes */
@@ -593,8 +593,8 @@ static PetscReal way_out(SbContactSurface m, const PetscReal x[], const SbBoxTre
   return least;
 }
 
-/* Longest way out of the points of two parts in each other, those of part[0] along n and those of
-   part[1] against it, m; limit: it is not shorter. */
+/* Longest distance to the surface of the points of two parts in each other, those of part[0] along
+   n and those of part[1] against it, m; limit: it is not shorter. */
 static PetscReal longest_way(SbContactSurface m, const Search *search, const PetscInt part[2],
                              const PetscReal n[3], PetscReal limit)
 {

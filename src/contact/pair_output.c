@@ -314,9 +314,8 @@ PetscErrorCode SbContactWarnAtEnd_Surfaces(SbContact contact, SbSpace s)
       "effect %s: surfaces that were in each other when the run began still are at the end, by "
       "%" PetscInt_FMT
       " intersections: what pushes them there are springs, not contact. Let the run go on, give "
-      "more -static_steps or a smaller -effect_%s_separation_steps, or move the bodies apart in "
-      "the "
-      "meshes",
+      "more -static_steps or a smaller -effect_%s_separation_steps, or move the bodies apart "
+      "in the meshes",
       e->name, b->separation.overlap.ncrossing, e->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

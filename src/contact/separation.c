@@ -20,7 +20,6 @@
 
 #define STIFF 10.  /* static run: stiffness over that of the barrier */
 #define HELD 5.    /* of the width: gap within which what is outside is kept there */
-#define LEVER 0.25 /* least sum of squared weights of vertices that are not prescribed */
 #define FRONT 0.7  /* cosine of a gap and the direction of separation that opens it */
 #define OPENED 0.9 /* of the width: a gap at which what overlapped is apart */
 #define OPENING 30 /* most steps for that: bodies pressed from outside may never be */
@@ -62,7 +61,7 @@ static PetscErrorCode add_opening(Surfaces *b, const SbContactPair *pair, const 
   PetscFunctionBeginUser;
   for (int i = 0; i < 4; i++)
     lever += b->surface->driven[pair->v[i]] ? 0. : PetscSqr(d->weight[i]);
-  if (lever < LEVER)
+  if (lever < SB_LEVER)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int pass = 0; pass < 2; pass++) { /* positive weights first */
     for (int i = 0; i < 4; i++) {
@@ -321,7 +320,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
     /* prescribed vertices stay as they are */
     for (PetscInt j = 0; j < p->n; j++)
       lever += m->driven[p->v[j]] ? 0. : PetscSqr(p->weight[j]);
-    if (lever < LEVER)
+    if (lever < SB_LEVER)
       continue;
 
     /* the barrier would add much energy to what is parted by less than its width */

@@ -53,7 +53,6 @@
 #define SUMS 4     /* in the first record of a checkpoint */
 #define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
 #define PASSES 200 /* sweeps over all pairs for that */
-#define LEVER 0.25 /* least sum of squared weights for that: of a free pair it is one or more */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
@@ -363,7 +362,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
       if (lever <= 0.)
         continue;
       lever =
-        PetscMax(lever, LEVER); /* prescribed vertices hold the pair nearly all by themselves */
+        PetscMax(lever, SB_LEVER); /* prescribed vertices hold the pair nearly all by themselves */
       n++;
       for (int k = 0; k < 4; k++) {
         const PetscInt v = pair->v[k];

@@ -6,6 +6,10 @@
 #include "contact_impl.h"
 #include "pairs.h"
 
+/* Least sum of squared weights of the vertices of a pair that are not prescribed, for it to be
+   moved apart; of a free pair it is one or more. */
+#define SB_LEVER 0.25
+
 /* A pair that may have a force at the current positions: with a gap below the width, or with a
    multiplier. */
 typedef struct {

@@ -29,9 +29,9 @@
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  evaluated at the start of the step, so that the terms are constant within it and their energy is
-  quadratic. A dependence on the current state would have to be differentiated: jumps would add a
-  spurious pressure.
+  evaluated at the start of the step, so that the terms are constant within a solve and their energy
+  is quadratic. A dependence on the current state would have to be differentiated: jumps would add a
+  spurious pressure. A load step is solved again, with m of its end, until m has settled.
 
   A follower pressure on the body (src/effect/pressure.c) works on the volume of its cells with a
   part p of itself, -p dV: that part of the load has the second variation which the stress -p cof F
@@ -344,9 +344,10 @@ static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
 
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      PetscReal J[9], c0, c1;
+      static const SbPack zero[9];
+      PetscReal J[9], sum[3], c0, c1;
 
-      (void)held_part(j, b, l, x, J);
+      gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
       face_factors(s, j, &j->face[i], PETSC_FALSE, &c0, &c1);
       change += 0.5 * j->share[b][l] * PetscAbsReal(c1 - j->c1[b][l]) * squares_of(J);
     }
@@ -367,7 +368,7 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, Pets
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
-      const PetscReal part = held_part(j, b, l, x, J);
+      const PetscReal part = keep ? held_part(j, b, l, x, J) : 1.;
       PetscReal c0, least, held, kept;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);

@@ -360,7 +360,7 @@ PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps
   PetscReal enough = 0.;
 
   PetscFunctionBeginUser;
-  if (changed && m->space->jump && steps == SB_STEPS_OF_LOAD) {
+  if (changed && m->space->jump && !m->space->linear && steps == SB_STEPS_OF_LOAD) {
     const PetscReal *u;
     PetscReal least, volume;
     PetscInt inverted;

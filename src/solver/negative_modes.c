@@ -112,7 +112,7 @@ static void find_lowest(Lanczos *z)
        size *= 2.)
     below -= size;
 
-  /* two solves with the definite matrix just below suffice: it is all but singular */
+  /* inverse iteration with the definite matrix just below, which is all but singular */
   for (PetscInt i = 0; i < n; i++)
     z->s[i] = 1.;
   for (int pass = 0; pass < 3; pass++) {
@@ -184,7 +184,7 @@ static PetscErrorCode iterate(Lanczos *z, Vec sum, Vec dual, PetscBool *known)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether x . K x is negative beyond rounding; kx, dx: work vectors. */
+/* Whether x . K x is negative beyond rounding; scale: |D|. */
 static PetscErrorCode is_negative(Lanczos *z, Vec x, Vec scale, PetscBool *is)
 {
   PetscReal energy, size;

@@ -174,18 +174,16 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
 static PetscErrorCode correct_followed(Path *p, PetscReal l, PetscInt *follows, PetscInt *its,
                                        PetscBool *ok)
 {
-  PetscBool again = PETSC_FALSE;
+  PetscBool again;
   PetscInt more;
 
   PetscFunctionBeginUser;
   PetscCall(correct(p, l, its, ok));
-  if (*ok)
+  while (*ok) {
     PetscCall(SbRunRepeatForJumps(p->run, p->factor, p->X, follows, &again));
-  while (again) {
+    if (!again)
+      break;
     PetscCall(correct(p, l, &more, ok));
-    again = PETSC_FALSE;
-    if (*ok)
-      PetscCall(SbRunRepeatForJumps(p->run, p->factor, p->X, follows, &again));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

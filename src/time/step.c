@@ -12,7 +12,7 @@
 
 #define SHORT 0.13 /* step over the requested one, below which a warning follows: three halvings */
 #define FORGET 0.9 /* decay per step of the recorded longest step */
-#define SETTLED \
+#define REPEATED \
   30 /* solves of a load step after which its penalty on jumps has to be that of its end: 6 to 8 where \
         a cube is pressed to half or to 0.4 */
 #define FULL 0.9 /* step over the requested one, from which on it counts as that */
@@ -45,7 +45,7 @@ PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *time
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelFollowJumps(run->model, t, U, SB_STEPS_OF_LOAD, again));
-  if (!*again || ++*times < SETTLED)
+  if (!*again || ++*times < REPEATED)
     PetscFunctionReturn(PETSC_SUCCESS);
   *again = PETSC_FALSE;
   if (!run->monitors.warned_jumps)

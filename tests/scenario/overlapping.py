@@ -50,7 +50,7 @@ for i, (options, ranks, when, depth) in enumerate((
 for apart, said in ("0.05", True), ("0.11", False):
     done = subprocess.run([*os.environ["SB_MPI"].split(), "2", os.environ["SB_SUPPLE"], *SCENE.split(), *MEET.split(), "-body_b_translate", f"{apart},0,0",
                            "-output_dir", str(OUT / f"left{apart}")], capture_output=True, text=True, check=False)
-    good = done.returncode == 0 and said == ("effect meet: surfaces that were in each other when the run began still are at the end" in done.stderr)
+    good = done.returncode == 0 and said == bool(re.search("effect meet: .* at the end", done.stderr))
     passed, failed = passed + good, failed + (not good)
     if not good:
         print(f"FAILED: {apart}: {done.returncode}, {done.stderr[-600:]}")
