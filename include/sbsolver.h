@@ -100,16 +100,18 @@ PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscI
 /* ---- negative eigenvalues of a symmetric matrix K (negative_modes.c) */
 
 /*
-  K and a symmetric positive definite M, the nearer to K the better; both in the subspace of
-  `start`. All operations are collective.
+  K and a symmetric positive definite M, the nearer to K the better; both in the subspace that the
+  right-hand sides of `start` are in. All operations are collective.
 
     multiply - y = K x
     solve    - z = M^-1 r
+    start    - a right-hand side with a part along every mode, another one for each k = 0, 1, ...
 */
 typedef struct {
   PetscErrorCode (*multiply)(void *ctx, Vec x, Vec y);
   PetscErrorCode (*solve)(void *ctx, Vec r, Vec z);
-  void *ctx; /* of both; borrowed */
+  PetscErrorCode (*start)(void *ctx, PetscInt k, Vec r);
+  void *ctx; /* of all; borrowed */
 } SbPencil;
 
 typedef struct {
@@ -124,12 +126,12 @@ typedef struct {
   SbNegativeModes - whether K has negative eigenvalues, how many, and the mode of the lowest one of
   the pencil (K, M).
 
-  Collective. Input: start, a right-hand side with a part along every mode; scale, the absolute
-  values of K's diagonal, for the rounding below which an eigenvalue counts as zero; most, the
-  largest number that is looked for. Output: mode, if there is one.
+  Collective. Input: scale, the absolute values of K's diagonal, for the rounding below which an
+  eigenvalue counts as zero; most, the largest number that is looked for. Output: mode, if there is
+  one.
 */
-PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, PetscInt most,
-                               Vec mode, SbInertia *found);
+PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec scale, PetscInt most, Vec mode,
+                               SbInertia *found);
 
 /* ---- systems with constraints outside of the matrix (constraint_operator.c) */
 

@@ -14,7 +14,8 @@
   repeats eigenvalues that have converged, which does not matter to the lowest one.
 
   A mode counts as negative if x . K x is, beyond the rounding of sums over the unknowns. The next
-  ones are found in the same way M-orthogonal to those before.
+  ones are found in the same way M-orthogonal to those before, each from a start of its own: one
+  start has a part along one direction only of the modes of equal eigenvalues.
 */
 #include "sbsolver.h"
 
@@ -202,8 +203,8 @@ static PetscErrorCode is_negative(Lanczos *z, Vec x, Vec scale, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, PetscInt most,
-                               Vec mode, SbInertia *found)
+PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec scale, PetscInt most, Vec mode,
+                               SbInertia *found)
 {
   PetscBool known = PETSC_TRUE;
   PetscBool negative = PETSC_TRUE;
@@ -212,17 +213,18 @@ PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, Pet
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&z));
   z->p = pencil;
-  z->start = start;
   z->definite = PETSC_TRUE;
-  for (Vec *v[] = {&z->before, &z->now, &z->w, &z->q, NULL}, **at = v; *at; at++)
-    PetscCall(VecDuplicate(start, *at));
-  PetscCall(VecDuplicateVecs(start, most, &z->mode));
-  PetscCall(VecDuplicateVecs(start, most, &z->dual));
+  for (Vec *v[] = {&z->start, &z->before, &z->now, &z->w, &z->q, NULL}, **at = v; *at; at++)
+    PetscCall(VecDuplicate(scale, *at));
+  PetscCall(VecDuplicateVecs(scale, most, &z->mode));
+  PetscCall(VecDuplicateVecs(scale, most, &z->dual));
   while (z->nmode < most && known && negative) {
     Vec x = z->mode[z->nmode];
     Vec dual = z->dual[z->nmode];
     PetscBool repeated;
+    PetscReal square;
 
+    PetscCall((*pencil->start)(pencil->ctx, z->nmode, z->start));
     PetscCall(iterate(z, NULL, NULL, &known));
     negative = (PetscBool)(known && z->definite && z->k && z->lowest < 0.);
     if (!negative)
@@ -230,6 +232,9 @@ PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, Pet
     PetscCall(VecZeroEntries(x));
     PetscCall(VecZeroEntries(dual));
     PetscCall(iterate(z, x, dual, &repeated));
+    PetscCall(VecDot(x, dual, &square)); /* 1, but for the loss of orthogonality */
+    PetscCall(VecScale(x, 1. / PetscSqrtReal(square)));
+    PetscCall(VecScale(dual, 1. / PetscSqrtReal(square)));
     PetscCall(is_negative(z, x, scale, &negative));
     if (!negative)
       break;
@@ -244,7 +249,7 @@ PetscErrorCode SbNegativeModes(const SbPencil *pencil, Vec start, Vec scale, Pet
                        .solves = z->solves};
   PetscCall(VecDestroyVecs(most, &z->mode));
   PetscCall(VecDestroyVecs(most, &z->dual));
-  for (Vec *v[] = {&z->before, &z->now, &z->w, &z->q, NULL}, **at = v; *at; at++)
+  for (Vec *v[] = {&z->start, &z->before, &z->now, &z->w, &z->q, NULL}, **at = v; *at; at++)
     PetscCall(VecDestroy(*at));
   PetscCall(PetscFree(z));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -82,16 +82,17 @@ static PetscErrorCode set_tangents(SbModel m, SbTangentKind kind, const SbTangen
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Right-hand side with a part along every mode, the same on any number of ranks: noise by the rest
-   positions of the nodes. */
-static PetscErrorCode make_noise(SbSpace s, Vec start)
+/* The k-th right-hand side, the same on any number of ranks: noise by the rest positions of the
+   nodes. */
+static PetscErrorCode make_noise(void *ctx, PetscInt k, Vec start)
 {
+  const SbSpace s = ((Tangent *)ctx)->run->model->space;
   PetscScalar *x;
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayWrite(start, &x));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    uint64_t state = 0x9e3779b97f4a7c15U;
+    uint64_t state = 0x9e3779b97f4a7c15U * (uint64_t)(k + 1);
 
     for (int c = 0; c < 3; c++) {
       float at = (float)s->node_x[3 * i + c] + 0.f; /* no negative zero */
@@ -208,18 +209,17 @@ static PetscErrorCode examine(SbRun run, PetscInt most, Vec mode, SbInertia *fou
   const SbSpace s = m->space;
   const PetscBool shell = (PetscBool)(run->solve.solver_used->create != NULL);
   Tangent t = {.run = run};
-  const SbPencil pencil = {multiply, solve, &t};
+  const SbPencil pencil = {multiply, solve, make_noise, &t};
   SbTangentKind *kinds;
   PetscBool definite = PETSC_FALSE;
-  Vec start, scale;
+  Vec work, scale;
   Mat P = NULL;
   KSP ksp;
 
   PetscFunctionBeginUser;
   *found = (SbInertia){0};
-  PetscCall(SbSpaceCreateVec(s, &start));
+  PetscCall(SbSpaceCreateVec(s, &work));
   PetscCall(SbSpaceCreateVec(s, &scale));
-  PetscCall(make_noise(s, start));
   PetscCall(PetscMalloc1(m->nmaterial, &kinds));
   for (PetscInt k = 0; k < m->nmaterial; k++)
     kinds[k] = m->material[k]->tangent;
@@ -248,22 +248,22 @@ static PetscErrorCode examine(SbRun run, PetscInt most, Vec mode, SbInertia *fou
       PetscCall(assemble_definite(run));
   }
   if (t.pc || t.last)
-    PetscCall(SbNegativeModes(&pencil, start, scale, most, mode, found));
+    PetscCall(SbNegativeModes(&pencil, scale, most, mode, found));
 
   /* it may have been of another state, or not definite after all */
   if (!found->known && !found->definite && !t.last && !shell) {
     PetscCall(assemble_definite(run));
-    PetscCall(SbNegativeModes(&pencil, start, scale, most, mode, found));
+    PetscCall(SbNegativeModes(&pencil, scale, most, mode, found));
   }
 
   /* or too far from the tangent */
   if (!found->known && 3 * s->Nnode <= FACTORED) {
     if (m->contacts.npotential)
-      PetscCall(factor_barriers(&t, start));
+      PetscCall(factor_barriers(&t, work));
     else if (!SbConstraintsSeparate(s))
       PetscCall(factor_apart(&t, &P));
     if (t.factor || P)
-      PetscCall(SbNegativeModes(&pencil, start, scale, most, mode, found));
+      PetscCall(SbNegativeModes(&pencil, scale, most, mode, found));
   }
   PetscCall(PetscInfo(run->solve.snes,
                       "stability: %" PetscInt_FMT " negative eigenvalues (%s), %" PetscInt_FMT
@@ -278,7 +278,7 @@ static PetscErrorCode examine(SbRun run, PetscInt most, Vec mode, SbInertia *fou
   PetscCall(SbContactSystemDestroy(&t.factor));
   PetscCall(PetscFree(t.blocks.block));
   PetscCall(VecDestroy(&scale));
-  PetscCall(VecDestroy(&start));
+  PetscCall(VecDestroy(&work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
