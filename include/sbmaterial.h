@@ -59,9 +59,9 @@ typedef enum {
     psi = psi_mu(F) + lambda/2 theta(F)^2,
 
   theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
-  (corotated), tr(E) (stvk), ln J (neohookean), J - 1 (stable_neohookean); and lambda Lame's first
-  parameter at rest (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law
-  with lambda = 0.
+  (corotated), tr(E) (stvk), ln J (neohookean), the root of (J^2 - 1 - 2 ln J) / 2
+  (isochoric_neohookean), J - 1 (stable_neohookean); and lambda Lame's first parameter at rest
+  (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
 */
 typedef struct {
   /* reads the options of the law's rows into m->data, and may replace the stiffness at rest, which

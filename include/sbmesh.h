@@ -80,7 +80,7 @@ typedef struct {
   PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
   PetscBool
     edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
-  char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean | stable_neohookean */
+  char material[SB_NAME_MAX];    /* a law's name (SbMaterialNames) */
   PetscReal density;             /* kg/m^3 */
   PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
   PetscReal angular_velocity[3]; /* initial angular velocity about the centre of mass, rad/s */

@@ -81,6 +81,8 @@ static const Part parts[] = {
   {"material", "corotated", "", NULL, NULL, PETSC_FALSE},
   {"material", "stvk", "-body_bar_material stvk", NULL, NULL, PETSC_TRUE},
   {"material", "neohookean", "-body_bar_material neohookean", NULL, NULL, PETSC_TRUE},
+  {"material", "isochoric_neohookean", "-body_bar_material isochoric_neohookean", NULL, NULL,
+   PETSC_TRUE},
   {"material", "stable_neohookean", "-body_bar_material stable_neohookean", NULL, NULL, PETSC_TRUE},
   {"time", "euler_implicit", "", NULL, "", PETSC_FALSE},
   {"time", "newmark", "-time newmark", NULL, "", PETSC_FALSE},

@@ -6,11 +6,12 @@
 #include <sbmaterial.h>
 
 /* The laws, each a constant SbMaterialType in a file of its own: a new one is a line here. */
-#define SB_MATERIAL_LAWS(LAW) \
-  LAW(SbMaterialLinear)       \
-  LAW(SbMaterialCorotated)    \
-  LAW(SbMaterialStVK)         \
-  LAW(SbMaterialNeoHookean)   \
+#define SB_MATERIAL_LAWS(LAW)        \
+  LAW(SbMaterialLinear)              \
+  LAW(SbMaterialCorotated)           \
+  LAW(SbMaterialStVK)                \
+  LAW(SbMaterialNeoHookean)          \
+  LAW(SbMaterialIsochoricNeoHookean) \
   LAW(SbMaterialStableNeoHookean)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;

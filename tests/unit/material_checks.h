@@ -684,6 +684,36 @@ static inline void check_damping(SbMaterial m, const PetscReal F[9])
            sqrt(SbDot9(dP, dP)));
 }
 
+/* psi(I + t H) is Hooke's energy up to a relative error of order t, down to strains of 1e-7. */
+static inline void check_small_strains(SbMaterial m)
+{
+  PetscReal H[9], F[9];
+  PetscReal before = 0;
+
+  for (int k = 0; k < 9; k++)
+    H[k] = uniform();
+  for (int n = 3; n < 25; n++) {
+    const PetscReal t = ldexp(1, -n);
+    const PetscReal tr = H[0] + H[4] + H[8];
+    PetscReal hooke = SbMaterialVolumetricModulus(m) / 2 * tr * tr;
+
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        hooke += SbMaterialShearModulus(m) / 4 * (H[3 * i + j] + H[3 * j + i]) *
+                 (H[3 * i + j] + H[3 * j + i]);
+    for (int k = 0; k < 9; k++)
+      F[k] = (k % 4 == 0) + t * H[k];
+    const PetscReal error = fabs(energy_of(m, F) / (t * t * hooke) - 1);
+    if (n > 9 && n < 14)
+      SB_CHECK_NEAR(before / error, 2, 0.2, "order of the small-strain limit");
+
+    /* F represents t H with an error of eps, eps / t relative to the energy */
+    if (n > 16)
+      SB_CHECK(error < 4 * t + 1e-14 / t, "energy of a strain of %g is off by %g", t, error);
+    before = error;
+  }
+}
+
 /* What holds for every law. The first part includes linear ones, whose strain a rotation
    changes. */
 static inline PetscErrorCode check_law(SbMaterial m)
@@ -695,6 +725,8 @@ static inline PetscErrorCode check_law(SbMaterial m)
   check_rest(m);
   check_lanes(m);
   check_softening(m);
+  if (!m->linear)
+    check_small_strains(m);
   for (int t = 0; t < 100; t++) {
     random_deformation(0.25, F);
     check_derivatives(m, F, "order of the Taylor remainder");
