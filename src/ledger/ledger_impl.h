@@ -33,12 +33,12 @@ struct _p_SbSpaceEstimate {
   PetscReal
     *strain; /* [nbody] the laws' strain energy of the cells of each body and all ranks, J */
   PetscReal *factor; /* [nbody] cell2, body2 over the square of recovery alone, 1 but for P1 */
-  struct _p_SbRecovery *recovery;
-  PetscReal *P;                 /* [ncell][9] stresses, Pa */
-  struct SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */
-  PetscReal *R;                 /* [ncell_owned][9] rotations; NULL when every law is linear */
-  PetscReal *psi;               /* [ncell_owned] energy densities, J/m^3 */
-  Vec residual;                 /* NULL without a body of P1 */
+  SbRecovery recovery;
+  PetscReal *P;          /* [ncell][9] stresses, Pa */
+  SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */
+  PetscReal *R;          /* [ncell_owned][9] rotations; NULL when every law is linear */
+  PetscReal *psi;        /* [ncell_owned] energy densities, J/m^3 */
+  Vec residual;          /* NULL without a body of P1 */
 };
 /* Patches and links between ranks, once. Collective. The model is borrowed; destroy the
    estimate. */
