@@ -44,6 +44,16 @@
   Displacements have the accuracy of deviators and mean pressures, one order above that of pointwise
   pressures. P2 does not lock: no factor.
 
+  The error of a quantity is a product of two errors (quantity.c) and has terms that off_T lacks:
+  p_h is not K theta at a point, theta the dilatation of u_h. From the form 2 mu dev e : dev e' + p
+  theta' + p' theta - p p' / K of the errors in displacement and pressure, with the discrete dual
+  solution subtracted, of which p_h is as little K theta,
+
+    form_T = off_T + int pi^2 / (2 K) - pi t + (K - lambda_m) / 2 t^2,
+
+  pi and t what p* and theta differ by from their means over the cell, lambda_m the modulus of the
+  mean (src/fem/quadratic.c). It may be negative, as the cell may be too soft.
+
   Limits. The norm is that of Hooke's law in the rotated frame of the cell: for strains of order one
   it is not the tangent's. theta counts supports that rotate by large angles as doing work, and
   contact between bodies as a support: the estimate of a locked body is too low then. Features that
@@ -208,9 +218,12 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscRea
 }
 
 /* off_T of an owned P2 cell from values at ten nodes; SbQuadraticMass() integrates products of
-   quadratics. */
-static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K)
+   quadratics. rest: what the form of est->form2 has more. */
+static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, SbMaterial law, PetscReal *rest)
 {
+  const PetscReal G = SbMaterialShearModulus(law);
+  const PetscReal K = SbMaterialBulkModulus(law);
+  const PetscReal mean_modulus = SbMaterialMeanModulus(law);
   const PetscReal *R = est->R ? est->R + 9 * c : NULL;
   const PetscReal V = cell_volume(est->model->mesh, c);
   const PetscReal near = SbRuleQuadratic.L[0][0];
@@ -218,6 +231,7 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
   const SbPointStress *at = est->stress + c;
   PetscReal off[SB_CELL_NODES][6];
   PetscReal pressure = 0.;
+  PetscReal corner[4];
   PetscReal square = 0.;
 
   for (int a = 0; a < SB_CELL_NODES; a++) {
@@ -225,7 +239,10 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
     const int j = a < 4 ? a : SbTetEdge[a - 4][1];
     PetscReal P[9], mean;
 
-    pressure += (a < 4 ? -0.05 : 0.2) * SbRecoveryNode(est->recovery, c, a, P);
+    mean = SbRecoveryNode(est->recovery, c, a, P);
+    pressure += (a < 4 ? -0.05 : 0.2) * mean;
+    if (a < 4)
+      corner[a] = mean;
     for (int k = 0; k < 9; k++) {
       const PetscReal sum = at->P[0][k] + at->P[1][k] + at->P[2][k] + at->P[3][k];
 
@@ -244,6 +261,20 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
         product += (k < 3 ? 1. : 2.) * off[a][k] * off[b][k];
       square += SbQuadraticMass(a, b) * product;
     }
+  }
+
+  // pressure and dilatation less their means
+  *rest = 0.;
+  for (int q = 0; q < 4; q++) {
+    PetscReal s[6];
+    PetscReal p = 0.;
+    PetscReal theta;
+
+    for (int a = 0; a < 4; a++)
+      p += (SbRuleQuadratic.L[q][a] - 0.25) * corner[a];
+    turn(R, at->P[q], s);
+    theta = ((s[0] + s[1] + s[2]) / 3. - at->pressure) / (K - mean_modulus);
+    *rest += V / 4. * (p * p / (2. * K) - p * theta + (K - mean_modulus) / 2. * theta * theta);
   }
   return V / (4. * G) * square + V / (2. * K) * PetscSqr(pressure - at->pressure);
 }
@@ -297,14 +328,17 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   PetscCall(SbRecoveryFit(est->recovery, est->P, est->stress));
 
   /* sums over the cells of each body */
+  est->form2 = 0.;
   PetscCall(PetscCalloc1(model->nbody, &sum));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const SbMaterial law = model->material[mesh->cell_material[c]];
     const PetscReal K = SbMaterialBulkModulus(law);
     const PetscInt body = mesh->cell_body[c];
+    PetscReal rest;
 
     if (model->element[body]->nodes_per[1]) {
-      est->cell2[c] = quadratic_off(est, c, SbMaterialShearModulus(law), K);
+      est->cell2[c] = quadratic_off(est, c, law, &rest);
+      est->form2 += rest;
       sum[body][SHEAR_OFF] += est->cell2[c];
       sum[body][STRAIN] += cell_volume(mesh, c) * est->psi[c];
     } else
@@ -331,6 +365,8 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL,
                              MPI_SUM, model->comm));
 
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &est->form2, 1, MPIU_REAL, MPI_SUM, model->comm));
+
   /* results of each body from its sums */
   est->total2 = 0.;
   for (PetscInt b = 0; b < model->nbody; b++) {
@@ -341,6 +377,7 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
     est->total2 += est->body2[b];
     est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
   }
+  est->form2 += est->total2;
   for (PetscInt c = 0; c < mesh->ncell_owned; c++)
     est->cell2[c] *= est->factor[mesh->cell_body[c]];
   PetscCall(PetscFree(sum));
