@@ -270,6 +270,12 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X)
 
 /* stresses and energies of cells */
 
+/* Stress of a P2 cell, Pa: at the points of SbRuleQuadratic, and the mean pressure, positive in
+   tension. */
+typedef struct {
+  PetscReal P[4][9], pressure;
+} SbPointStress;
+
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest),
    the law's pressure -lambda theta, Pa (SbMaterialPressure()). Outputs may be NULL. Not
    collective. */
@@ -281,6 +287,9 @@ void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], Pet
    cell the linear function nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
                       PetscReal psi[], PetscReal point[]);
+/* Per owned cell: Cauchy stress, symmetric, T[9] (Pa), and of P2 as in SbSpaceCellPiola() at its
+   points, point[ncell] (may be NULL). Not collective. */
+void SbSpaceCellCauchy(SbSpace space, const PetscReal u[], PetscReal T[], SbPointStress point[]);
 /* Adds rest volumes of owned cells of the law `linear`, m^3: of all of them, and of those that are
    turned by more than `angle`, rad. Local: reduce them. */
 void SbSpaceTurned(SbSpace space, const PetscReal u[], PetscReal angle, PetscReal volume[2]);
@@ -480,6 +489,60 @@ void SbConstraintsReactions(SbSpace space, PetscReal r[]);
    columns. */
 void SbConstraintsProjectBlock(SbSpace space, PetscInt i, PetscInt j, size_t rs, size_t cs,
                                PetscScalar *v);
+
+/* recovery of stresses at vertices and nodes from those of cells (src/fem/recovery.c) */
+
+#define SB_FIT_MONOMIALS 10 /* monomials up to degree two */
+#define SB_FIT_VALUES 10    /* fitted values: nine of the stress, the pressure */
+
+typedef struct _p_SbRecovery *SbRecovery;
+struct _p_SbRecovery {
+  SbMesh mesh;              /* borrowed */
+  const SbElement *element; /* [nbody] borrowed */
+  PetscInt nlayer;          /* largest number of materials around a vertex, all ranks */
+  PetscInt
+    *slot; /* [ncell][4] index of the value of each corner of a cell: nlayer vertex + layer */
+  PetscReal
+    *weight; /* [ncell][4] weight of a cell's stress in the value of a corner; 0: not owned */
+  PetscReal *value; /* [nvert nlayer][9] recovered values */
+
+  /* for P2; NULL without a P2 body */
+  PetscReal (
+    *factor)[2][SB_FIT_MONOMIALS * SB_FIT_MONOMIALS]; /* [nvert_owned nlayer] Cholesky factors */
+  struct SbFit {
+    PetscReal c[SB_FIT_VALUES]
+               [SB_FIT_MONOMIALS]; /* coefficients of monomials of (X - X_v) / size */
+    PetscReal size;                /* length scale, m */
+  } * fit;                         /* [nvert nlayer] */
+};
+/* Patches, once. Collective. */
+PetscErrorCode SbRecoveryCreate(SbSpace space, SbRecovery *recovery);
+PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery); /* sets NULL; NULL is accepted */
+/* Fits the stresses of owned cells, P[ncell][9] and of P2 point[ncell] (NULL without), Pa; those of
+   ghosts are filled in. Collective. */
+PetscErrorCode SbRecoveryFit(SbRecovery recovery, PetscReal P[], SbPointStress point[]);
+/* The recovered stress at a corner of a cell, linear elements, [9] Pa. Not collective. */
+static inline const PetscReal *SbRecoveryCorner(SbRecovery r, PetscInt cell, int a)
+{
+  return r->value + 9 * r->slot[4 * cell + a];
+}
+/* The recovered stress P and, returned, mean stress at node a = 0..9 of a P2 cell, Pa. Not
+   collective. */
+PetscReal SbRecoveryNode(SbRecovery recovery, PetscInt cell, int a, PetscReal P[9]);
+
+/*
+  Cauchy stress at the nodes of cells (src/fem/nodal_stress.c), for output.
+
+  SbNodalStressCompute - at displacements U, m. Collective.
+  SbNodalStressAt      - after it, at node a = 0..3, of P2 to 9, of a local cell: sigma[6] = xx yy
+  zz
+                         xy yz xz, Pa, on the cell's side where materials meet. Not collective.
+*/
+typedef struct _p_SbNodalStress *SbNodalStress;
+PetscErrorCode SbNodalStressCreate(SbSpace space, SbNodalStress *stress);
+PetscErrorCode SbNodalStressCompute(SbNodalStress stress, Vec U);
+void SbNodalStressAt(SbNodalStress stress, PetscInt cell, int a, PetscReal sigma[6]);
+PetscErrorCode SbNodalStressDestroy(SbNodalStress *stress); /* sets NULL; NULL is accepted */
 
 /* for linear solvers: the assembly plan */
 

@@ -137,6 +137,33 @@ static PetscReal lane_det(const SbPack F[9], PetscInt l)
          F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
 }
 
+/* Factor of the value at point q of the rule of curved cells in that of the linear function next to
+   it (L2 projection on the straight tet) at point i of SbRuleQuadratic: with b_c = sum_q w_q l_c
+   P_q it has 20 b_c - 4 sum_j b_j at corner c. */
+static PetscReal linear_part(const SbPointRule *rule, int q, int i)
+{
+  PetscReal value = -4.;
+
+  for (int c = 0; c < 4; c++)
+    value += 20. * SbRuleQuadratic.L[i][c] * rule->L[q][c];
+  return value;
+}
+
+/* Cauchy stress P F^T / J at a point in lane l; for small strain it is P itself. */
+static void lane_cauchy(const SbMaterial law, const SbPack F[9], const SbPack P[9], PetscInt l,
+                        PetscReal T[9])
+{
+  const PetscReal det = law->linear ? 1. : lane_det(F, l);
+
+  for (int k = 0; k < 9; k++) {
+    const SbPack *p = P + 3 * (k / 3);
+    const SbPack *f = F + 3 * (k % 3);
+
+    T[k] =
+      law->linear ? p[k % 3][l] : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det;
+  }
+}
+
 void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[],
                       PetscReal psi[], PetscReal pressure[])
 {
@@ -164,6 +191,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
       for (int q = 0; q < at.n; q++) {
         const PetscReal det = lane_det((const SbPack *)F[q], l);
         const PetscReal part = at.weight[q][l];
+        PetscReal T[9];
 
         if (J)
           J[c] += part * det;
@@ -172,19 +200,44 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
         if (pressure)
           pressure[c] += part * pressures[q][l];
 
-        /* Cauchy stress P F^T / J; for small strain it is P itself */
-        for (int k = 0; sigma && k < 6; k++) {
-          const int i = row[k];
-          const int j = column[k];
-          const SbPack *p = (const SbPack *)P[q] + 3 * i;
-          const SbPack *f = (const SbPack *)F[q] + 3 * j;
-
-          sigma[6 * c + k] +=
-            part * (region->material->linear
-                      ? p[j][l]
-                      : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
-        }
+        if (!sigma)
+          continue;
+        lane_cauchy(region->material, (const SbPack *)F[q], (const SbPack *)P[q], l, T);
+        for (int k = 0; k < 6; k++)
+          sigma[6 * c + k] += part * T[3 * row[k] + column[k]];
       }
+    }
+  }
+}
+
+void SbSpaceCellCauchy(SbSpace s, const PetscReal x[], PetscReal T[], SbPointStress point[])
+{
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const SbPoints at = SbBatchPoints(s, b);
+    SbPack F[SB_POINTS][9], P[SB_POINTS][9];
+
+    SbBatchState(s, b, x, F, P, NULL, NULL);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt c = s->batch_cell[b] + l;
+      PetscReal here[9];
+
+      // means over the points, and what is at these
+      memset(T + 9 * c, 0, 9 * sizeof(*T));
+      if (point)
+        memset(&point[c], 0, sizeof(point[c]));
+      for (int q = 0; q < at.n; q++) {
+        lane_cauchy(region->material, (const SbPack *)F[q], (const SbPack *)P[q], l, here);
+        for (int k = 0; k < 9; k++)
+          T[9 * c + k] += at.weight[q][l] * here[k];
+        if (point && region->quadratic && !at.step)
+          memcpy(point[c].P[q], here, sizeof(here));
+        for (int i = 0; point && at.step && i < 36; i++)
+          point[c].P[i / 9][i % 9] +=
+            at.rule->weight[q] * linear_part(at.rule, q, i / 9) * here[i % 9];
+      }
+      if (point)
+        point[c].pressure = (T[9 * c] + T[9 * c + 4] + T[9 * c + 8]) / 3.;
     }
   }
 }
@@ -202,20 +255,14 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
       SbPackGet(9, (const SbPack *)stress[i % 4], (int)(i / 4),
                 point + 9 * (4 * s->batch_cell[b] + i));
 
-    /* a curved cell: the linear function of l next to P (L2 projection on the straight tet) at the
-       points
-         of SbRuleQuadratic; with b_i = sum_q w_q l_i P_q it has 20 b_i - 4 sum_j b_j at corner i */
+    // a curved cell: of the linear function next to P
     for (PetscInt i = 0; point && at.step && i < 36 * s->batch_n[b]; i++) {
       PetscReal *to = point + 36 * s->batch_cell[b] + i;
 
       *to = 0.;
-      for (int q = 0; q < at.n; q++) {
-        PetscReal value = -4.;
-
-        for (int c = 0; c < 4; c++)
-          value += 20. * SbRuleQuadratic.L[i / 9 % 4][c] * at.rule->L[q][c];
-        *to += at.rule->weight[q] * value * stress[q][i % 9][i / 36];
-      }
+      for (int q = 0; q < at.n; q++)
+        *to +=
+          at.rule->weight[q] * linear_part(at.rule, q, (int)(i / 9 % 4)) * stress[q][i % 9][i / 36];
     }
 
     /* means over the points */

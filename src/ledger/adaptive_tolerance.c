@@ -88,10 +88,17 @@ static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx,
   SbLedger l = (SbLedger)ctx;
   const PetscReal allowed =
     STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->clock.t_end;
+  PetscReal error = 0.;
+  PetscBool known;
 
   PetscFunctionBeginUser;
   *order = l->order;
   *ratio = allowed > 0. ? PetscMax(0., l->step_time - NOISE * left_by_solves(l)) / allowed : 0.;
+
+  // of a quantity of interest only its own error counts
+  PetscCall(SbQuantityStepError(l, step, &error, &known));
+  if (known)
+    *ratio = error / (STEPS * l->accuracy * step->dt / run->clock.t_end);
   if (*ratio > 1. && !l->warned_shortest && step->dt <= 1.001 * SHORTEST * run->clock.dt) {
     l->warned_shortest = PETSC_TRUE;
     PetscCall(SbWarning(

@@ -36,7 +36,8 @@ const SbOption SbLedgerRows[] = {
   {"ledger_on", SB_OPTION_STRING, 1, "", "", "",
    "ledger_quantity reaction: set of its prescribed nodes"},
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "target relative error in the energy norm: chooses time steps, tolerances and the width of "
+   "target relative error in the energy norm, of time steps with ledger_quantity displacement "
+   "that of it over its range: chooses time steps, tolerances and the width of "
    "response "
    "barrier; 0: as given by their options"},
   {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
@@ -228,16 +229,32 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
 /* Lists the accumulated errors for checkpoints. */
 static PetscErrorCode carry(SbLedger l)
 {
-  static const char *const names[] = {
-    "error",         "derivative", "mean",        "lost",           "tau",    "span",
-    "stored",        "step_time",  "step_linear", "step_nonlinear", "offset", "residual",
-    "seen_residual", "kept_part",  "work",        "own_work",       "least",  "most"};
+  static const char *const names[] = {"error",         "derivative",     "mean",     "lost",
+                                      "tau",           "span",           "stored",   "step_time",
+                                      "step_linear",   "step_nonlinear", "offset",   "residual",
+                                      "seen_residual", "kept_part",      "work",     "own_work",
+                                      "least",         "most",           "steepest", "worst"};
   static const int sizes[] = {SB_ERROR_COUNT, 4, 4}; /* of the first ones; 1 of the others */
-  PetscReal *const values[PETSC_STATIC_ARRAY_LENGTH(names)] = {
-    l->error,     l->derivative,      l->mean,           &l->lost,        &l->tau,
-    &l->span,     &l->stored,         &l->step_time,     &l->step_linear, &l->step_nonlinear,
-    &l->offset,   &l->residual,       &l->seen_residual, &l->kept_part,   &l->work,
-    &l->own_work, &l->quantity.least, &l->quantity.most};
+  PetscReal *const values[PETSC_STATIC_ARRAY_LENGTH(names)] = {l->error,
+                                                               l->derivative,
+                                                               l->mean,
+                                                               &l->lost,
+                                                               &l->tau,
+                                                               &l->span,
+                                                               &l->stored,
+                                                               &l->step_time,
+                                                               &l->step_linear,
+                                                               &l->step_nonlinear,
+                                                               &l->offset,
+                                                               &l->residual,
+                                                               &l->seen_residual,
+                                                               &l->kept_part,
+                                                               &l->work,
+                                                               &l->own_work,
+                                                               &l->quantity.least,
+                                                               &l->quantity.most,
+                                                               &l->quantity.steepest,
+                                                               &l->quantity.worst};
   PetscInt n = 0;
 
   PetscFunctionBeginUser;

@@ -30,15 +30,16 @@ struct _p_SbSpaceEstimate {
   PetscReal *cell2; /* [ncell_owned] square of the error of each owned cell, J */
   PetscReal *body2; /* [nbody] sums over the cells of each body and all ranks, J */
   PetscReal total2; /* their sum, J */
+  PetscReal form2;  /* the same of the form whose products are errors of quantities, J */
   PetscReal
     *strain; /* [nbody] the laws' strain energy of the cells of each body and all ranks, J */
   PetscReal *factor; /* [nbody] cell2, body2 over the square of recovery alone, 1 but for P1 */
-  struct _p_SbRecovery *recovery;
-  PetscReal *P;                 /* [ncell][9] stresses, Pa */
-  struct SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */
-  PetscReal *R;                 /* [ncell_owned][9] rotations; NULL when every law is linear */
-  PetscReal *psi;               /* [ncell_owned] energy densities, J/m^3 */
-  Vec residual;                 /* NULL without a body of P1 */
+  SbRecovery recovery;
+  PetscReal *P;          /* [ncell][9] stresses, Pa */
+  SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */
+  PetscReal *R;          /* [ncell_owned][9] rotations; NULL when every law is linear */
+  PetscReal *psi;        /* [ncell_owned] energy densities, J/m^3 */
+  Vec residual;          /* NULL without a body of P1 */
 };
 /* Patches and links between ranks, once. Collective. The model is borrowed; destroy the
    estimate. */
@@ -74,6 +75,10 @@ typedef struct {
   uint64_t set;   /* reaction: bit of the set */
   Vec weight;     /* reaction: direction of the force, at the prescribed unknowns of the set */
   PetscReal value, least, most; /* current value; extremes over the run */
+  PetscInt nlast;               /* dynamic: number of last values known, at most 4 */
+  PetscReal last[4], last_t[4]; /* these, newest first, and their times, s */
+  PetscReal steepest;           /* largest derivative of the integrator's order + 1 so far, */
+  PetscReal worst;              /* and error by the time step */
   PetscReal error[SB_ERROR_COUNT];
 } SbQuantity;
 
@@ -176,5 +181,9 @@ PetscErrorCode SbQuantityAttach(SbLedger l);
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
+/* Error of the quantity by a step just solved over the range of its values, into *error; *known:
+   whether it has both. Collective. */
+PetscErrorCode SbQuantityStepError(SbLedger l, const SbSolvedStep *step, PetscReal *error,
+                                   PetscBool *known);
 
 extern const char *const SbErrorNames[SB_ERROR_COUNT];

@@ -69,6 +69,33 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Stress at nodes, once for all fields of a step. Collective. */
+static PetscErrorCode nodal_stress(SbOutput out, const SbStep *step)
+{
+  PetscFunctionBeginUser;
+  if (out->nodal_valid)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbNodalStressCompute(out->nodal, step->U));
+  out->nodal_valid = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A function of the Cauchy stress at points. */
+static PetscErrorCode nodal(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  const SbOutput out = (SbOutput)run->monitors.output;
+  PetscReal *sigma;
+
+  PetscFunctionBeginUser;
+  PetscCall(nodal_stress(out, step));
+  PetscCall(PetscMalloc1(6 * out->point.nowned, &sigma));
+  PetscCall(SbPointsStress(run, out, sigma));
+  for (PetscInt i = 0; i < out->point.nowned; i++)
+    (*f->of_stress)(sigma + 6 * i, values + f->ncomp * i);
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else
    one. */
 static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step,
@@ -168,6 +195,10 @@ static const SbField table[] = {
   {"contact_force", "N", 3, .compute = contact, .help = "force of contact on the body"},
   {"contact_gap", "m", 3, .compute = contact,
    .help = "from the nearest point of what it may touch, along the normal there; 0: nothing near"},
+  {"nodal_stress", "Pa", 6, .compute = nodal, .of_stress = stress,
+   .help = "Cauchy stress at vertices, and p2's nodes, recovered from the cells around"},
+  {"nodal_von_mises", "Pa", 1, .compute = nodal, .of_stress = von_mises,
+   .help = "von Mises stress of nodal_stress"},
   {"stress", "Pa", 6, CELL, .compute = of_state, STATE(sigma), .of_stress = stress,
    .help = "Cauchy stress"},
   {"von_mises", "Pa", 1, CELL, .compute = of_state, STATE(sigma), .of_stress = von_mises,
@@ -237,6 +268,30 @@ PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool SbFieldIsRecovered(const SbField *f)
+{
+  return (PetscBool)(f->of_stress != NULL);
+}
+
+PetscErrorCode SbFieldAddNodal(const SbField *f, SbRun run, const SbStep *step, const SbSum *nodes,
+                               PetscReal value[])
+{
+  const SbOutput out = (SbOutput)run->monitors.output;
+
+  PetscFunctionBeginUser;
+  PetscCall(nodal_stress(out, step));
+  for (PetscInt i = 0; i < nodes->n; i++) {
+    const PetscInt number = nodes->item[i].number;
+    PetscReal sigma[6], here[6];
+
+    SbNodalStressAt(out->nodal, number / SB_CELL_NODES, (int)(number % SB_CELL_NODES), sigma);
+    (*f->of_stress)(sigma, here);
+    for (PetscInt k = 0; k < f->ncomp; k++)
+      value[k] += nodes->item[i].weight * here[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
@@ -258,6 +313,8 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
   /* weights of nodes at vertices; forces also need the residual of each step */
   if (forces)
     run->monitors.want_residual = PETSC_TRUE;
+  if (f->compute == nodal && !out->nodal)
+    PetscCall(SbNodalStressCreate(run->model->space, &out->nodal));
   if (!f->cell)
     PetscCall(SbPointsPrepare(
       run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));

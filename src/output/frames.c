@@ -343,7 +343,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscCall(SbH5PutInt(&fr->h5, group, "mesh", fr->mesh));
 
   /* the fields, and the points of contact */
-  out->state_valid = PETSC_FALSE;
+  out->state_valid = out->nodal_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
 
@@ -576,6 +576,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   SbFrames fr = out->frames;
   PetscBool has = PETSC_FALSE; /* the file has the mesh */
   PetscInt most = 1;           /* components of a cell field */
+  PetscInt nvalue = 3;         /* and of a point field */
   PetscInt wide;               /* points of a cell */
 
   PetscFunctionBeginUser;
@@ -617,13 +618,15 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (out->field[i]->cell)
       most = PetscMax(most, out->field[i]->ncomp);
+    else
+      nvalue = PetscMax(nvalue, out->field[i]->ncomp);
     PetscCall(SbFieldPrepare(run, out, out->field[i]));
   }
   wide = PetscMax(most, out->edge_number ? SB_CELL_NODES + 1 : 4);
   PetscCall(PetscFree2(fr->owned, fr->slice));
   PetscCall(PetscMalloc2(
-    PetscMax(3 * out->point.nowned, wide * out->cell.nowned), &fr->owned,
-    PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n), &fr->slice));
+    PetscMax(nvalue * out->point.nowned, wide * out->cell.nowned), &fr->owned,
+    PetscMax(PetscMax(nvalue * out->point.n, wide * out->cell.n), most * out->tet.n), &fr->slice));
   if (out->contact_points)
     run->monitors.want_residual = PETSC_TRUE;
   if (!has) {

@@ -255,6 +255,7 @@ PetscErrorCode SbOutputForgetMesh(SbOutput out)
   PetscCall(PetscFree(out->J));
   PetscCall(PetscFree(out->psi));
   PetscCall(PetscFree(out->pressure));
+  PetscCall(SbNodalStressDestroy(&out->nodal));
   PetscCall(PetscFree(out->body_nodes));
   PetscCall(PetscFree(out->points.start));
   PetscCall(PetscFree(out->points.corner));

@@ -16,7 +16,8 @@ const SbOption SbOutputRows[] = {
    "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
-   "contact_gap, stress, von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; "
+   "contact_gap, nodal_stress, nodal_von_mises, stress, von_mises, pressure, mean_pressure, J, "
+   "energy_density, space_error, rank; "
    "sets: "
    "where the sets and groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
@@ -243,6 +244,7 @@ static PetscErrorCode destroy(SbRun run)
   for (PetscInt p = 0; p < out->nprobe; p++) {
     PetscCall(PetscFree(out->probe[p].nodes.item));
     PetscCall(PetscFree(out->probe[p].cells.item));
+    PetscCall(PetscFree(out->probe[p].stresses.item));
   }
   PetscCall(PetscFree(out->probe));
   PetscCall(PetscFree(out->identity));

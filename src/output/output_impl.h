@@ -162,6 +162,7 @@ typedef struct {
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
   SbSum nodes, cells; /* this rank's nodes, if there is no vertex at x, and tets */
+  SbSum stresses;     /* of a point: 10 cell + a, nodes of tets for SbNodalStressAt() */
 } SbProbe;
 
 typedef struct _p_SbFrames *SbFrames;   /* frames.c */
@@ -248,6 +249,8 @@ struct _p_SbOutput {
   PetscBool state_valid;
   PetscReal *sigma, *J, *psi; /* [ncell_owned][6] Pa, [ncell_owned], the same in J/m^3; or NULL */
   PetscReal *pressure;        /* [ncell_owned] Pa; NULL likewise */
+  SbNodalStress nodal;        /* stress at nodes; NULL when nothing shows it */
+  PetscBool nodal_valid;      /* likewise of it */
 
   SbPoints points;
 
@@ -296,12 +299,21 @@ SbFieldPrepare(SbRun run, SbOutput out,
    false. */
 PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *step,
                                const SbSum *cells, PetscReal value[]);
+/* The same at the nodes 10 cell + a of tets, of the recovered stress. Collective where nodal_valid
+   is false. */
+PetscErrorCode SbFieldAddNodal(const SbField *field, SbRun run, const SbStep *step,
+                               const SbSum *nodes, PetscReal value[]);
+/* Whether a probe at a point shows it of the recovered stress. */
+PetscBool SbFieldIsRecovered(const SbField *field);
 /* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
 PetscBool SbFieldIsProbed(const SbField *field);
 
 /* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces().
    Collective. */
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces);
+/* sigma[point.nowned][6], Pa, of out->nodal; where materials meet the mean of the tets, by volume.
+   Not collective. */
+PetscErrorCode SbPointsStress(SbRun run, SbOutput out, PetscReal sigma[]);
 /* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of
    a cell (4 cell + a of the vertex), if it is that cell's alone. */
 typedef struct {

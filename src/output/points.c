@@ -214,3 +214,50 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
   PetscCall(PetscFree(r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbPointsStress(SbRun run, SbOutput out, PetscReal sigma[])
+{
+  const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
+  PetscReal *V, here[6];
+  PetscInt *point; /* [nnode] of own nodes at edges, -1: of others */
+
+  PetscFunctionBeginUser;
+  if (out->discontinuous) {
+    for (PetscInt i = 0; i < out->point.nowned; i++)
+      SbNodalStressAt(out->nodal, out->place[i] / SB_CELL_NODES,
+                      (int)(out->place[i] % SB_CELL_NODES), sigma + 6 * i);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  // means over the cells around, which are all local
+  PetscCall(PetscMalloc2(out->point.nowned, &V, s->nnode, &point));
+  PetscCall(PetscArrayzero(V, out->point.nowned));
+  PetscCall(PetscArrayzero(sigma, 6 * out->point.nowned));
+  for (PetscInt i = 0; i < s->nnode; i++)
+    point[i] = -1;
+  for (PetscInt i = mesh->nvert_owned; i < out->point.nowned; i++)
+    point[out->place[i]] = i;
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    const PetscReal volume = SbTetDeterminant(mesh->x, mesh->cell + 4 * c);
+
+    for (int a = 0; a < SB_CELL_NODES; a++) {
+      PetscInt i = -1;
+
+      if (a < 4 && mesh->cell[4 * c + a] < mesh->nvert_owned)
+        i = mesh->cell[4 * c + a];
+      else if (a >= 4 && s->edge_node && s->edge_node[6 * c + a - 4] >= 0)
+        i = point[s->edge_node[6 * c + a - 4]];
+      if (i < 0)
+        continue;
+      SbNodalStressAt(out->nodal, c, a, here);
+      V[i] += volume;
+      for (int k = 0; k < 6; k++)
+        sigma[6 * i + k] += volume * here[k];
+    }
+  }
+  for (PetscInt i = 0; i < 6 * out->point.nowned; i++)
+    sigma[i] /= V[i / 6];
+  PetscCall(PetscFree2(V, point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

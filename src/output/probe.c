@@ -4,10 +4,11 @@
 
   At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that
   with the smallest original number. Vectors are what vertex fields show there: the unknown of P1
-  and P2, the mean of the cells around it for CR and DG; quantities of tets are means over the tets
-  around it, by volume. On a set: the mean over its boundary facets, by area at rest; in a set: over
-  its tets, by volume at rest. Both integrate the basis functions, so they are exact for each
-  element; a facet has what its tet has.
+  and P2, the mean of the cells around it for CR and DG; stresses are recovered
+  (fem/nodal_stress.c), other quantities of tets are means over the tets around it, by volume. On a
+  set: the mean over its boundary facets, by area at rest; in a set: over its tets, by volume at
+  rest. Both integrate the basis functions, so they are exact for each element; a facet has what its
+  tet has.
 
   A probe at a point follows the material that is there. When its body is re-meshed and the vertex
   is gone, it shows what the tet has that holds the position at rest. Checkpoints carry the position
@@ -40,9 +41,8 @@ const SbOption SbProbeRows[] = {
   {"fields", SB_OPTION_NAMES, 1, "", "displacement", "",
    "columns of history.csv: displacement, position, velocity, acceleration, stress, von_mises, "
    "pressure, "
-   "mean_pressure, J, energy_density; quantities of tets are averaged over the tets around the "
-   "vertex, or "
-   "behind the facets"},
+   "mean_pressure, J, energy_density; stresses at a vertex are recovered ones, other quantities of "
+   "tets averaged over the tets around it, or behind the facets"},
   {0},
 };
 
@@ -225,6 +225,8 @@ static PetscErrorCode add_cell(const SbSpace s, SbProbe *probe, PetscInt cell, P
     for (int c = 0; c < 4 && !quadratic; c++)
       w += e->ops.vertex[c][a] * L[c];
     PetscCall(add(&probe->nodes, SbSpaceCellNode(s, cell, a), w));
+    if (probe->kind == SB_PROBE_POINT)
+      PetscCall(add(&probe->stresses, SB_CELL_NODES * cell + a, quadratic ? w : L[a]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -361,10 +363,12 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
     PetscBool cells = PETSC_FALSE;
     PetscReal total = 0.;
 
-    probe->nodes.n = probe->cells.n = 0;
+    probe->nodes.n = probe->cells.n = probe->stresses.n = 0;
     for (PetscInt i = 0; i < probe->nfield; i++) {
       PetscCall(SbFieldPrepare(run, out, probe->field[i]));
       cells = (PetscBool)(cells || probe->field[i]->cell);
+      if (probe->kind == SB_PROBE_POINT && SbFieldIsRecovered(probe->field[i]) && !out->nodal)
+        PetscCall(SbNodalStressCreate(s, &out->nodal));
     }
     probe->local = -1;
     if (probe->kind != SB_PROBE_POINT)
@@ -389,9 +393,13 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
           there = mesh->gvert[mesh->cell[i]];
         else if (s->edge_node[i] >= 0)
           there = s->gnode[s->edge_node[i]];
-        if (there == here)
-          PetscCall(add(&probe->cells, i / per,
-                        SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / per)) / 6.));
+        if (there == here) {
+          const PetscReal V = SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / per)) / 6.;
+
+          PetscCall(add(&probe->cells, i / per, V));
+          PetscCall(
+            add(&probe->stresses, SB_CELL_NODES * (i / per) + i % per + (vertex ? 0 : 4), V));
+        }
       }
     }
 
@@ -406,6 +414,8 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
                  : "tetrahedra; a mean over facets is asked for by _on");
     for (PetscInt i = 0; i < probe->cells.n; i++)
       probe->cells.item[i].weight /= total;
+    for (PetscInt i = 0; i < probe->stresses.n; i++)
+      probe->stresses.item[i].weight /= total;
     for (PetscInt i = 0; i < probe->nodes.n; i++)
       probe->nodes.item[i].weight /= total;
 
@@ -422,7 +432,7 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const Sb
                            PetscReal values[])
 {
   PetscFunctionBeginUser;
-  out->state_valid = PETSC_FALSE;
+  out->state_valid = out->nodal_valid = PETSC_FALSE;
   for (const SbProbe *probe = out->probe; probe < out->probe + out->nprobe; probe++) {
     for (PetscInt i = 0; i < probe->nfield; values += probe->field[i++]->ncomp) {
       const SbField *f = probe->field[i];
@@ -433,6 +443,10 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, const Sb
         x = stage->v;
       else if (f->from == offsetof(SbStep, A))
         x = stage->a;
+      if (probe->kind == SB_PROBE_POINT && SbFieldIsRecovered(f)) {
+        PetscCall(SbFieldAddNodal(f, run, step, &probe->stresses, values));
+        continue;
+      }
       if (f->cell) {
         PetscCall(SbFieldAddCells(f, run, step, &probe->cells, values));
         continue;

@@ -214,6 +214,14 @@ static inline PetscErrorCode locking_shell_errors(SbModel m, Vec U, PetscReal nu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene: mesh, nu. */
+#define LOCKING_SHELL                                                                        \
+  "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g " \
+  "-body_a_density 1 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "              \
+  "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "      \
+  "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "  \
+  "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static"
+
 /* On a mesh of meshes/shell.geo. */
 static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const char *more,
                                            LockingShell *e, LockingCost *cost)
@@ -221,14 +229,7 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(locking_run(
-    &t, cost, more,
-    "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
-    "-body_a_density 1 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
-    "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
-    "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
-    mesh, nu));
+  PetscCall(locking_run(&t, cost, more, LOCKING_SHELL, mesh, nu));
   PetscCall(locking_shell_errors(t.model, t.run->state.U, nu, e));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -32,7 +32,7 @@ SCENE = """-bodies cube
 -set_half_at box:0,0,0,0.05,0.1,0.1
 -probes inside,corner,side,block
 -probe_inside_at 0.028,0.052,0.047
--probe_inside_fields displacement,J
+-probe_inside_fields displacement,J,stress
 -probe_corner_at 0.1,0.1,0.1
 -probe_side_on xmax
 -probe_side_fields displacement,position,stress
@@ -81,11 +81,11 @@ def check(folder, block=False, remeshed=True):
         return rows[:, names.index(name)]
 
     wrong = [numpy.abs(column("side_position_x") - column("side_ux") - 0.1).max() / 0.1]
-    for t, *found in zip(rows[:, 1], column("inside_J"), column("block_J"), column("side_stress_xz"), column("side_stress_zz"), column("block_von_mises")):
+    for t, *found in zip(rows[:, 1], column("inside_J"), column("block_J"), column("side_stress_xz"), column("side_stress_zz"), column("block_von_mises"), column("inside_stress_xz")):
         s, J = stress(t)
         d = s - numpy.trace(s) / 3 * numpy.eye(3)
         wrong += [abs(found[0] - J), abs(found[1] - J), abs(found[2] - s[0, 2]) / MU, abs(found[3] - s[2, 2]) / MU]
-        wrong += [abs(found[4] - (1.5 * (d * d).sum()) ** 0.5) / MU]
+        wrong += [abs(found[4] - (1.5 * (d * d).sum()) ** 0.5) / MU, abs(found[5] - s[0, 2]) / MU]
     # the body is all there is
     wrong += [numpy.abs(column("cube_strain") - column("strain")).max()]
     wrong += [numpy.abs(column(f"cube_centre_{k}") - column(f"centre_{k}")).max() / 0.1 for k in "xyz"]

@@ -176,6 +176,137 @@ static PetscErrorCode solves(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Values of the quantity of interest after each step. */
+static PetscErrorCode record(SbRun run, const SbStep *step, void *ctx)
+{
+  const SbLedger l = (SbLedger)run->monitors.post_solve.ctx;
+
+  PetscFunctionBeginUser;
+  ((PetscReal *)ctx)[step->step] = l->quantity.value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define TIP                                                                                 \
+  "-ledger yes -ledger_quantity displacement -ledger_at 0.4,0.05,0.05 -body_bar_young 1e5 " \
+  "-ts_max_time 0.4 "
+
+/* Largest error of the tip by the time step in a run of n steps, against one of 20 n. */
+static PetscErrorCode tip_in_time(const char *scene, const char *integrator, PetscInt n)
+{
+  PetscReal *value[2];
+  PetscReal error = 0.;
+  PetscReal estimate = 0.;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  for (int fine = 0; fine < 2; fine++) {
+    PetscCall(PetscCalloc1(20 * n + 1, &value[fine]));
+    PetscCall(test_open(&t, BAR TIP "%s -time %s -ts_dt %.17g", scene,
+                        fine ? "newmark" : integrator, 0.4 / (fine ? 20. * (double)n : (double)n)));
+    PetscCall(SbRunAddMonitor(t.run, record, value[fine]));
+    PetscCall(verify_solve(&t, scene));
+    if (!fine)
+      estimate = ((SbLedger)t.run->monitors.post_solve.ctx)->quantity.error[SB_ERROR_TIME];
+    PetscCall(test_scene_close(&t));
+  }
+  for (PetscInt i = 1; i <= n; i++)
+    error = PetscMax(error, PetscAbsReal(value[0][i] - value[1][20 * i]));
+  test_print("  | tip, %s, %d steps, %s | time | %.2e | %.2e | %.2f |\n", integrator, (int)n, scene,
+             error, estimate, estimate / error);
+  SB_CHECK(estimate > 0.3 * error && estimate < 3. * error,
+           "tip, %s, %s: estimate / error %g is not in [0.3, 3]", integrator, scene,
+           estimate / error);
+  PetscCall(PetscFree(value[0]));
+  PetscCall(PetscFree(value[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With a quantity, -accuracy is of that: fast oscillations that the tip does not show cost
+   nothing. */
+static PetscErrorCode tip_accuracy(void)
+{
+  static const char scene[] =
+    BAR TIP "-body_bar_material linear -body_bar_element cr -body_bar_poisson 0.4999 "
+            "-ts_max_time 0.2 -time newmark ";
+  PetscReal tip[2] = {0., 0.};
+  PetscReal range = 0.;
+  PetscInt steps = 0;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  for (int fine = 0; fine < 2; fine++) {
+    const SbQuantity *q;
+
+    PetscCall(test_open(&t, "%s %s", scene, fine ? "-ts_dt 0.001" : "-ts_dt 0.01 -accuracy 0.01"));
+    PetscCall(verify_solve(&t, "accuracy of the tip"));
+    q = &((SbLedger)t.run->monitors.post_solve.ctx)->quantity;
+    tip[fine] = q->value;
+    range = q->most - q->least;
+    if (!fine)
+      steps = t.run->counters.steps;
+    PetscCall(test_scene_close(&t));
+  }
+  test_print("  tip, cr, nu 0.4999, -accuracy 0.01: %d steps, error %.2e of the range\n",
+             (int)steps, PetscAbsReal(tip[0] - tip[1]) / range);
+  SB_CHECK(steps < 100, "-accuracy 0.01 for the tip takes %d steps", (int)steps);
+  SB_CHECK_NEAR(tip[0], tip[1], 0.01 * range, "tip with -accuracy 0.01");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Errors of quantities: of the tip of a swinging bar by the time step, and of Cook's membrane by
+   the mesh, against P2 with edges of a quarter of the length. */
+static PetscErrorCode quantities(void)
+{
+  static const char p1[] = "-body_bar_material linear";
+  static const char p2[] =
+    "-body_bar_material linear -body_bar_mesh box:0.4,0.1,0.1:1 -body_bar_element p2";
+  static const char turned[] = "-body_bar_material corotated -snes_rtol 1e-9";
+  static const struct {
+    const char *element;
+    PetscReal nu, exact, low, high;
+  } cook[] = {{"p1", 0.3, 21.94401, 0.5, 2.},
+              {"p2", 0.45, 19.58106, 0.5, 2.},
+              {"p2", 0.4999, 18.50922, 0.5, 2.}};
+
+  PetscFunctionBeginUser;
+  PetscCall(tip_in_time(p1, "newmark", 20));
+  if (test_size == 1) {
+    PetscCall(tip_accuracy());
+    PetscCall(tip_in_time(p1, "genalpha", 40));
+    PetscCall(tip_in_time(p1, "euler_implicit", 40));
+    PetscCall(tip_in_time(p2, "newmark", 40));
+    PetscCall(tip_in_time(turned, "newmark", 20));
+    PetscCall(tip_in_time(turned, "euler_implicit", 40));
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cook); i++) {
+    TestScene t;
+    SbQuantity *q;
+    PetscReal error;
+
+    PetscCall(test_open(
+      &t,
+      "-bodies a -body_a_mesh meshes/cook.msh -body_a_material linear -body_a_young 1 "
+      "-body_a_poisson %g -body_a_element %s -body_a_density 1 -effects hold,plane,pull "
+      "-effect_hold_type fixed -effect_hold_on left -effect_plane_type fixed -effect_plane_on all "
+      "-effect_plane_components z -effect_pull_type traction -effect_pull_on right "
+      "-effect_pull_vector 0;1/16;0 -time static -solver direct -ledger yes -ledger_quantity "
+      "displacement -ledger_at 48,52,0 -ledger_direction 0,1,0",
+      (double)cook[i].nu, cook[i].element));
+    PetscCall(verify_solve(&t, "cook"));
+    q = &((SbLedger)t.run->monitors.post_solve.ctx)->quantity;
+    error = PetscAbsReal(q->value - cook[i].exact);
+    test_print("  | Cook, %s, nu %g | space | %.2e | %.2e | %.2f |\n", cook[i].element,
+               (double)cook[i].nu, error, q->error[SB_ERROR_SPACE],
+               q->error[SB_ERROR_SPACE] / error);
+    SB_CHECK(q->error[SB_ERROR_SPACE] > cook[i].low * error &&
+               q->error[SB_ERROR_SPACE] < cook[i].high * error,
+             "Cook, %s, nu %g: estimate / error %g", cook[i].element, (double)cook[i].nu,
+             q->error[SB_ERROR_SPACE] / error);
+    PetscCall(test_scene_close(&t));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Penalty springs against the exact rigid contact: a block indented by a ball, and one that settles
    evenly on its springs. */
 static PetscErrorCode springs(void)
@@ -364,6 +495,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(steps());
   PetscCall(solves());
+  PetscCall(quantities());
   PetscCall(springs());
 
   /* a factorisation on several ranks sums in the order in which messages arrive */
