@@ -135,7 +135,7 @@ static PetscErrorCode open_parted(Surfaces *b)
     parted += (o->touching[k] & SB_TOUCH_PARTED) != 0;
   if (!parted)
     PetscFunctionReturn(PETSC_SUCCESS);
-  b->pairs->near = b->separation.held;
+  b->pairs->near = b->separation.rims;
   b->pairs->known = PETSC_FALSE;
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -242,7 +242,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   }
   if (b->pairs->near || b->separation.overlapping)
     b->pairs->known = PETSC_FALSE;
-  b->pairs->near = b->separation.overlapping ? o->near : b->separation.held;
+  b->pairs->near = b->separation.overlapping ? o->near : b->separation.rims;
   b->motion.known = PETSC_FALSE;
   if (!b->separation.overlapping) {
     if (e->dynamic && b->motion.begun)

@@ -50,9 +50,10 @@
 #define SOFTEST \
   0.01 /* ... down to this. Arches of 7 and 9 stones of 30 and 10 GPa fail with 1; forces are right
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
-#define SUMS 4     /* in the first record of a checkpoint */
-#define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
-#define PASSES 200 /* sweeps over all pairs for that */
+#define SUMS 4      /* in the first record of a checkpoint */
+#define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
+#define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
+#define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
@@ -115,6 +116,8 @@ static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
+  b->surface->rim =
+    2. * b->contact.base.width; /* what touches, and what faces turn by as they open */
   PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0],
                                  b->options.search, &b->pairs));
   b->record.least = PETSC_MAX_REAL;
@@ -238,7 +241,7 @@ static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
 
     if (one == two || pair->side || !counts(b, pair) || SbContactPairRadius(m, pair) > 0. ||
         SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, SB_TOUCH * w) ||
-        SbContactPairGap(m, pair, b->motion.x, &d) >= SB_TOUCH * w ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= PetscMin(SB_TOUCH * w, width_of(b, pair)) ||
         !face_to_face(b, pair, normal, &d, n, &gap) || gap >= (edges ? 0. : NEXT * w))
       continue;
     touching[one] |= SB_TOUCH_ONCE | SB_TOUCH_NOW | (edges ? 0 : SB_TOUCH_VERTICES);
@@ -254,7 +257,9 @@ static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
 /* The gap to which a pair is opened when a run begins, m. */
 static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair)
 {
-  return (b->contact.base.effect->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair);
+  const PetscReal w = of_pair(b, b->widths.w, pair);
+
+  return PetscMin(b->contact.base.effect->dynamic ? w : APART * w, width_of(b, pair));
 }
 
 static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
@@ -324,7 +329,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
   PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
-  most = b->contact.base.width + b->separation.sunk;
+  most = FARTHEST * (b->contact.base.width + b->separation.sunk);
   for (int pass = 0; pass < PASSES && far < most; pass++) {
     PetscInt n = 0;
 
@@ -475,6 +480,8 @@ static PetscErrorCode touch_at_width(SbEffect e)
     SbDistance d;
     const PetscReal gap = SbContactPairGap(b->surface, pair, b->motion.x, &d);
 
+    if (pair->rims)
+      continue;
     least = PetscMin(least, gap / of_pair(b, b->widths.w, pair));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, b->surface->space->comm));
@@ -514,42 +521,41 @@ static void stiffen(Surfaces *b, PetscReal dt)
          : 0.);
 }
 
-/* Prescribed vertices of two bodies that lie on each other, as the rims of two blocks side by side
-   on one clamped base, never open: pairs of them are excluded, as those of an overlap are. Free
-   vertices beside them stay guarded. Collective. */
-static PetscErrorCode find_held(Surfaces *b)
+/* Prescribed vertices that stand just inside another body beside prescribed ones of it, as the rims
+   of two blocks that overlap on one clamped base, never part, and their edges go through each other
+   there: pairs of them are excluded. Free vertices beside them stay guarded. Collective. */
+static PetscErrorCode find_sunk_rims(Surfaces *b)
 {
   const SbContactSurface m = b->surface;
   const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
-  uint8_t *held;
+  uint8_t *rims;
   uint8_t any = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(N, &held));
+  PetscCall(PetscCalloc1(N, &rims));
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    PetscReal lever = 0.;
+    PetscReal n[3];
     SbDistance d;
 
-    if (pair->side || SbContactPairRadius(m, pair) > 0. ||
-        SbContactPairGap(m, pair, b->motion.x, &d) >= ON * m->size)
+    if (!pair->rims || pair->kind != SB_PAIR_VERTEX_TRIANGLE || !m->driven[pair->v[0]] ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= m->rim)
       continue;
-    for (int k = 0; k < 4; k++)
-      lever += m->driven[pair->v[k]] ? 0. : PetscAbsReal(d.weight[k]);
-    for (int k = 0; k < 4 && lever <= ON; k++)
-      if (d.weight[k] != 0.)
-        any = held[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
+    (void)SbContactTriangleArea(b->motion.x, pair->v + 1, n);
+    for (int k = 0; k < 4 && SbDot3(n, d.n) < 0.; k++)
+      if (m->driven[pair->v[k]])
+        any = rims[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_UINT8_T, MPI_MAX, m->space->comm));
   if (any) {
     PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, held, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
-    b->separation.held = held;
-    b->pairs->near = b->pairs->near ? b->pairs->near : held;
+      MPI_Allreduce(MPI_IN_PLACE, rims, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
+    b->separation.rims = rims;
+    b->pairs->near = b->pairs->near ? b->pairs->near : rims;
     b->pairs->known = b->motion.known = PETSC_FALSE;
   } else
-    PetscCall(PetscFree(held));
+    PetscCall(PetscFree(rims));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -580,7 +586,7 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
       e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.), PETSC_FALSE));
   }
   if (!b->motion.begun && !b->separation.overlapping)
-    PetscCall(find_held(b));
+    PetscCall(find_sunk_rims(b));
   if (!b->motion.begun && t == 0. && !e->dynamic) /* not when it goes on from a checkpoint */
     PetscCall(touch_at_width(e));
   b->motion.begun = PETSC_TRUE;
@@ -829,7 +835,7 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
   PetscCall(PetscFree(b->blocks.slot));
   PetscCall(PetscFree(b->springs.spring));
   PetscCall(SbContactOverlapFree(&b->separation.overlap));
-  PetscCall(PetscFree(b->separation.held));
+  PetscCall(PetscFree(b->separation.rims));
   PetscCall(SbPartnerDestroy(&b->contact.partner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
