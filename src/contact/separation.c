@@ -280,7 +280,14 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   /* warns once, naming what overlaps */
   if (!b->separation.announced) {
     const char *name[2];
+    char how[3 * SB_NAME_MAX] = "moved apart with their supports, and pushed together from there";
 
+    if (e->dynamic || b->contact.partner.obstacle)
+      SbFormat(
+        sizeof(how), how,
+        "separated gradually (-effect_%s_separation_steps); until then they may pass through "
+        "each other there",
+        e->name);
     for (int k = 0; k < 2; k++)
       name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
     PetscCheck(
@@ -292,11 +299,9 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
     PetscCall(SbWarning(
       s->comm,
       "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
-      " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); "
-      "until then "
-      "they may pass through each other there",
+      " points are up to %g m deep. They are %s",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), e->name));
+      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), how));
   }
   b->separation.announced = PETSC_TRUE;
 

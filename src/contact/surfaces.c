@@ -309,6 +309,41 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool *all,
+                                        SbInitialContacts *list)
+{
+  Surfaces *b = (Surfaces *)contact;
+  const SbContactOverlap *o = &b->separation.overlap;
+
+  PetscFunctionBeginUser;
+  if (!b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  *all = (PetscBool)(*all && !b->contact.partner.obstacle && o->nway);
+  for (PetscInt k = 0; k < o->nway; k++) {
+    const PetscInt *part = o->way[k].part;
+    SbInitialContact touch = {.body = {part[0], part[1]},
+                              .to = PetscMin(b->widths.w[part[0]], b->widths.w[part[1]])};
+
+    for (PetscInt i = 0; i < o->n; i++) {
+      const SbPenetration *p = &o->point[i];
+      const PetscInt own = b->surface->part[p->v[0]];
+      const PetscInt other = b->surface->part[p->v[p->n - 1]];
+
+      if (PetscMin(own, other) == part[0] && PetscMax(own, other) == part[1])
+        touch.gap = PetscMin(touch.gap, -p->depth);
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &touch.gap, 1, MPIU_REAL, MPI_MIN, s->comm));
+    if (touch.gap == 0.)
+      continue; /* of an earlier search */
+    *all = (PetscBool)(*all && SbDot3(o->way[k].n, o->way[k].n) > 0.);
+    for (int i = 0; i < 3; i++)
+      touch.n[i] = o->way[k].n[i];
+    PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
+    list->touch[list->n++] = touch;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves touching surfaces apart to their initial gap where bodies could not be: Jacobi iterations
    over all closer pairs. Every rank treats its own pairs; displacements of vertices are summed over
    all. */
@@ -842,6 +877,7 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
 
 static const SbContactOps surface_ops = {
   .initial_contacts = initial_contacts_surfaces,
+  .overlaps = overlaps_surfaces,
   .part = part_surfaces,
   .begin_step = begin_step_surfaces,
   .find_impacts = SbContactFindImpacts_Surfaces,
