@@ -1337,6 +1337,16 @@ static PetscErrorCode take_points(SbContactSurface m, SbContactOverlap *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactOverlapCreate(SbContactSurface m, SbContactOverlap *o)
+{
+  PetscFunctionBeginUser;
+  if (o->near)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m->nvertex - m->nbody_vertex + m->Nbody_vertex, &o->near));
+  PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *o)
 {
@@ -1350,10 +1360,7 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
   o->n = o->npoint = o->ncrossing = 0;
   o->deepest = o->farthest = 0.;
   o->touches = PETSC_FALSE;
-  if (!o->near) {
-    PetscCall(PetscMalloc1(N, &o->near));
-    PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
-  }
+  PetscCall(SbContactOverlapCreate(m, o));
   PetscCall(PetscArrayzero(o->near, N));
   for (PetscInt k = 0; k <= m->space->mesh->nbody; k++)
     o->touching[k] &= ~SB_TOUCH_OVERLAP;

@@ -289,6 +289,7 @@ typedef struct {
    edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
+PetscErrorCode SbContactOverlapCreate(SbContactSurface mesh, SbContactOverlap *o);
 PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
    a tet of body[0] is within the surface of body[1] at x. Slow: for the start of a run.

@@ -189,7 +189,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   PetscFunctionBeginUser;
   b->springs.n = 0;
   o->touch = touch && !b->separation.overlapping ? SB_TOUCH * b->contact.base.width : 0.;
-  if (!b->motion.begun && !b->contact.partner.obstacle)
+  if (!b->motion.begun && !b->separation.resumed && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
   o->coplanar = PETSC_TRUE;
   for (PetscInt k = 0; k <= s->mesh->nbody && o->touching; k++)
@@ -245,7 +245,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   b->pairs->near = b->separation.overlapping ? o->near : b->separation.rims;
   b->motion.known = PETSC_FALSE;
   if (!b->separation.overlapping) {
-    if (e->dynamic && b->motion.begun)
+    if (e->dynamic && (b->motion.begun || b->separation.resumed))
       PetscCall(open_parted(b));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

@@ -50,7 +50,7 @@
 #define SOFTEST \
   0.01 /* ... down to this. Arches of 7 and 9 stones of 30 and 10 GPa fail with 1; forces are right
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
-#define SUMS 4      /* in the first record of a checkpoint */
+#define SUMS 6      /* in the first record of a checkpoint */
 #define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
@@ -765,31 +765,64 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces follow from the positions and the multipliers: these are saved, and accumulated sums. The
-   first record of a rank has its sums; with multipliers each further one has one of them. */
+/* What a record of a checkpoint has, at PAIR_KEY; a multiplier has its force there. */
+enum {
+  RECORD_SUMS = -1, /* SUMS numbers: accumulated sums, and factors that go from step to step */
+  RECORD_WAY = -2,  /* parts that overlap, and their direction */
+  RECORD_PART = -3  /* a part, and SB_TOUCH_... of it */
+};
+
+/* Adds a record of n numbers. */
+static void add_record(PetscInt nstate, PetscInt *at, PetscReal records[], int kind, int n,
+                       const PetscReal number[])
+{
+  PetscReal *record = records + nstate * (*at)++;
+
+  for (int i = 0; i < n; i++)
+    record[i] = number[i];
+  record[PAIR_KEY] = kind;
+}
+
+/* Forces follow from the positions and the multipliers: these are saved, accumulated sums, of which
+   each rank has its own, and what the separation of an overlap goes on from. */
 static PetscErrorCode save_surfaces(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Surfaces *b = (const Surfaces *)e->data;
   const PairForces *m = &b->multipliers.kept;
-  const PetscReal sum[SUMS] = {b->sums.work + b->contact.base.given, b->friction.loss,
+  const SbContactOverlap *o = &b->separation.overlap;
+  const PetscInt npart = o->touching ? s->mesh->nbody + 1 : 0;
+  const PetscReal sum[SUMS] = {b->sums.work + b->contact.base.given,
+                               b->friction.loss,
                                s->rank ? 0. : b->separation.stiffer,
-                               s->rank ? 0. : b->widths.scale};
+                               s->rank ? 0. : b->widths.scale,
+                               s->rank ? 0. : (PetscReal)b->separation.opening,
+                               s->rank ? 0. : b->contact.overlap.longest};
+  PetscInt at = 0;
 
   PetscFunctionBeginUser;
-  *n = s->rank ? 1 : 1 + m->n;
-  PetscCall(PetscCalloc1(e->nstate * *n, records));
-  PetscCall(PetscArraycpy(*records, sum, SUMS));
-  if (has_table(b))
-    (*records)[PAIR_KEY] = -1.;
-  for (PetscInt k = 1; k < *n; k++) {
-    PetscReal *record = *records + e->nstate * k;
+  PetscCall(PetscCalloc1(e->nstate * (1 + m->n + o->nway + npart), records));
+  add_record(e->nstate, &at, *records, RECORD_SUMS, SUMS, sum);
+  for (PetscInt k = 0; k < o->nway && !s->rank; k++) {
+    const SbOverlapWay *w = &o->way[k];
+
+    add_record(
+      e->nstate, &at, *records, RECORD_WAY, 5,
+      (const PetscReal[]){(PetscReal)w->part[0], (PetscReal)w->part[1], w->n[0], w->n[1], w->n[2]});
+  }
+  for (PetscInt k = 0; k < npart && !s->rank; k++)
+    if (o->touching[k] & (SB_TOUCH_OVERLAP | SB_TOUCH_PARTED))
+      add_record(e->nstate, &at, *records, RECORD_PART, 2,
+                 (const PetscReal[]){(PetscReal)k, (PetscReal)o->touching[k]});
+  for (PetscInt k = 0; k < m->n && !s->rank; k++) {
+    PetscReal *record = *records + e->nstate * at++;
 
     for (int i = 0; i < PAIR_KEY; i++)
-      record[i] = m->pair[k - 1].key[i];
-    record[PAIR_KEY] = m->pair[k - 1].force;
+      record[i] = m->pair[k].key[i];
+    record[PAIR_KEY] = m->pair[k].force;
     for (int i = 0; i < 3; i++)
-      record[PAIR_KEY + 1 + i] = m->pair[k - 1].tangent[i];
+      record[PAIR_KEY + 1 + i] = m->pair[k].tangent[i];
   }
+  *n = at;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -798,33 +831,44 @@ static PetscErrorCode load_surfaces(SbEffect e, SbSpace s, PetscReal t, const Pe
 {
   Surfaces *b = (Surfaces *)e->data;
   PairForces *m = &b->multipliers.kept;
+  SbContactOverlap *o = &b->separation.overlap;
   PetscReal sum[SUMS] = {0.};
 
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
-  m->n = 0;
+  m->n = o->nway = 0;
   PetscCall(SbReserve(n, sizeof(*m->pair), &m->size, &m->pair));
+  PetscCall(SbContactOverlapCreate(b->surface, o));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *record = records + e->nstate * k;
 
-    if (!has_table(b) || record[PAIR_KEY] < 0.) {
+    if (record[PAIR_KEY] == RECORD_SUMS) {
       for (int i = 0; i < SUMS; i++)
         sum[i] += record[i];
-      continue;
+    } else if (record[PAIR_KEY] == RECORD_WAY) {
+      PetscCall(SbReserve(o->nway + 1, sizeof(*o->way), &o->way_size, &o->way));
+      o->way[o->nway++] = (SbOverlapWay){.part = {(PetscInt)record[0], (PetscInt)record[1]},
+                                         .n = {record[2], record[3], record[4]}};
+    } else if (record[PAIR_KEY] == RECORD_PART) {
+      o->touching[(PetscInt)record[0]] = (uint8_t)record[1];
+      b->separation.resumed = b->separation.announced = PETSC_TRUE;
+    } else {
+      for (int i = 0; i < PAIR_KEY; i++)
+        m->pair[m->n].key[i] = (PetscInt)record[i];
+      m->pair[m->n].force = record[PAIR_KEY];
+      for (int i = 0; i < 3; i++)
+        m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
+      m->n++;
     }
-    for (int i = 0; i < PAIR_KEY; i++)
-      m->pair[m->n].key[i] = (PetscInt)record[i];
-    m->pair[m->n].force = record[PAIR_KEY];
-    for (int i = 0; i < 3; i++)
-      m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
-    m->n++;
   }
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
   b->separation.stiffer = sum[2];
   if (sum[3] > 0. && b->options.width == 0.)
     set_scale(e, sum[3]);
+  b->separation.opening = (PetscInt)sum[4];
+  b->contact.overlap.longest = sum[5];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -947,7 +991,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
   PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
   b->fall_back.response = b->contact.response;
   b->fall_back.may = (PetscBool)(has_multipliers(b) && (unsettled == 2 || (by_auto && !unsettled)));
-  e->nstate = has_multipliers(b) || b->options.sticks ? PAIR_KEY + 4 : SUMS;
+  e->nstate = PAIR_KEY + 4;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

@@ -131,6 +131,7 @@ typedef struct {
   PetscBool parted;      /* there was some at the start of this load step */
   PetscBool searched;    /* it was searched for when the run began */
   PetscBool announced;   /* the warning was given */
+  PetscBool resumed;     /* the run goes on in the middle of it */
   PetscInt opening;      /* steps since nothing intersects any more */
   uint8_t
     *rims; /* as SbContactOverlap.near: prescribed vertices inside another body beside prescribed
@@ -234,7 +235,7 @@ static inline PetscBool has_multipliers(const Surfaces *b)
 /* Whether there is a table of multipliers: of forces, of friction, or of both. */
 static inline PetscBool has_table(const Surfaces *b)
 {
-  return (PetscBool)(b->contact.base.effect->nstate > PAIR_KEY);
+  return (PetscBool)(has_multipliers(b) || b->options.sticks);
 }
 
 /* How a pair resists. */
