@@ -54,6 +54,9 @@ typedef struct {
   PetscErrorCode (*initial_contacts)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
                                      const PetscReal u[], PetscBool *first,
                                      SbInitialContacts *list);
+  /* of a static run, after initial_contacts(): adds pairs of bodies that overlap as whole, with the
+     depth as a negative gap; all: false if some have no common direction. Alike on all ranks */
+  PetscErrorCode (*overlaps)(SbContact c, SbSpace space, PetscBool *all, SbInitialContacts *list);
   /* then, where surfaces touch that could not be moved apart rigidly: moves their vertices, u is
      changed, ghosts too; moved: it was, alike on all ranks */
   PetscErrorCode (*part)(SbContact c, SbSpace space, PetscReal t, PetscReal u[], PetscBool *moved);
@@ -197,8 +200,12 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 
   Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
               moved apart rigidly, as far as potentials ask for it.
+  Shift     - then, in a static run: supported bodies that touch or overlap are moved apart rigidly,
+              by S, as if nothing held them, so that a solution can push them together again; k: the
+              first potential with such bodies, -1: nothing was moved.
   Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved
-              apart; moved: some were. Give - by that the bodies got this energy, J.
+              apart; moved: some were. Give - by the start the bodies got this energy, J, of which
+              `counted` is in the work of its steps already.
   Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
   BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
               unchanged until the step ends. speed: SbModelStepSpeed(), the scale of tolerances,
@@ -207,7 +214,10 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U);
 PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
                                 PetscBool *moved);
-void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy);
+PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U,
+                                 Vec S, PetscInt *k);
+void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy,
+                      PetscReal counted);
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts);
 PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
                                      PetscReal speed, Vec U0, Vec V0);

@@ -756,6 +756,7 @@ PetscErrorCode SbContactSurfaceGather(SbContactSurface m, const PetscReal x[],
   PetscCall(PetscNew(&w));
   *w = (struct _p_SbContactSurface){.space = m->space,
                                     .self = m->self,
+                                    .rim = m->rim,
                                     .radius = m->radius,
                                     .side = m->side,
                                     .Nbody_vertex = m->Nbody_vertex,

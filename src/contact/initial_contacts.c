@@ -119,6 +119,145 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
+/* Adds touches of supported bodies at u that are to be opened, where nothing overlaps. */
+static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInitialContacts *mine,
+                                  SbInitialContacts *all)
+{
+  const PetscInt nbody = s->mesh->nbody;
+  SbInitialContact *touch;
+  PetscInt n;
+  PetscBool closed = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbAllgatherv(s->comm, MPI_BYTE, mine->n * (PetscInt)sizeof(*touch), mine->touch, &n,
+                         &touch, NULL));
+  n /= (PetscInt)sizeof(*touch);
+  if (n)
+    qsort(touch, (size_t)n, sizeof(*touch), by_value);
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt *b = touch[i].body;
+
+    closed = (PetscBool)(closed || (b[0] < nbody && b[1] < nbody && fixed[b[0]] && fixed[b[1]] &&
+                                    touch[i].gap < CLOSE * touch[i].to));
+  }
+  for (PetscInt i = 0; i < n && closed; i++) {
+    const PetscInt *b = touch[i].body;
+
+    if (b[0] >= nbody || b[1] >= nbody || !fixed[b[0]] || !fixed[b[1]])
+      continue;
+    PetscCall(SbReserve(all->n + 1, sizeof(*all->touch), &all->size, &all->touch));
+    all->touch[all->n++] = touch[i];
+  }
+  PetscCall(PetscFree(touch));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves supported bodies that touch or overlap apart from where they are, u, which was moved by
+   shift[nbody + 1][3] so far; *k: the first potential that has some, -1: none; *apart: none do any
+   more. all: contacts that were found so far, from the first positions. */
+static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, PetscReal dt,
+                                 const uint8_t fixed[], PetscReal u[], PetscReal shift[],
+                                 SbInitialContacts *all, PetscInt *k, PetscBool *apart)
+{
+  const SbSpace s = contacts->space;
+  const PetscInt nbody = s->mesh->nbody;
+  const PetscInt before = all->n;
+  uint8_t *none;
+  PetscReal *way;
+  PetscBool directed = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < contacts->npotential; i++) {
+    const PetscInt n = all->n;
+    SbInitialContacts mine = {0};
+    PetscBool first = PETSC_FALSE;
+
+    PHASE_CALL(contacts->potential[i], initial_contacts, s, t, dt, u, &first, &mine);
+    if (first)
+      PHASE_CALL(contacts->potential[i], overlaps, s, &directed, all);
+    if (first && directed && all->n == n)
+      PetscCall(add_touches(s, fixed, &mine, all));
+    PetscCall(PetscFree(mine.touch));
+    *k = *k < 0 && all->n > n ? i : *k;
+  }
+  for (PetscInt i = before; i < all->n; i++) {
+    SbInitialContact *touch = &all->touch[i];
+
+    directed = (PetscBool)(directed && fixed[touch->body[0]] && fixed[touch->body[1]]);
+    for (int c = 0; c < 3; c++)
+      touch->gap -= touch->n[c] * (shift[3 * touch->body[0] + c] - shift[3 * touch->body[1] + c]);
+  }
+  *apart = (PetscBool)(directed && all->n == before);
+  if (*apart || !directed) {
+    all->n = before;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* as if nothing held them */
+  PetscCall(PetscCalloc2(nbody + 1, &none, 3 * (nbody + 1), &way));
+  none[nbody] = 7;
+  sweep_touches(all->n, all->touch, nbody, none, way);
+  for (PetscInt i = 0; i < 3 * s->nnode; i++)
+    u[i] += way[3 * s->node_body[i / 3] + i % 3] - shift[3 * s->node_body[i / 3] + i % 3];
+  PetscCall(PetscArraycpy(shift, way, 3 * (nbody + 1)));
+  PetscCall(PetscFree2(none, way));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* fixed[nbody + 1]: bit c, component c of some node of the body is prescribed; of the obstacle all
+   are. Collective. */
+static PetscErrorCode find_supported(SbSpace s, uint8_t fixed[])
+{
+  const PetscInt nbody = s->mesh->nbody;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    fixed[s->node_body[i]] |= s->fixed[i];
+  fixed[nbody] = 7;
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U,
+                                 Vec S, PetscInt *k)
+{
+  const SbSpace s = contacts->space;
+  SbInitialContacts list = {0};
+  PetscReal *u, *shift;
+  PetscScalar *way;
+  uint8_t *fixed;
+  PetscBool apart = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  *k = -1;
+  PetscCall(PetscCalloc2(3 * (s->mesh->nbody + 1), &shift, s->mesh->nbody + 1, &fixed));
+  PetscCall(find_supported(s, fixed));
+  PetscCall(SbSpaceGetLocalWrite(s, U, &u));
+  PetscCall(SbSpaceUpdateGhosts(s, u));
+  for (int round = 0; round < ROUNDS && !apart; round++) {
+    const PetscInt n = list.n;
+
+    PetscCall(shift_once(contacts, t, dt, fixed, u, shift, &list, k, &apart));
+    if (!apart && list.n == n)
+      break;
+  }
+
+  /* where some stay in each other all stay, and springs have to part them */
+  if (!apart)
+    *k = -1;
+  for (PetscInt i = 0; i < 3 * s->nnode && *k < 0; i++)
+    u[i] -= shift[3 * s->node_body[i / 3] + i % 3];
+  PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
+  PetscCall(VecGetArray(S, &way));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    way[i] = *k < 0 ? 0. : shift[3 * s->node_body[i / 3] + i % 3];
+  PetscCall(VecRestoreArray(S, &way));
+  PetscCall(PetscFree(list.touch));
+  PetscCall(PetscFree2(shift, fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is
    inactive. */
 PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U)
@@ -135,11 +274,7 @@ PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, Pets
   PetscCall(SbSpaceGetLocalWrite(s, U, &u));
   PetscCall(SbSpaceUpdateGhosts(s, u));
   PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    fixed[s->node_body[i]] |= s->fixed[i];
-  fixed[nbody] = 7;
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, s->comm));
+  PetscCall(find_supported(s, fixed));
   for (int round = 0; go_on && round < ROUNDS; round++) {
     SbInitialContacts list = {0};
     SbInitialContact *touch;
@@ -181,8 +316,11 @@ PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy)
+void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy, PetscReal counted)
 {
-  contacts->potential[k]->work = contacts->potential[k]->given =
-    contacts->space->rank ? 0. : energy;
+  const SbContact c = contacts->potential[k];
+  const PetscBool here = (PetscBool)!contacts->space->rank;
+
+  c->work = here ? energy : 0.;
+  c->given = here ? energy - counted : 0.;
 }

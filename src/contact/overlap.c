@@ -75,6 +75,49 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
   return volume > 0. ? 1 : -1;
 }
 
+/* Whether an end of edge e that goes through triangle t is prescribed, and only just behind it, or
+   on it but for the distance that surfaces are drawn in by, where the triangle has prescribed
+   vertices: nothing can move them apart. */
+static PetscBool at_rim(SbContactSurface m, const PetscReal x[], const PetscInt e[2], PetscInt t)
+{
+  const PetscInt *v = m->triangle + 3 * t;
+  PetscReal n[3], r[3];
+  PetscReal y[12];
+  PetscReal length;
+  int ny = 6;
+  PetscBool at = PETSC_FALSE;
+  SbDistance d;
+
+  if (m->rim <= 0. || !(m->driven[v[0]] | m->driven[v[1]] | m->driven[v[2]]))
+    return PETSC_FALSE;
+  length = 2. * SbContactTriangleArea(x, v, n);
+  for (int k = 0; k < 2; k++) {
+    SbSubtract(x + 3 * v[0], x + 3 * e[k], r);
+    at = (PetscBool)(at || (m->driven[e[k]] && SbDot3(n, r) < m->rim * length &&
+                            SbDot3(n, r) > -2. * JITTER * m->size * length));
+  }
+  if (at || !m->driven[e[0]] || !m->driven[e[1]])
+    return at;
+  for (int k = 0; k < 9; k++) {
+    if (k < 6)
+      y[k] = x[3 * e[k / 3] + k % 3];
+    if (m->driven[v[k / 3]])
+      y[ny++] = x[3 * v[k / 3] + k % 3];
+  }
+  if (ny == 12)
+    SbDistanceFind(SB_PAIR_EDGE_EDGE, y, &d);
+  else { /* the vertex first */
+    for (int k = 0; k < 3; k++) {
+      const PetscReal vertex = y[6 + k];
+
+      y[6 + k] = y[k];
+      y[k] = vertex;
+    }
+    SbDistanceFind(SB_PAIR_VERTEX_EDGE, y, &d);
+  }
+  return (PetscBool)(d.d < m->rim);
+}
+
 /* Whether an edge intersects a triangle. */
 static PetscBool goes_through(SbContactSurface m, const PetscReal x[], PetscInt edge, PetscInt t)
 {
@@ -100,7 +143,9 @@ static PetscBool goes_through(SbContactSurface m, const PetscReal x[], PetscInt 
   if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0)
     return PETSC_FALSE;
   around = side_of(a, b, p, q);
-  return (PetscBool)(around && side_of(a, b, q, r) == around && side_of(a, b, r, p) == around);
+  if (!around || side_of(a, b, q, r) != around || side_of(a, b, r, p) != around)
+    return PETSC_FALSE;
+  return (PetscBool)!at_rim(m, x, e, t);
 }
 
 /* Edges that intersect triangles of another body, or of the same one (m->self): hit[n][2], edge and
@@ -1292,6 +1337,16 @@ static PetscErrorCode take_points(SbContactSurface m, SbContactOverlap *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactOverlapCreate(SbContactSurface m, SbContactOverlap *o)
+{
+  PetscFunctionBeginUser;
+  if (o->near)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m->nvertex - m->nbody_vertex + m->Nbody_vertex, &o->near));
+  PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *o)
 {
@@ -1305,10 +1360,7 @@ PetscErrorCode SbContactOverlapFind(SbContactSurface m, const PetscReal x[], Pet
   o->n = o->npoint = o->ncrossing = 0;
   o->deepest = o->farthest = 0.;
   o->touches = PETSC_FALSE;
-  if (!o->near) {
-    PetscCall(PetscMalloc1(N, &o->near));
-    PetscCall(PetscCalloc1(m->space->mesh->nbody + 1, &o->touching));
-  }
+  PetscCall(SbContactOverlapCreate(m, o));
   PetscCall(PetscArrayzero(o->near, N));
   for (PetscInt k = 0; k <= m->space->mesh->nbody; k++)
     o->touching[k] &= ~SB_TOUCH_OVERLAP;

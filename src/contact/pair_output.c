@@ -308,6 +308,14 @@ PetscErrorCode SbContactWarnAtEnd_Surfaces(SbContact contact, SbSpace s)
   const SbEffect e = contact->effect;
 
   PetscFunctionBeginUser;
+  PetscCheck(e->dynamic || !b->separation.overlapping, s->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s: surfaces that were in each other when the run began still are, at "
+             "(%g, %g, %g) m and elsewhere, by %" PetscInt_FMT
+             " intersections: what pushes them there are springs, not contact. Move the bodies "
+             "apart in the meshes, or by -body_NAME_translate, or give more -static_steps",
+             e->name, (double)b->separation.overlap.place[0],
+             (double)b->separation.overlap.place[1], (double)b->separation.overlap.place[2],
+             b->separation.overlap.ncrossing);
   if (b->separation.overlapping)
     PetscCall(SbWarning(
       s->comm,

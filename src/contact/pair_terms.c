@@ -47,7 +47,8 @@ PetscErrorCode SbSurfacesUpdate(Surfaces *b, const PetscReal u[])
         SbContactPairSweptApart(b->surface, pair, b->motion.x, b->motion.x, b->widths.w[0]))
       continue;
     a.gap = SbContactPairGap(b->surface, pair, b->motion.x, &a.at);
-    if (!known && a.gap >= of_pair(b, b->widths.w, pair))
+    a.width = width_of(b, pair);
+    if (!known && a.gap >= a.width)
       continue;
     PetscCall(
       SbReserve(b->active.n + 1, sizeof(*b->active.pair), &b->active.size, &b->active.pair));

@@ -52,7 +52,37 @@ PetscReal SbContactPairGap(SbContactSurface m, const SbContactPair *pair, const 
   return g->d;
 }
 
-#define MARGIN 0.1 /* of the mean edge: least growth of the boxes */
+/* Distance of the prescribed vertices of both sides of a pair at at[4][3], m. */
+static PetscReal rim_gap(SbContactSurface m, const SbContactPair *pair, const PetscReal at[12])
+{
+  const int split = SbContactPairSplit(pair);
+  const PetscBool turned =
+    (PetscBool)(m->driven[pair->v[0]] + (split > 1 && m->driven[pair->v[1]]) > 1);
+  PetscReal x[12];
+  int n = 0;
+  SbDistance g;
+
+  /* a vertex, then a vertex or an edge */
+  for (int k = 0; k < 4; k++) {
+    const int i = turned ? (k + split) % 4 : k;
+
+    for (int c = 0; c < 3 && m->driven[pair->v[i]]; c++)
+      x[n++] = at[3 * i + c];
+  }
+  SbDistanceFind(n == 6 ? SB_PAIR_VERTEX_VERTEX : SB_PAIR_VERTEX_EDGE, x, &g);
+  return g.d;
+}
+
+PetscReal SbContactPairRimGap(SbContactSurface m, const SbContactPair *pair, const PetscReal x[])
+{
+  PetscReal at[12];
+
+  places(pair, x, at);
+  return rim_gap(m, pair, at);
+}
+
+#define JOINED 1e-9 /* of the bodies' size: prescribed parts that are nearer are at one place */
+#define MARGIN 0.1  /* of the mean edge: least growth of the boxes */
 #define CROWD \
   200 /* a motion with more pairs than CROWD (number of vertices + CROWD_LEAST) is halved */
 #define CROWD_LEAST 1000
@@ -121,6 +151,20 @@ static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
                                 : PetscMax(near[0], near[1]) >= SB_OVERLAP_INTERSECTED);
 }
 
+/* Whether the prescribed parts of a pair are at one place: they keep the others of one side from
+   passing through those of the other, as a common vertex would. */
+static PetscBool joined(SbContactPairs p, const SbContactPair *pair)
+{
+  PetscReal at[12];
+
+  for (int k = 0; k < 12; k++) {
+    const PetscReal *box = p->box + 6 * pair->v[k / 3] + k % 3;
+
+    at[k] = 0.5 * (box[0] + box[3]);
+  }
+  return (PetscBool)(rim_gap(p->mesh, pair, at) < JOINED * p->mesh->size);
+}
+
 /* Adds the pair of a vertex i and a triangle j, or of two edges, if they may come into contact. */
 static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i, PetscInt j)
 {
@@ -137,7 +181,8 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   const PetscInt one = m->part[a[0]];
   const PetscInt two = m->part[b[0]];
   const PetscInt obstacle = m->space->mesh->nbody;
-  PetscBool driven = PETSC_TRUE;
+  int driven[2] = {0, 0};
+  const int split = SbContactPairSplit(&pair);
 
   PetscFunctionBeginUser;
 
@@ -147,20 +192,21 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
                  : !m->self || one == obstacle)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 4; k++) {
-    driven = (PetscBool)(driven && m->driven[pair.v[k]]);
-    for (int l = SbContactPairSplit(&pair); k < SbContactPairSplit(&pair) && l < 4; l++)
+    driven[k >= split] += m->driven[pair.v[k]];
+    for (int l = split; k < split && l < 4; l++)
       if (pair.v[k] == pair.v[l])
         PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (driven)
+  if (driven[0] + driven[1] == 4)
     PetscFunctionReturn(PETSC_SUCCESS);
+  pair.rims = (PetscBool)(driven[0] && driven[1] && two != obstacle && one != obstacle);
   if (edges)
     pair.area =
       b[0] >= m->nbody_vertex ? m->edge_area[low] : 0.5 * (m->edge_area[low] + m->edge_area[high]);
   else
     pair.area =
       i < m->nbody_vertex ? m->area[i] : (m->area[b[0]] + m->area[b[1]] + m->area[b[2]]) / 3.;
-  if (overlaps(p, &pair) || stays_apart(p, &pair))
+  if (overlaps(p, &pair) || stays_apart(p, &pair) || (pair.rims && joined(p, &pair)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));
   p->pair[p->n++] = pair;

@@ -16,6 +16,9 @@ typedef struct _p_SbContactSurface *SbContactSurface;
 struct _p_SbContactSurface {
   SbSpace space;  /* borrowed */
   PetscBool self; /* self-contact, too; set by the caller, false at first */
+  PetscReal
+    rim; /* prescribed vertices less deep in another body than this stand there like the rims
+                     of two blocks on one clamped base, m; set by the caller, 0 at first */
   /* what this rank holds. Kept features come first, in the order of their numbers, then those of
      other ranks, last the obstacle's; of vertices: a number stays the same within a step */
   PetscInt nvertex, nbody_vertex;
@@ -136,6 +139,7 @@ typedef struct {
     kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE; with a side SB_PAIR_VERTEX_VERTEX */
   PetscInt v[4];  /* vertices of the mesh */
   PetscReal area; /* m^2 */
+  PetscBool rims; /* both sides have prescribed vertices, and one has others */
 } SbContactPair;
 
 /* Number of vertices on the first side. */
@@ -196,6 +200,9 @@ PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], co
    collective. */
 PetscReal SbContactPairGap(SbContactSurface mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
+/* Distance of the prescribed parts of a pair with rims, m: nothing else changes it. */
+PetscReal SbContactPairRimGap(SbContactSurface mesh, const SbContactPair *pair,
+                              const PetscReal x[]);
 /* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m. */
 static inline PetscBool SbContactPairSweptApart(SbContactSurface mesh, const SbContactPair *pair,
                                                 const PetscReal x0[], const PetscReal x1[],
@@ -282,6 +289,7 @@ typedef struct {
    edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactSurface mesh, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
+PetscErrorCode SbContactOverlapCreate(SbContactSurface mesh, SbContactOverlap *o);
 PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of
    a tet of body[0] is within the surface of body[1] at x. Slow: for the start of a run.

@@ -67,36 +67,65 @@ static PetscErrorCode find_shared(const Pair *pair)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an option of both effects has the same text. */
-static PetscErrorCode same_text(const Pair *pair, const char *key, PetscBool *same)
-{
-  char name[3 * SB_NAME_MAX];
-  char text[2][PETSC_MAX_PATH_LEN] = {"", ""};
+#define SAMPLES 64 /* times at which paths are compared, evenly over the run */
+#define EQUAL 1e-9 /* difference of places that are the same, over their size */
 
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 2; k++) {
-    SbFormat(sizeof(name), name, "-effect_%s_%s", pair->effect[k]->name, key);
-    PetscCall(PetscOptionsGetString(NULL, NULL, name, text[k], sizeof(text[k]), NULL));
+/* Whether numbers are the same but for rounding. */
+static PetscBool alike(PetscInt n, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal size = 0.;
+  PetscReal far = 0.;
+
+  for (PetscInt k = 0; k < n; k++) {
+    size = PetscMax(size, PetscMax(PetscAbsReal(a[k]), PetscAbsReal(b[k])));
+    far = PetscMax(far, PetscAbsReal(a[k] - b[k]));
   }
-  *same = (PetscBool)!strcmp(text[0], text[1]);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (PetscBool)(far <= EQUAL * size);
 }
 
-/* Whether the obstacles of two effects are the same shape on the same path. */
-static PetscErrorCode same_obstacle(const Pair *pair, PetscBool *same)
+/* Whether both obstacles are the same at rest: by their numbers, of capsules and cylinders with
+   either end first, and by the file of a mesh. */
+static PetscBool same_shape(const SbPartner *one, const SbPartner *two)
 {
-  static const char *const path[] = {"displacement", "angle",       "axis",
-                                     "axis_point",   "obstacle_at", "obstacle_scale"};
-  const SbObstacle a = ((const Contact *)pair->effect[0]->data)->partner.obstacle;
-  const SbObstacle b = ((const Contact *)pair->effect[1]->data)->partner.obstacle;
+  const SbObstacle a = one->obstacle;
+  const SbObstacle b = two->obstacle;
+  const PetscReal turned[7] = {b->p[3], b->p[4], b->p[5], b->p[0], b->p[1], b->p[2], b->p[6]};
+
+  if (a->shape != b->shape)
+    return PETSC_FALSE;
+  if (a->shape == MESH)
+    return (PetscBool)(!strcmp(a->file, b->file) && alike(1, &one->scale, &two->scale) &&
+                       alike(3, one->at, two->at));
+  return (PetscBool)(alike(7, a->p, b->p) ||
+                     ((a->shape == CAPSULE || a->shape == CYLINDER) && alike(7, a->p, turned)));
+}
+
+/* Whether the obstacles of two effects are the same shape on the same path: at SAMPLES times of the
+   run four points of one are where those of the other are, however paths are written. */
+static PetscErrorCode same_obstacle(const Pair *pair, PetscReal size, PetscBool *same)
+{
+  const SbPartner *one = &((const Contact *)pair->effect[0]->data)->partner;
+  const SbPartner *two = &((const Contact *)pair->effect[1]->data)->partner;
+  PetscReal end = 1.;
 
   PetscFunctionBeginUser;
-  *same =
-    (PetscBool)(a->shape == b->shape && !strcmp(a->file ? a->file : "", b->file ? b->file : ""));
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(a->p); k++)
-    *same = (PetscBool)(*same && a->p[k] == b->p[k]);
-  for (size_t k = 0; *same && k < PETSC_STATIC_ARRAY_LENGTH(path); k++)
-    PetscCall(same_text(pair, path[k], same));
+  PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_max_time", &end, NULL));
+  *same = same_shape(one, two);
+  for (int k = 0; *same && k <= SAMPLES; k++) {
+    PetscReal x[2][12];
+    SbPose pose[2];
+
+    PetscCall(SbPartnerPose(one, end * k / SAMPLES, &pose[0]));
+    PetscCall(SbPartnerPose(two, end * k / SAMPLES, &pose[1]));
+    for (int i = 0; i < 8; i++) {
+      PetscReal X[3] = {0., 0., 0.};
+
+      if (i % 4)
+        X[i % 4 - 1] = size;
+      SbPoseApply(&pose[i / 4], X, x[i / 4] + 3 * (i % 4));
+    }
+    *same = alike(12, x[0], x[1]);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,7 +218,7 @@ PetscErrorCode SbContactSetCheckRepeated(const SbContactSet *contacts)
       for (PetscInt b = 0; b < nbody; b++)
         both += in[k * nbody + b] && in[l * nbody + b];
       if (same && obstacle)
-        PetscCall(same_obstacle(&pair, &same));
+        PetscCall(same_obstacle(&pair, SbBodySmallest(nbody, contacts->space->mesh->body), &same));
       if (!same || !both)
         continue;
       PetscCall(find_shared(&pair));

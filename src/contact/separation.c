@@ -135,7 +135,7 @@ static PetscErrorCode open_parted(Surfaces *b)
     parted += (o->touching[k] & SB_TOUCH_PARTED) != 0;
   if (!parted)
     PetscFunctionReturn(PETSC_SUCCESS);
-  b->pairs->near = b->separation.held;
+  b->pairs->near = b->separation.rims;
   b->pairs->known = PETSC_FALSE;
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -189,7 +189,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   PetscFunctionBeginUser;
   b->springs.n = 0;
   o->touch = touch && !b->separation.overlapping ? SB_TOUCH * b->contact.base.width : 0.;
-  if (!b->motion.begun && !b->contact.partner.obstacle)
+  if (!b->motion.begun && !b->separation.resumed && !b->contact.partner.obstacle)
     PetscCall(SbContactSurfaceIsInside(m, b->motion.x, body, &inside));
   o->coplanar = PETSC_TRUE;
   for (PetscInt k = 0; k <= s->mesh->nbody && o->touching; k++)
@@ -242,10 +242,10 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   }
   if (b->pairs->near || b->separation.overlapping)
     b->pairs->known = PETSC_FALSE;
-  b->pairs->near = b->separation.overlapping ? o->near : b->separation.held;
+  b->pairs->near = b->separation.overlapping ? o->near : b->separation.rims;
   b->motion.known = PETSC_FALSE;
   if (!b->separation.overlapping) {
-    if (e->dynamic && b->motion.begun)
+    if (e->dynamic && (b->motion.begun || b->separation.resumed))
       PetscCall(open_parted(b));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -280,7 +280,14 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   /* warns once, naming what overlaps */
   if (!b->separation.announced) {
     const char *name[2];
+    char how[3 * SB_NAME_MAX] = "moved apart with their supports, and pushed together from there";
 
+    if (e->dynamic || b->contact.partner.obstacle)
+      SbFormat(
+        sizeof(how), how,
+        "separated gradually (-effect_%s_separation_steps); until then they may pass through "
+        "each other there",
+        e->name);
     for (int k = 0; k < 2; k++)
       name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
     PetscCheck(
@@ -292,11 +299,9 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
     PetscCall(SbWarning(
       s->comm,
       "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
-      " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); "
-      "until then "
-      "they may pass through each other there",
+      " points are up to %g m deep. They are %s",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), e->name));
+      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), how));
   }
   b->separation.announced = PETSC_TRUE;
 

@@ -50,9 +50,10 @@
 #define SOFTEST \
   0.01 /* ... down to this. Arches of 7 and 9 stones of 30 and 10 GPa fail with 1; forces are right
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
-#define SUMS 4     /* in the first record of a checkpoint */
-#define NEARBY 5.  /* search distance over w for gaps that moving apart may close */
-#define PASSES 200 /* sweeps over all pairs for that */
+#define SUMS 6      /* in the first record of a checkpoint */
+#define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
+#define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
+#define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
   1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
@@ -115,6 +116,8 @@ static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
+  b->surface->rim =
+    2. * b->contact.base.width; /* what touches, and what faces turn by as they open */
   PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0],
                                  b->options.search, &b->pairs));
   b->record.least = PETSC_MAX_REAL;
@@ -238,7 +241,7 @@ static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
 
     if (one == two || pair->side || !counts(b, pair) || SbContactPairRadius(m, pair) > 0. ||
         SbContactPairSweptApart(m, pair, b->motion.x, b->motion.x, SB_TOUCH * w) ||
-        SbContactPairGap(m, pair, b->motion.x, &d) >= SB_TOUCH * w ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= PetscMin(SB_TOUCH * w, width_of(b, pair)) ||
         !face_to_face(b, pair, normal, &d, n, &gap) || gap >= (edges ? 0. : NEXT * w))
       continue;
     touching[one] |= SB_TOUCH_ONCE | SB_TOUCH_NOW | (edges ? 0 : SB_TOUCH_VERTICES);
@@ -254,7 +257,9 @@ static PetscErrorCode find_touching(Surfaces *b, const PetscReal normal[])
 /* The gap to which a pair is opened when a run begins, m. */
 static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair)
 {
-  return (b->contact.base.effect->dynamic ? 1. : APART) * of_pair(b, b->widths.w, pair);
+  const PetscReal w = of_pair(b, b->widths.w, pair);
+
+  return PetscMin(b->contact.base.effect->dynamic ? w : APART * w, width_of(b, pair));
 }
 
 static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
@@ -304,6 +309,41 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool *all,
+                                        SbInitialContacts *list)
+{
+  Surfaces *b = (Surfaces *)contact;
+  const SbContactOverlap *o = &b->separation.overlap;
+
+  PetscFunctionBeginUser;
+  if (!b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  *all = (PetscBool)(*all && !b->contact.partner.obstacle && o->nway);
+  for (PetscInt k = 0; k < o->nway; k++) {
+    const PetscInt *part = o->way[k].part;
+    SbInitialContact touch = {.body = {part[0], part[1]},
+                              .to = PetscMin(b->widths.w[part[0]], b->widths.w[part[1]])};
+
+    for (PetscInt i = 0; i < o->n; i++) {
+      const SbPenetration *p = &o->point[i];
+      const PetscInt own = b->surface->part[p->v[0]];
+      const PetscInt other = b->surface->part[p->v[p->n - 1]];
+
+      if (PetscMin(own, other) == part[0] && PetscMax(own, other) == part[1])
+        touch.gap = PetscMin(touch.gap, -p->depth);
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &touch.gap, 1, MPIU_REAL, MPI_MIN, s->comm));
+    if (touch.gap == 0.)
+      continue; /* of an earlier search */
+    *all = (PetscBool)(*all && SbDot3(o->way[k].n, o->way[k].n) > 0.);
+    for (int i = 0; i < 3; i++)
+      touch.n[i] = o->way[k].n[i];
+    PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
+    list->touch[list->n++] = touch;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves touching surfaces apart to their initial gap where bodies could not be: Jacobi iterations
    over all closer pairs. Every rank treats its own pairs; displacements of vertices are summed over
    all. */
@@ -324,7 +364,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
   PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
   PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
-  most = b->contact.base.width + b->separation.sunk;
+  most = FARTHEST * (b->contact.base.width + b->separation.sunk);
   for (int pass = 0; pass < PASSES && far < most; pass++) {
     PetscInt n = 0;
 
@@ -475,6 +515,8 @@ static PetscErrorCode touch_at_width(SbEffect e)
     SbDistance d;
     const PetscReal gap = SbContactPairGap(b->surface, pair, b->motion.x, &d);
 
+    if (pair->rims)
+      continue;
     least = PetscMin(least, gap / of_pair(b, b->widths.w, pair));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, b->surface->space->comm));
@@ -514,42 +556,41 @@ static void stiffen(Surfaces *b, PetscReal dt)
          : 0.);
 }
 
-/* Prescribed vertices of two bodies that lie on each other, as the rims of two blocks side by side
-   on one clamped base, never open: pairs of them are excluded, as those of an overlap are. Free
-   vertices beside them stay guarded. Collective. */
-static PetscErrorCode find_held(Surfaces *b)
+/* Prescribed vertices that stand just inside another body beside prescribed ones of it, as the rims
+   of two blocks that overlap on one clamped base, never part, and their edges go through each other
+   there: pairs of them are excluded. Free vertices beside them stay guarded. Collective. */
+static PetscErrorCode find_sunk_rims(Surfaces *b)
 {
   const SbContactSurface m = b->surface;
   const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
-  uint8_t *held;
+  uint8_t *rims;
   uint8_t any = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(N, &held));
+  PetscCall(PetscCalloc1(N, &rims));
   PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    PetscReal lever = 0.;
+    PetscReal n[3];
     SbDistance d;
 
-    if (pair->side || SbContactPairRadius(m, pair) > 0. ||
-        SbContactPairGap(m, pair, b->motion.x, &d) >= ON * m->size)
+    if (!pair->rims || pair->kind != SB_PAIR_VERTEX_TRIANGLE || !m->driven[pair->v[0]] ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= m->rim)
       continue;
-    for (int k = 0; k < 4; k++)
-      lever += m->driven[pair->v[k]] ? 0. : PetscAbsReal(d.weight[k]);
-    for (int k = 0; k < 4 && lever <= ON; k++)
-      if (d.weight[k] != 0.)
-        any = held[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
+    (void)SbContactTriangleArea(b->motion.x, pair->v + 1, n);
+    for (int k = 0; k < 4 && SbDot3(n, d.n) < 0.; k++)
+      if (m->driven[pair->v[k]])
+        any = rims[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_UINT8_T, MPI_MAX, m->space->comm));
   if (any) {
     PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, held, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
-    b->separation.held = held;
-    b->pairs->near = b->pairs->near ? b->pairs->near : held;
+      MPI_Allreduce(MPI_IN_PLACE, rims, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
+    b->separation.rims = rims;
+    b->pairs->near = b->pairs->near ? b->pairs->near : rims;
     b->pairs->known = b->motion.known = PETSC_FALSE;
   } else
-    PetscCall(PetscFree(held));
+    PetscCall(PetscFree(rims));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -580,7 +621,7 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
       e, s, dt, (PetscBool)(!b->motion.begun && !b->separation.searched && t == 0.), PETSC_FALSE));
   }
   if (!b->motion.begun && !b->separation.overlapping)
-    PetscCall(find_held(b));
+    PetscCall(find_sunk_rims(b));
   if (!b->motion.begun && t == 0. && !e->dynamic) /* not when it goes on from a checkpoint */
     PetscCall(touch_at_width(e));
   b->motion.begun = PETSC_TRUE;
@@ -724,31 +765,64 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces follow from the positions and the multipliers: these are saved, and accumulated sums. The
-   first record of a rank has its sums; with multipliers each further one has one of them. */
+/* What a record of a checkpoint has, at PAIR_KEY; a multiplier has its force there. */
+enum {
+  RECORD_SUMS = -1, /* SUMS numbers: accumulated sums, and factors that go from step to step */
+  RECORD_WAY = -2,  /* parts that overlap, and their direction */
+  RECORD_PART = -3  /* a part, and SB_TOUCH_... of it */
+};
+
+/* Adds a record of n numbers. */
+static void add_record(PetscInt nstate, PetscInt *at, PetscReal records[], int kind, int n,
+                       const PetscReal number[])
+{
+  PetscReal *record = records + nstate * (*at)++;
+
+  for (int i = 0; i < n; i++)
+    record[i] = number[i];
+  record[PAIR_KEY] = kind;
+}
+
+/* Forces follow from the positions and the multipliers: these are saved, accumulated sums, of which
+   each rank has its own, and what the separation of an overlap goes on from. */
 static PetscErrorCode save_surfaces(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Surfaces *b = (const Surfaces *)e->data;
   const PairForces *m = &b->multipliers.kept;
-  const PetscReal sum[SUMS] = {b->sums.work + b->contact.base.given, b->friction.loss,
+  const SbContactOverlap *o = &b->separation.overlap;
+  const PetscInt npart = o->touching ? s->mesh->nbody + 1 : 0;
+  const PetscReal sum[SUMS] = {b->sums.work + b->contact.base.given,
+                               b->friction.loss,
                                s->rank ? 0. : b->separation.stiffer,
-                               s->rank ? 0. : b->widths.scale};
+                               s->rank ? 0. : b->widths.scale,
+                               s->rank ? 0. : (PetscReal)b->separation.opening,
+                               s->rank ? 0. : b->contact.overlap.longest};
+  PetscInt at = 0;
 
   PetscFunctionBeginUser;
-  *n = s->rank ? 1 : 1 + m->n;
-  PetscCall(PetscCalloc1(e->nstate * *n, records));
-  PetscCall(PetscArraycpy(*records, sum, SUMS));
-  if (has_table(b))
-    (*records)[PAIR_KEY] = -1.;
-  for (PetscInt k = 1; k < *n; k++) {
-    PetscReal *record = *records + e->nstate * k;
+  PetscCall(PetscCalloc1(e->nstate * (1 + m->n + o->nway + npart), records));
+  add_record(e->nstate, &at, *records, RECORD_SUMS, SUMS, sum);
+  for (PetscInt k = 0; k < o->nway && !s->rank; k++) {
+    const SbOverlapWay *w = &o->way[k];
+
+    add_record(
+      e->nstate, &at, *records, RECORD_WAY, 5,
+      (const PetscReal[]){(PetscReal)w->part[0], (PetscReal)w->part[1], w->n[0], w->n[1], w->n[2]});
+  }
+  for (PetscInt k = 0; k < npart && !s->rank; k++)
+    if (o->touching[k] & (SB_TOUCH_OVERLAP | SB_TOUCH_PARTED))
+      add_record(e->nstate, &at, *records, RECORD_PART, 2,
+                 (const PetscReal[]){(PetscReal)k, (PetscReal)o->touching[k]});
+  for (PetscInt k = 0; k < m->n && !s->rank; k++) {
+    PetscReal *record = *records + e->nstate * at++;
 
     for (int i = 0; i < PAIR_KEY; i++)
-      record[i] = m->pair[k - 1].key[i];
-    record[PAIR_KEY] = m->pair[k - 1].force;
+      record[i] = m->pair[k].key[i];
+    record[PAIR_KEY] = m->pair[k].force;
     for (int i = 0; i < 3; i++)
-      record[PAIR_KEY + 1 + i] = m->pair[k - 1].tangent[i];
+      record[PAIR_KEY + 1 + i] = m->pair[k].tangent[i];
   }
+  *n = at;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -757,33 +831,44 @@ static PetscErrorCode load_surfaces(SbEffect e, SbSpace s, PetscReal t, const Pe
 {
   Surfaces *b = (Surfaces *)e->data;
   PairForces *m = &b->multipliers.kept;
+  SbContactOverlap *o = &b->separation.overlap;
   PetscReal sum[SUMS] = {0.};
 
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
-  m->n = 0;
+  m->n = o->nway = 0;
   PetscCall(SbReserve(n, sizeof(*m->pair), &m->size, &m->pair));
+  PetscCall(SbContactOverlapCreate(b->surface, o));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *record = records + e->nstate * k;
 
-    if (!has_table(b) || record[PAIR_KEY] < 0.) {
+    if (record[PAIR_KEY] == RECORD_SUMS) {
       for (int i = 0; i < SUMS; i++)
         sum[i] += record[i];
-      continue;
+    } else if (record[PAIR_KEY] == RECORD_WAY) {
+      PetscCall(SbReserve(o->nway + 1, sizeof(*o->way), &o->way_size, &o->way));
+      o->way[o->nway++] = (SbOverlapWay){.part = {(PetscInt)record[0], (PetscInt)record[1]},
+                                         .n = {record[2], record[3], record[4]}};
+    } else if (record[PAIR_KEY] == RECORD_PART) {
+      o->touching[(PetscInt)record[0]] = (uint8_t)record[1];
+      b->separation.resumed = b->separation.announced = PETSC_TRUE;
+    } else {
+      for (int i = 0; i < PAIR_KEY; i++)
+        m->pair[m->n].key[i] = (PetscInt)record[i];
+      m->pair[m->n].force = record[PAIR_KEY];
+      for (int i = 0; i < 3; i++)
+        m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
+      m->n++;
     }
-    for (int i = 0; i < PAIR_KEY; i++)
-      m->pair[m->n].key[i] = (PetscInt)record[i];
-    m->pair[m->n].force = record[PAIR_KEY];
-    for (int i = 0; i < 3; i++)
-      m->pair[m->n].tangent[i] = record[PAIR_KEY + 1 + i];
-    m->n++;
   }
   b->sums.work = s->rank ? 0. : sum[0];
   b->friction.loss = s->rank ? 0. : sum[1];
   b->separation.stiffer = sum[2];
   if (sum[3] > 0. && b->options.width == 0.)
     set_scale(e, sum[3]);
+  b->separation.opening = (PetscInt)sum[4];
+  b->contact.overlap.longest = sum[5];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -829,13 +914,14 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
   PetscCall(PetscFree(b->blocks.slot));
   PetscCall(PetscFree(b->springs.spring));
   PetscCall(SbContactOverlapFree(&b->separation.overlap));
-  PetscCall(PetscFree(b->separation.held));
+  PetscCall(PetscFree(b->separation.rims));
   PetscCall(SbPartnerDestroy(&b->contact.partner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static const SbContactOps surface_ops = {
   .initial_contacts = initial_contacts_surfaces,
+  .overlaps = overlaps_surfaces,
   .part = part_surfaces,
   .begin_step = begin_step_surfaces,
   .find_impacts = SbContactFindImpacts_Surfaces,
@@ -905,7 +991,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
   PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
   b->fall_back.response = b->contact.response;
   b->fall_back.may = (PetscBool)(has_multipliers(b) && (unsettled == 2 || (by_auto && !unsettled)));
-  e->nstate = has_multipliers(b) || b->options.sticks ? PAIR_KEY + 4 : SUMS;
+  e->nstate = PAIR_KEY + 4;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
                                            : PETSC_STATIC_ARRAY_LENGTH(bodies);

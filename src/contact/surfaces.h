@@ -15,6 +15,7 @@
 typedef struct {
   SbContactPair pair;
   PetscReal gap;   /* m */
+  PetscReal width; /* gap from which on it has no force, m */
   PetscReal force; /* its multiplier, N */
   SbDistance at;
 } Active;
@@ -130,9 +131,11 @@ typedef struct {
   PetscBool parted;      /* there was some at the start of this load step */
   PetscBool searched;    /* it was searched for when the run began */
   PetscBool announced;   /* the warning was given */
+  PetscBool resumed;     /* the run goes on in the middle of it */
   PetscInt opening;      /* steps since nothing intersects any more */
-  uint8_t *held;     /* as SbContactOverlap.near: prescribed vertices that lie on each other; NULL:
-                            there are none */
+  uint8_t
+    *rims; /* as SbContactOverlap.near: prescribed vertices inside another body beside prescribed
+                    ones of it; NULL: there are none */
   PetscReal sunk;    /* largest depth of surfaces that only touch, at the start, m */
   PetscReal stiffer; /* factor on the stiffness of springs, by their success in the last steps */
   SbContactOverlap overlap;
@@ -191,6 +194,8 @@ typedef struct {
   PairColumns columns;
 } Surfaces;
 
+#define RIM 1e-6 /* rounding of the distance of prescribed vertices */
+
 /* The value of a pair from those of its sides: width or pressure. */
 static inline PetscReal of_pair(const Surfaces *b, const PetscReal value[],
                                 const SbContactPair *pair)
@@ -198,6 +203,16 @@ static inline PetscReal of_pair(const Surfaces *b, const PetscReal value[],
   const PetscInt *part = b->surface->part;
 
   return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
+}
+
+/* The gap from which on a pair has no force, m: of one with prescribed vertices on both sides at
+   most the distance of these, which nothing can move apart. */
+static inline PetscReal width_of(const Surfaces *b, const SbContactPair *pair)
+{
+  const PetscReal w = of_pair(b, b->widths.w, pair);
+
+  return pair->rims ? PetscMin(w, (1. - RIM) * SbContactPairRimGap(b->surface, pair, b->motion.x))
+                    : w;
 }
 
 static inline PetscBool is_barrier(const Surfaces *b)
@@ -220,7 +235,7 @@ static inline PetscBool has_multipliers(const Surfaces *b)
 /* Whether there is a table of multipliers: of forces, of friction, or of both. */
 static inline PetscBool has_table(const Surfaces *b)
 {
-  return (PetscBool)(b->contact.base.effect->nstate > PAIR_KEY);
+  return (PetscBool)(has_multipliers(b) || b->options.sticks);
 }
 
 /* How a pair resists. */
@@ -228,7 +243,7 @@ static inline PetscBool has_table(const Surfaces *b)
 static inline SbPairLaw SbPairLawOf(const Surfaces *b, const Active *a)
 {
   return (SbPairLaw){.spring = (PetscBool)!is_barrier(b),
-                     .width = of_pair(b, b->widths.w, &a->pair),
+                     .width = a->width,
                      .stiffness = (is_exact(b) ? STIFFER : 1.) * of_pair(b, b->widths.k, &a->pair),
                      .force = a->force,
                      .guard = of_pair(b, b->widths.guard, &a->pair)};

@@ -290,9 +290,15 @@ static PetscErrorCode start_contacts(SbRun run)
 {
   const SbModel m = run->model;
   const PetscReal t = run->clock.t0;
+  PetscInt shifted = -1;
+  Vec shift = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(SbContactSetStart(&m->contacts, t, run->clock.dt, run->state.U));
+  if (!m->dynamic && m->contacts.npotential) {
+    PetscCall(VecDuplicate(run->state.U, &shift));
+    PetscCall(SbContactSetShift(&m->contacts, t, run->clock.dt, run->state.U, shift, &shifted));
+  }
   for (PetscInt k = 0; k < m->contacts.npotential; k++) {
     SbEnergies before = {0};
     SbEnergies after = {0};
@@ -305,10 +311,13 @@ static PetscErrorCode start_contacts(SbRun run)
     if (moved) {
       PetscCall(SbModelEnergies(m, old, run->state.V, &before));
       PetscCall(SbModelEnergies(m, run->state.U, run->state.V, &after));
-      SbContactSetGive(&m->contacts, k, after.strain - before.strain);
+      SbContactSetGive(&m->contacts, k, after.strain - before.strain, 0.);
     }
     PetscCall(VecDestroy(&old));
   }
+  if (shifted >= 0)
+    PetscCall(SbStaticPush(run, shift, shifted));
+  PetscCall(VecDestroy(&shift));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

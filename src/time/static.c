@@ -4,6 +4,9 @@
   is halved and repeated from the last equilibrium; after each successful step the length doubles
   again.
 
+  Bodies that overlap when the run begins are moved apart, rigidly and with their supports, without
+  load; these go back in as many steps, and push the bodies together (SbStaticPush()).
+
   With -static_adapt a step without contact that converges slowly is given up early and halved, at
   most EARLY times in a row: beyond a limit load the energy has to be searched.
 
@@ -26,6 +29,7 @@
   1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
 #define SHARE 0.01 /* of the volume, above which cells that turn far matter */
 #define CUTS 6     /* halvings of a load step for their sake, then it is accepted with a warning */
+#define PUSH_LEAST 1e-3 /* shortest step of pushing together, over a load step */
 #define EXCESS \
   0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
@@ -35,6 +39,8 @@ typedef struct {
   PetscReal factor, length; /* load factor at the end of the step, and its increment */
   Vec X;                    /* displacement at its end, m */
   PetscBool contact;        /* with contact of any response */
+  Vec shift;                /* of bodies by which supports are away, m; NULL: they are not */
+  PetscReal part;           /* this part of it at the end of the step */
 } LoadStep;
 
 static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
@@ -55,6 +61,15 @@ static PetscErrorCode predict(void *ctx)
   l->run->model->load = l->factor;
   PetscCall(VecCopy(l->run->state.U, l->X));
   PetscCall(SbModelPrescribe(l->run->model, l->factor, l->X));
+  if (l->shift) {
+    Vec away;
+
+    PetscCall(VecDuplicate(l->shift, &away));
+    PetscCall(VecCopy(l->shift, away));
+    PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_FALSE, away));
+    PetscCall(VecAXPY(l->X, l->part, away));
+    PetscCall(VecDestroy(&away));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,6 +201,67 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k)
+{
+  const SbModel m = run->model;
+  const PetscReal nominal = 1. / (PetscReal)run->clock.static_steps;
+  const PetscReal least = PUSH_LEAST * nominal;
+  PetscReal part = 1.;
+  PetscReal length = nominal;
+  PetscReal work = 0.;
+  SbEnergies before = {0};
+  SbEnergies after = {0};
+  Vec X;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(run->state.U, &X));
+  m->load = run->clock.t0;
+  PetscCall(SbModelEnergies(m, run->state.U, NULL, &before));
+  while (part > 0.) {
+    const PetscReal next = part - length < 1e-9 ? 0. : part - length;
+    LoadStep load = {.run = run, .X = X, .contact = PETSC_TRUE, .shift = S, .part = next};
+    const SbSolvedStep end = {0., 0., run->state.U, .U = X, .solved = PETSC_TRUE};
+    const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
+    SbStage stage = {.shift_k = 1.};
+    PetscReal sum;
+    PetscBool ok;
+
+    PetscCall(SbRunAttempt(run, &attempt, &ok));
+    if (!ok) {
+      char why[sizeof(run->clock.stop_reason)];
+
+      length *= 0.5;
+      run->solve.tangent_known = PETSC_FALSE;
+      if (run->clock.stopped)
+        break;
+      if (length >= least)
+        continue;
+      PetscCall(PetscStrncpy(why, run->clock.stop_reason, sizeof(why)));
+      SETERRQ(
+        m->comm, PETSC_ERR_USER_INPUT,
+        "The effect %s: bodies that overlap when the run begins were moved apart, and could be "
+        "pushed together by their supports up to %.2g of the way: %s. Move them apart in the "
+        "meshes, or by -body_NAME_translate",
+        m->contacts.potential[k]->effect->name, 1. - (double)part, why);
+    }
+    run->clock.stop_reason[0] = 0;
+    PetscCall(VecCopy(X, run->state.U));
+    PetscCall(SbSpaceGetLocalRead(m->space, run->state.U, &stage.u));
+    for (PetscInt e = 0; e < m->naccept; e++)
+      SbEffectCall(m->accept[e], accept, m->space, &stage);
+    PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
+    sum = m->contacts.potential[k]->work;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, m->comm));
+    work += sum;
+    part = next;
+    length = PetscMin(2. * length, nominal);
+  }
+  PetscCall(SbModelEnergies(m, run->state.U, NULL, &after));
+  SbContactSetGive(&m->contacts, k, after.strain - before.strain, work);
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* No equilibrium was found at the shortest increment `length`: says which load was reached, and the
    likely cause. */
 static PetscErrorCode report_shortest(SbRun run, PetscReal factor, PetscReal length,
@@ -268,7 +344,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscCall(SbRunCutTurn(run, factor, least, &length));
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
-    LoadStep load = {run, next, next - factor, X, contact};
+    LoadStep load = {
+      .run = run, .factor = next, .length = next - factor, .X = X, .contact = contact};
     const SbSolvedStep end = {factor, next - factor, run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE;

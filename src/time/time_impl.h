@@ -124,6 +124,9 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: load steps */
+/* Before them: bodies that overlap were shifted by S; supports bring them back, under contact of
+   the potential k. Collective. */
+PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k);
 /* turn.c. The largest angle, rad, by which moving supports turn a set of nodes from the load factor
    `from` to `to`, and the effect that does. Collective. */
 PetscErrorCode SbRunSupportsTurn(SbRun run, PetscReal from, PetscReal to, PetscReal *angle,

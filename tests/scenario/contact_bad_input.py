@@ -92,6 +92,12 @@ for response in ALL:
     floors = ONE.replace("hold,meet", "hold,meet,again") + again
     code, text, _ = run("floors", floors + floor.format("meet", 1) + floor.format("again", 1), response)
     check(f"floors {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text and "body a" in text, text)
+    paths = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_meet_displacement 0;0;-t -effect_again_displacement 0;0;-1*t"
+    code, text, _ = run("paths", paths, response)
+    check(f"paths {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text, text)
+    ends = "-effect_meet_obstacle capsule:0,0,0.2,0.1,0,0.2,0.01 -effect_again_obstacle capsule:0.1,0,0.2,0,0,0.2,0.01 "
+    code, text, _ = run("ends", floors + ends, response)
+    check(f"ends {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text, text)
     other = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_again_displacement 0;0;-t"
     code, text, _ = run("other", other, response)
     check(f"other {response}", code == 0, text)

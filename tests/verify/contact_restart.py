@@ -2,7 +2,7 @@
 
 An instrument that drags along tissue, and a block that is dragged over another: nodes and pairs that stick, and some that slide, when the
 checkpoint is written. Every row of history.csv is compared, the sums since the start and the account of energies among them. Also: an
-overlap that is being taken back; an impact with nodes at faces; faces of CR that keep their energy while their penalty changes; a checkpoint that has lost what it says.
+overlap that is being taken back; bodies that overlap and are being separated; an impact with nodes at faces; faces of CR that keep their energy while their penalty changes; a checkpoint that has lost what it says.
 """
 import csv
 import shutil
@@ -29,6 +29,10 @@ BLOCKS = ("-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.0
 DEEP = ("-bodies a -body_a_mesh box:0.1,0.1,0.05:2 " + BOX.format("a", "corotated", "1e5") + "-effects gravity,floor "
         "-effect_gravity_vector 1,0,-9 -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0.001 "
         "-effect_floor_friction 0.3 -ts_dt 0.005 -ts_max_time {end} -effect_floor_response ")
+# a tenth of each other when they begin, obliquely; they intersect until 0.31 s
+PARTED = ("-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_rotate 0,0,1,5 -body_b_translate 0.09,0.013,0.007 "
+          + BOX.format("a", "stable_neohookean", "1e6") + BOX.format("b", "stable_neohookean", "1e6")
+          + "-effects meet -effect_meet_type contact -ts_dt 0.01 -ts_max_time {end}")
 # a block on its corner hits a floor at 100 m/s, nodes at faces; half of it is squeezed when the checkpoint is written
 CORNER = ("-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element cr -body_a_rotate 1,-1,0,54.7356 "
           "-body_a_translate 0,0,0 -body_a_velocity 3,0,-100 " + BOX.format("a", "stable_neohookean", "1e9")
@@ -140,6 +144,7 @@ def main():
     check("tool-multiplier", TOOL + "multiplier", 0.4, (1,), 1e-6)
     check("blocks", BLOCKS, 0.2, (1, 3), 1e-6)
     check("deep-projected", DEEP + "projected", 0.1, (2,), 1e-6)
+    check("parted", PARTED, 0.6, (1, 3), 1e-5)
     check("corner-projected", CORNER + "projected", 4e-4, (2, 3), 1e-6)
     check("pressed", PRESSED, 0.32, (1, 2), 1e-6)
     check("swing", SWING, 0.48, (1, 3), 1e-6)
