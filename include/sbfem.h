@@ -113,7 +113,10 @@ struct _p_SbSpace {
   PetscBool consistent_mass; /* -mass consistent */
   PetscBool
     tentative; /* the tangent may be indefinite: a failed solve is repeated with a definite one */
-  uint8_t *fixed;         /* [nnode] bit c set: component c of the node is prescribed */
+  uint8_t *fixed; /* [nnode] bit c set: component c of the node is prescribed */
+  PetscReal
+    *vertex_value;        /* [nvert][3] displacement that supports prescribe at corners of the faces
+                              whose nodes they prescribe, else zero, m; NULL without face nodes */
   PetscInt nfixed;        /* local nodes with any bit */
   PetscInt *fixed_node;   /* [nfixed] ascending */
   PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the last evaluation, m */
@@ -569,6 +572,7 @@ typedef struct _p_SbPlan {
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
   PetscReal *face_term[2]; /* factor of the identity in each block of both parts, N/m; or NULL */
+  PetscReal *edge_term[2]; /* vector v of v x in each block of both parts, [3] N/m; or NULL */
   PetscInt nfix;           /* blocks that a prescribed unknown touches */
   PetscInt *fix_block;     /* [nfix] block index as in offset */
   PetscInt *fix_row;       /* [nfix] local row node */

@@ -31,6 +31,8 @@ typedef struct {
   PetscInt n, nowned; /* nodes with unknowns that it prescribes */
   PetscInt *node;     /* [n] local, ascending, owned ones first */
   uint8_t *bits;      /* [n] bit c: component c is prescribed by this effect */
+  PetscInt ncorner;   /* vertices of faces whose nodes are among them, */
+  PetscInt *corner;   /* [ncorner] in all directions; NULL without face nodes */
 
   /* owned nodes where an earlier effect prescribes what this one would */
   PetscInt nlost;
@@ -94,6 +96,37 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Lists the vertices of faces whose nodes the effect prescribes in all directions. */
+static PetscErrorCode list_corners(Support *d, SbSpace space)
+{
+  const SbMesh mesh = space->mesh;
+  PetscBool *in, *seen;
+
+  PetscFunctionBeginUser;
+  if (!space->vertex_value || d->components != 7)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc2(space->nnode, &in, mesh->nvert, &seen));
+  PetscCall(PetscMalloc1(mesh->nvert, &d->corner));
+  for (PetscInt i = 0; i < d->n; i++)
+    in[d->node[i]] = PETSC_TRUE;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt support = space->dirichlet_node ? space->dirichlet_node[i] : -1;
+
+    if (SbSpaceCellElement(space, i / 4)->nodes_per[0] ||
+        !in[support >= 0 ? support : space->cell_node[i]])
+      continue;
+    for (int k = 0; k < 3; k++) {
+      const PetscInt v = mesh->cell[4 * (i / 4) + SbFaceVertex[i % 4][k]];
+
+      if (!seen[v])
+        d->corner[d->ncorner++] = v;
+      seen[v] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree2(in, seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 {
   Support *d = (Support *)e->data;
@@ -127,6 +160,7 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
     if (node < space->nnode_owned)
       d->nowned = d->n;
   }
+  PetscCall(list_corners(d, space));
   owned[0] = d->nowned;
   owned[1] = d->nlost;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, owned, 2, MPIU_INT, MPI_SUM, space->comm));
@@ -179,6 +213,9 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
       if (d->bits[i] & (1 << c))
         space->fixed_value[3 * row + c] = u[c];
   }
+  for (PetscInt i = 0; i < d->ncorner; i++)
+    PetscCall(displacement_at(d, t, space->mesh->x + 3 * d->corner[i], sine,
+                              space->vertex_value + 3 * d->corner[i]));
 
   // what an earlier effect has there
   for (PetscInt i = 0, row = 0; d->watched && d->conflict < 0 && i < d->nlost; i++) {
@@ -358,6 +395,7 @@ static PetscErrorCode destroy_support(SbEffect e)
   PetscFunctionBeginUser;
   PetscCall(PetscFree(d->node));
   PetscCall(PetscFree(d->bits));
+  PetscCall(PetscFree(d->corner));
   PetscCall(PetscFree2(d->lost, d->lost_bits));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -32,7 +32,49 @@ PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
 /* Sums the current face terms for the matrix, in the plan. */
-void SbJumpSumTerms(SbSpace space);
+PetscErrorCode SbJumpSumTerms(SbSpace space);
+
+/* A face between two local cells; cell[1] = SB_SUPPORT: between a cell and a support node. */
+typedef struct {
+  PetscInt cell[2], face[2];
+} SbFace;
+#define SB_SUPPORT (-1)
+
+/* Factor of the penalty on the negative stiffness that it balances in load steps;
+   docs/reference/theory.md. */
+#define SB_FOLLOW 4.
+
+/* edge_gap.c: the gaps around edges that the volume of CR and DG cells misses. Not collective. */
+typedef struct _p_SbEdgeGaps *SbEdgeGaps;
+/* Faces in batches. Borrowed while gaps exist: node. */
+typedef struct {
+  PetscInt nface, nbatch;
+  const SbFace *face;   /* [nface] in the order of batches and lanes */
+  const PetscInt *n;    /* [nbatch] faces in a batch */
+  const PetscInt *node; /* [nbatch][8][SB_BATCH] as SbJumpCliques() */
+} SbFaceBatches;
+PetscErrorCode SbEdgeGapsCreate(SbSpace space, const SbFaceBatches *faces, SbEdgeGaps *gaps);
+PetscErrorCode SbEdgeGapsDestroy(SbEdgeGaps *gaps);
+/* Whether a cell of this rank at x[nnode][3] has a pressure that the penalty does not bear;
+   even[nbody]: pressures of loads, Pa, or NULL. */
+PetscBool SbEdgeGapsNeeded(SbSpace space, const PetscReal x[], const PetscReal even[]);
+/* Finds tensions and edges at x. change: by how much they change the energy of this rank's gaps, J,
+   edge by edge. differ: some do. */
+PetscErrorCode SbEdgeGapsFollow(SbSpace space, SbEdgeGaps gaps, const PetscReal x[],
+                                const PetscReal even[], PetscReal *change, PetscBool *differ);
+/* Those found last become those of the energy. */
+void SbEdgeGapsRenew(SbEdgeGaps gaps);
+/* Mean of the tensions found last over the edges of an owned cell, 0 at those that are left out,
+   Pa. */
+PetscReal SbEdgeGapsTension(SbEdgeGaps gaps, PetscInt cell);
+/* f[nnode][3] += forces, N; complete on owned nodes. */
+void SbEdgeGapsAdd(SbSpace space, SbEdgeGaps gaps, const PetscReal x[], PetscReal f[]);
+/* Energy of a face, J. */
+PetscReal SbEdgeGapsEnergy(SbSpace space, SbEdgeGaps gaps, const PetscReal x[], PetscInt b,
+                           PetscInt l);
+/* v[i][j]: the block of node i of the first side and node j of the other one is the matrix of v x,
+   N/m; the other blocks follow by symmetry, and those of a side with itself are zero. */
+void SbEdgeGapsMatrix(SbEdgeGaps gaps, PetscInt b, PetscInt l, PetscReal v[4][4][3]);
 
 /* plan.c */
 PetscErrorCode SbPlanDestroy(SbPlan *plan);

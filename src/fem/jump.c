@@ -24,14 +24,16 @@
   Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another
   non-convex function of F, has twist modes with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i
   and s_i principal values of the first Piola stress and of F: under a hydrostatic pressure p it is
-  mu - p. For continuous displacements the sum over the cells vanishes but for the boundary; here
-  the penalty balances it. So
+  mu - p. For continuous displacements the sum over the cells vanishes but for the boundary. In load
+  steps the gaps around edges take the hydrostatic part beyond mu / SB_FOLLOW (edge_gap.c); the
+  penalty balances the rest. So
 
-    kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
+    kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, SB_FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  evaluated at the start of the step, so that the terms are constant within a solve and their energy
-  is quadratic. A dependence on the current state would have to be differentiated: jumps would add a
-  spurious pressure. A load step is solved again, with m of its end, until m has settled.
+  P less the part p cof F that the gaps have, evaluated at the start of the step, so that the terms
+  are constant within a solve and their energy is quadratic. A dependence on the current state would
+  have to be differentiated: jumps would add a spurious pressure. A load step is solved again, with
+  m and the gaps of its end, until they have settled.
 
   A follower pressure on the body (src/effect/pressure.c) works on the volume of its cells with a
   part p of itself, -p dV: that part of the load has the second variation which the stress -p cof F
@@ -52,7 +54,6 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4. /* factor on the negative stiffness in load steps; docs/reference/theory.md */
 #define RATE \
   2. /* further one in time steps: the secant of a growing penalty is about half its tangent */
 #define LEAST \
@@ -64,16 +65,14 @@
 #define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
 #define SAME 1e-12 /* relative change that is rounding */
 
-/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */
-typedef struct {
-  PetscInt cell[2], face[2];
-} Face;
-#define SUPPORT (-1)
-
 struct _p_SbJump {
-  Face *face;         /* those with an owned node, in the order of batches and lanes */
+  SbFace *face;       /* those with an owned node, in the order of batches and lanes */
   PetscReal *V;       /* [ncell] rest volume, m^3 */
   PetscReal *modulus; /* [ncell] modulus m above, Pa */
+  PetscInt nface;
+  SbEdgeGaps gaps;    /* NULL until a load step has a pressure that the penalty does not bear */
+  PetscReal *tension; /* [ncell] mean of the gaps' tension at the cell's edges, Pa; NULL: no gaps on
+                         any rank */
   PetscInt nbatch;
   PetscInt *body;  /* [nbatch] */
   PetscInt *n;     /* [nbatch] number of faces in the batch */
@@ -88,14 +87,14 @@ struct _p_SbJump {
 
 /* Nodes of a face: for each side that on the face, then those opposite its vertices, in the same
    order. */
-static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
+static void face_nodes(SbSpace s, const SbFace *face, PetscInt node[8])
 {
   const PetscInt plus = 4 * face->cell[0];
   const PetscInt minus = 4 * face->cell[1];
 
   for (PetscInt i = 0; i < 4; i++)
     node[i] = s->cell_node[plus + (face->face[0] + i) % 4];
-  if (face->cell[1] == SUPPORT) {
+  if (face->cell[1] == SB_SUPPORT) {
     for (int i = 4; i < 8; i++)
       node[i] = s->dirichlet_node[plus + face->face[0]];
     return;
@@ -117,7 +116,7 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
 }
 
 /* c0 and c1 of a face; `rest`: with m = mu. */
-static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, PetscReal *c0,
+static void face_factors(SbSpace s, SbJump j, const SbFace *face, PetscBool rest, PetscReal *c0,
                          PetscReal *c1)
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
@@ -131,14 +130,14 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
   SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
   SbCross(p, q, n);
   area = 0.5 * PetscSqrtReal(SbDot3(n, n));
-  for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
+  for (int side = 0; side < (face->cell[1] == SB_SUPPORT ? 1 : 2); side++) {
     const PetscInt cell = face->cell[side];
     const SbMaterial law = s->material[s->mesh->cell_material[cell]];
 
     k1[side] = 2. * (rest ? SbMaterialShearModulus(law) : j->modulus[cell]) * area / j->V[cell];
     k0[side] = SbMaterialWaveModulus(law) * area / j->V[cell];
   }
-  if (face->cell[1] == SUPPORT) {
+  if (face->cell[1] == SB_SUPPORT) {
     *c1 = 0.;
     *c0 = e->gamma0 * 2. * k0[0] * area / 9.;
   } else {
@@ -166,7 +165,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   /* list the faces with an owned node, sorted by body */
   for (PetscInt body = 0; body < mesh->nbody; body++) {
     for (PetscInt i = 0; i < 4 * mesh->ncell && !s->element[body]->nodes_per[0]; i++) {
-      Face *face = &j->face[nface];
+      SbFace *face = &j->face[nface];
       const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
       PetscInt node[8];
       PetscInt f = 0;
@@ -176,7 +175,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
         continue;
       while (!supported && f < 3 && mesh->neighbour[4 * mesh->neighbour[i] + f] != i / 4)
         f++;
-      *face = (Face){{i / 4, supported ? SUPPORT : mesh->neighbour[i]}, {i % 4, f}};
+      *face = (SbFace){{i / 4, supported ? SB_SUPPORT : mesh->neighbour[i]}, {i % 4, f}};
       face_nodes(s, face, node);
       for (int k = 0; k < 8; k++)
         owned = (PetscBool)(owned || node[k] < s->nnode_owned);
@@ -190,7 +189,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     PetscMalloc3(j->nbatch, &j->body, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
   for (PetscInt i = 0; i < nface; i++) {
-    const Face *face = &j->face[i];
+    const SbFace *face = &j->face[i];
     const PetscInt body = mesh->cell_body[face->cell[0]];
     PetscInt node[8], l;
 
@@ -206,9 +205,10 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
     for (int side = 0; side < 2; side++)
       j->share[b][l] +=
-        face->cell[face->cell[1] == SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
+        face->cell[face->cell[1] == SB_SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
   }
   j->nbatch = b + 1;
+  j->nface = nface;
   *jump = j;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -220,6 +220,7 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
                               PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
+  const PetscReal *tension = s->jump->tension;
   const PetscReal mu = SbMaterialShearModulus(m);
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b];
@@ -236,13 +237,14 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
-  for (PetscInt l = 0; l < n && even != 0.; l++) {
+  for (PetscInt l = 0; l < n && (even != 0. || tension); l++) {
+    const PetscReal less = tension ? tension[s->batch_cell[b] + l] : 0.;
     PetscReal one[9], cofactor[9];
 
     SbPackGet(9, (const SbPack *)F, (int)l, one);
     SbMatCofactor(one, cofactor);
     for (int k = 0; k < 9; k++)
-      P[k][l] += even * cofactor[k];
+      P[k][l] += (even - less) * cofactor[k];
   }
 
   /* skip most batches: sums of two principal stresses are at most sqrt(2) |P| */
@@ -394,7 +396,7 @@ typedef struct {
   PetscReal flatness[2]; /* the shorter extent of the face over the height of the cell */
 } FaceShape;
 
-static FaceShape face_shape(SbSpace s, SbJump j, const Face *face)
+static FaceShape face_shape(SbSpace s, SbJump j, const SbFace *face)
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
   const PetscInt f = face->face[0];
@@ -413,7 +415,7 @@ static FaceShape face_shape(SbSpace s, SbJump j, const Face *face)
   trace = (SbDot3(p, p) + SbDot3(q, q) + SbDot3(r, r)) / 36.;
   largest =
     trace / 2. + PetscSqrtReal(PetscMax(0., PetscSqr(trace / 2.) - PetscSqr(shape.area) / 108.));
-  for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
+  for (int side = 0; side < (face->cell[1] == SB_SUPPORT ? 1 : 2); side++) {
     const PetscReal h = 3. * j->V[face->cell[side]] / shape.area;
     const PetscReal square = PetscMax(NEEDLE * (trace - largest), PetscSqr(h) / 12.) / largest;
 
@@ -439,7 +441,7 @@ PetscErrorCode SbSpaceWarnShapes(SbSpace s)
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const FaceShape shape = face_shape(s, j, &j->face[i]);
 
-      for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
+      for (int side = 0; side < (j->face[i].cell[1] == SB_SUPPORT ? 1 : 2); side++) {
         PetscReal *most = worst + 2 * j->body[b];
 
         most[0] = PetscMax(most[0], shape.length[side]);
@@ -483,7 +485,7 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
     k[i] = i % 5 == 4 ? j->modulus[i / 5] : 0.;
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
+      for (int side = 0; side < (j->face[i].cell[1] == SB_SUPPORT ? 1 : 2); side++) {
         const PetscInt cell = j->face[i].cell[side];
 
         if (cell < s->mesh->ncell_owned)
@@ -506,10 +508,10 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
   PetscCall(SbForestBroadcast(s->mesh->cell_sf, 5, MPIU_REAL, k, k));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const Face *face = &j->face[i];
+      const SbFace *face = &j->face[i];
       const PetscReal before = j->c1[b][l];
 
-      if (face->cell[1] == SUPPORT)
+      if (face->cell[1] == SB_SUPPORT)
         continue;
 
       /* the owner of a cell may not have each of its faces */
@@ -530,7 +532,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
    r. */
 static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], SbStepsOf steps)
 {
-  const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
+  const PetscReal factor = steps == SB_STEPS_OF_LOAD ? SB_FOLLOW : RATE * SB_FOLLOW;
   PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
 
   s->jump->renew = PETSC_FALSE;
@@ -544,26 +546,35 @@ static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], 
   return any;
 }
 
-void SbJumpSumTerms(SbSpace s)
+PetscErrorCode SbJumpSumTerms(SbSpace s)
 {
   const SbPlan p = s->plan;
+  const SbEdgeGaps gaps = s->jump->gaps;
   const PetscInt *nodes;
   const PetscInt nbatch = SbJumpCliques(s, &nodes);
 
+  PetscFunctionBeginUser;
+  if (gaps && !p->edge_term[0])
+    PetscCall(PetscMalloc2(3 * (size_t)p->di[s->nnode_owned], &p->edge_term[0],
+                           3 * (size_t)p->oi[s->nnode_owned], &p->edge_term[1]));
   for (int q = 0; q < 2; q++) {
     const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
 
-    for (PetscInt k = 0; k < n; k++)
-      p->face_term[q][k] = 0.;
+    PetscCall(PetscArrayzero(p->face_term[q], n));
+    if (gaps)
+      PetscCall(PetscArrayzero(p->edge_term[q], 3 * n));
   }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscInt *node = nodes + (size_t)b * 8 * SB_BATCH + l;
       PetscReal K[8][8];
+      PetscReal v[4][4][3];
 
       SbJumpMatrix(s, b, l, K);
       if (K[0][0] == 0.)
         continue; // padding lanes are zero
+      if (gaps)
+        SbEdgeGapsMatrix(gaps, b, l, v);
       for (int k = 0; k < 64; k++) {
         const PetscInt row = node[k / 8 * SB_BATCH];
         const PetscInt column = node[k % 8 * SB_BATCH];
@@ -577,16 +588,49 @@ void SbJumpSumTerms(SbSpace s)
         while (j[at] != column)
           at++;
         p->face_term[q][at] += K[k / 8][k % 8];
+
+        /* (v x)^T = -v x */
+        for (int c = 0; gaps && k / 32 != k % 8 / 4 && c < 3; c++)
+          p->edge_term[q][3 * at + c] += k / 32 ? -v[k % 8][k / 8 - 4][c] : v[k / 8][k % 8 - 4][c];
       }
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Finds tensions of the gaps around edges from x, where a rank has pressures that the penalty does
+   not bear. The owner of a cell knows all cells around its edges. Collective. */
+static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscReal even[],
+                                  PetscReal *change, PetscBool *differ)
+{
+  const SbJump j = s->jump;
+  const SbFaceBatches faces = {j->nface, j->nbatch, j->face, j->n, j->node};
+  PetscBool needed = (PetscBool)(j->gaps || SbEdgeGapsNeeded(s, x, even));
+
+  PetscFunctionBeginUser;
+  if (needed && !j->gaps)
+    PetscCall(SbEdgeGapsCreate(s, &faces, &j->gaps));
+  if (j->gaps)
+    PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change, differ));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &needed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (!needed)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (!j->tension)
+    PetscCall(PetscCalloc1(s->mesh->ncell, &j->tension));
+  for (PetscInt c = 0; j->gaps && c < s->mesh->ncell_owned; c++)
+    j->tension[c] = SbEdgeGapsTension(j->gaps, c);
+  PetscCall(SbForestBroadcast(s->mesh->cell_sf, 1, MPIU_REAL, j->tension, j->tension));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbStepsOf steps,
                                   PetscReal enough, PetscBool *changed)
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
+  const SbJump j = s->jump;
   const PetscReal *x;
+  PetscReal change = 0.;
+  PetscBool gaps = PETSC_FALSE;
   PetscBool any, first;
 
   PetscFunctionBeginUser;
@@ -602,15 +646,16 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
     s->jump->began = PETSC_TRUE;
   if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
     PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE));
-  any = follow(s, x, even, steps);
+  if (!in_time)
+    PetscCall(follow_gaps(s, x, even, &change, &gaps));
+  any = (PetscBool)(follow(s, x, even, steps) || gaps);
   if (changed && in_time)
     PetscCallMPI(MPI_Allreduce(&any, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
 
   /* the equilibrium at the end of a load step keeps its penalties if new ones would change
      little */
   if (changed && !in_time) {
-    PetscReal change = any ? change_of_energy(s, x) : 0.;
-
+    change += any ? change_of_energy(s, x) : 0.;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change, 1, MPIU_REAL, MPI_SUM, s->comm));
     *changed = (PetscBool)(change > enough);
     s->jump->renew = (PetscBool)(any && !*changed);
@@ -618,9 +663,11 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   }
   if (any)
     PetscCall(renew(s, x, in_time, first));
+  if (any && j->gaps)
+    SbEdgeGapsRenew(j->gaps);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (s->plan && any)
-    SbJumpSumTerms(s);
+    PetscCall(SbJumpSumTerms(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -635,6 +682,8 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscCall(PetscFree3(j->body, j->n, j->node));
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
   PetscCall(PetscFree(j->r));
+  PetscCall(PetscFree(j->tension));
+  PetscCall(SbEdgeGapsDestroy(&j->gaps));
   PetscCall(PetscFree(*jump));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -688,6 +737,8 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
       }
     }
   }
+  if (j->gaps && factor == SB_JUMP_STIFFNESS)
+    SbEdgeGapsAdd(s, j->gaps, x, f);
 }
 
 PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal body[])
@@ -706,6 +757,8 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
       gather_jumps(j->node + 8 * SB_BATCH * b, x, r, l, J, sum);
       energy += 0.5 * scale * j->share[b][l] *
                 (j->c1[b][l] * squares_of(J) + j->c0[b][l] * SbDot3(sum, sum));
+      if (j->gaps && factor == SB_JUMP_STIFFNESS)
+        energy += j->share[b][l] * SbEdgeGapsEnergy(s, j->gaps, x, b, l);
     }
     if (body)
       body[j->body[b]] += energy - before;

@@ -202,7 +202,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   }
   if (s->jump) {
     PetscCall(PetscMalloc2(p->di[nrow], &p->face_term[0], p->oi[nrow], &p->face_term[1]));
-    SbJumpSumTerms(s);
+    PetscCall(SbJumpSumTerms(s));
   }
 
   // the rows in the order in which the batches add to them first: the first batch clears a row in
@@ -243,6 +243,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscCall(PetscFree2(p->coupling_start, p->coupling));
   PetscCall(PetscFree2(p->ui, p->upper));
   PetscCall(PetscFree2(p->face_term[0], p->face_term[1]));
+  PetscCall(PetscFree2(p->edge_term[0], p->edge_term[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   PetscCall(PetscFree(*plan));

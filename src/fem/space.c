@@ -201,6 +201,8 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
     PetscCall(SbJumpCreate(s, &s->jump));
+  if (s->faces)
+    PetscCall(PetscCalloc1(3 * mesh->nvert, &s->vertex_value));
   PetscCall(PetscCalloc3(s->nnode, &s->node_mass, mesh->nbody, &s->alpha, mesh->nbody, &s->beta));
   s->node_share = s->node_mass;
   if (s->edge_node)
@@ -260,6 +262,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(VecDestroy(&s->template_vec));
   PetscCall(SbConstraintsDestroy(&s->constraints));
   PetscCall(SbJumpDestroy(&s->jump));
+  PetscCall(PetscFree(s->vertex_value));
   PetscCall(SbLayoutDestroy(s));
   PetscCall(PetscFree(s->batch_clique));
   PetscCall(PetscFree(s->batch_weight));

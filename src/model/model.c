@@ -413,6 +413,8 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
       SbEffectCall(m->prescribe[e], prescribe, s, t);
   for (PetscInt k = 0; k < 3 * s->nfixed; k++)
     s->fixed_value[k] *= m->load;
+  for (PetscInt k = 0; s->vertex_value && k < 3 * s->mesh->nvert; k++)
+    s->vertex_value[k] *= s->vertex_value[k] != 0. ? m->load : 1.; /* 0 of no support, load inf */
   for (PetscInt e = 0; e < m->nprescribe; e++)
     if (!m->prescribe[e]->steady)
       SbEffectCall(m->prescribe[e], prescribe, s, t);
