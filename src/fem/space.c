@@ -12,6 +12,8 @@
   terms of CR and DG.
 */
 #include "fem_impl.h"
+#include <errno.h>
+#include <unistd.h>
 
 const SbOption SbSpaceRows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",
@@ -160,6 +162,46 @@ static PetscErrorCode tabulate_batches(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The viewer TYPE:FILE:FORMAT:MODE exists, and its file can be written. */
+static PetscErrorCode check_view(MPI_Comm comm, const char *viewer)
+{
+  PetscErrorCode (*create)(PetscViewer);
+  PetscMPIInt rank;
+  int failed = 0;
+  char type[PETSC_MAX_PATH_LEN], *file, *end;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(type, viewer, sizeof(type)));
+  file = strchr(type, ':');
+  if (file)
+    *file++ = 0;
+  PetscCall(PetscViewerInitializePackage());
+  PetscCall(PetscFunctionListFind(PetscViewerList, type, &create));
+  PetscCheck(create || !type[0], comm, PETSC_ERR_USER_INPUT,
+             "PETSc has no viewer %s; take hdf5:FILE or vtk:FILE", type);
+  if (file && (end = strchr(file, ':')))
+    *end = 0;
+  if (!file || !file[0])
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* appending leaves a file of an earlier run as it is */
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank) {
+    const PetscBool there = (PetscBool)!access(file, F_OK);
+    FILE *f = fopen(file, "ab");
+
+    failed = f ? 0 : errno;
+    if (f)
+      (void)fclose(f);
+    if (f && !there)
+      (void)remove(file);
+  }
+  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, comm));
+  PetscCheck(!failed, comm, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s; give another path",
+             file, strerror(failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* -displacement_view, before anything is computed. */
 static PetscErrorCode read_view(SbSpace s)
 {
@@ -168,6 +210,8 @@ static PetscErrorCode read_view(SbSpace s)
   PetscFunctionBeginUser;
   PetscCall(SbOptionString(&SbRunScope, "displacement_view", sizeof(viewer), viewer));
   s->view_displacement = (PetscBool)(viewer[0] != 0);
+  if (s->view_displacement)
+    PetscCall(check_view(s->comm, viewer));
   for (PetscInt b = 0; b < s->mesh->nbody; b++)
     PetscCheck(
       strncmp(viewer, "vtk", 3) || !s->element[b]->nodes_per[2], s->comm, PETSC_ERR_USER_INPUT,

@@ -106,5 +106,13 @@ for option, value in (
     lines = [line for line in text.splitlines() if "supple: error" in line or "PETSC ERROR" in line]
     check(len(lines) == 1 and f"{option} {value}" in lines[0], f"{option} {value}: {lines[:4]}")
 
+# The file of -displacement_view is tried before anything is computed, and one that is there is left as it is.
+kept = OUT / "kept"
+kept.mkdir(exist_ok=True)
+for value, reason in ((f"hdf5:{OUT}/none/a.h5", "cannot be written: No such file"), (f"hdf5:{kept}", "cannot be written: Is a directory"),
+                      ("nonsense:a", "no viewer nonsense")):
+    text, _ = run("view_early", 2, *mesh, "-displacement_view", value)
+    check(reason in text and "steps " not in text, f"-displacement_view {value}: {text[-300:]}")
+
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)
