@@ -89,9 +89,8 @@ static const char *const pressed[] = {
   BOTH("multiplier") "-saddle_solver iterative -solver cg_icc",
   "-effect_floor_response multiplier -effect_roof_response projected"};
 
-/* A wedge of two planes at a small angle under the same nodes, the same plane twice but for
-   rounding, and a wall at
-   supported nodes. */
+/* A wedge of two planes at a small angle under the same nodes, nearly the same plane twice, and a
+   wall at supported nodes. */
 #define CORNER                                                                                \
   "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                           \
     "a") "-time static -effects x,gravity,top,floor,tilted,again,wall -effect_x_type fixed "  \
@@ -102,7 +101,7 @@ static const char *const pressed[] = {
          "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle "     \
          "plane:0,0,1,0 "                                                                     \
          "-effect_again_type contact -effect_again_response projected -effect_again_on zmin " \
-         "-effect_again_obstacle plane:0,0,1,1e-13 -effect_tilted_type contact "              \
+         "-effect_again_obstacle plane:0,0,1,3e-9 -effect_tilted_type contact "              \
          "-effect_tilted_response projected -effect_tilted_on zmin "                          \
          "-effect_tilted_obstacle plane:0,0.05,1,0.003 -effect_wall_type contact "            \
          "-effect_wall_response projected -effect_wall_on xmin -effect_wall_obstacle "        \
