@@ -32,6 +32,7 @@ typedef struct {
   PetscInt body[2];  /* nbody: an obstacle */
   PetscReal n[3];    /* unit, from the second to the first */
   PetscReal gap, to; /* the distance along n, and its target, m */
+  PetscReal width;   /* distance from which on there is no force, m; 0: unknown */
 } SbInitialContact;
 /* Start with {0}; release with PetscFree(list->touch). */
 typedef struct {

@@ -290,9 +290,6 @@ void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], Pet
    cell the linear function nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
                       PetscReal psi[], PetscReal point[]);
-/* Per owned cell: Cauchy stress, symmetric, T[9] (Pa), and of P2 as in SbSpaceCellPiola() at its
-   points, point[ncell] (may be NULL). Not collective. */
-void SbSpaceCellCauchy(SbSpace space, const PetscReal u[], PetscReal T[], SbPointStress point[]);
 /* Adds rest volumes of owned cells of the law `linear`, m^3: of all of them, and of those that are
    turned by more than `angle`, rad. Local: reduce them. */
 void SbSpaceTurned(SbSpace space, const PetscReal u[], PetscReal angle, PetscReal volume[2]);

@@ -8,6 +8,7 @@
 #define SWEEPS 1000 /* Gauss-Seidel sweeps over the contacts in each round */
 #define FAR 2.      /* largest displacement of a body per iteration, over the target gap */
 #define CLOSE 0.9   /* gap over the target gap below which there is contact */
+#define FREE 0.99   /* gap over the width of a force above which it does not count */
 #define MISSED 1e-3 /* tolerance of the sweeps over the target gap */
 
 /* Order of initial contacts: bodies, direction, gap, target gap. */
@@ -119,7 +120,8 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
-/* Adds touches of supported bodies at u that are to be opened, where nothing overlaps. */
+/* Adds touches of supported bodies at u that are to be opened until they bear no force, where
+   nothing overlaps. */
 static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInitialContacts *mine,
                                   SbInitialContacts *all)
 {
@@ -137,8 +139,9 @@ static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInit
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt *b = touch[i].body;
 
+    touch[i].to = PetscMax(touch[i].to, touch[i].width);
     closed = (PetscBool)(closed || (b[0] < nbody && b[1] < nbody && fixed[b[0]] && fixed[b[1]] &&
-                                    touch[i].gap < CLOSE * touch[i].to));
+                                    touch[i].gap < FREE * touch[i].to));
   }
   for (PetscInt i = 0; i < n && closed; i++) {
     const PetscInt *b = touch[i].body;

@@ -288,7 +288,8 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]];
     const PetscInt two = m->part[pair->v[SbContactPairSplit(pair)]];
-    SbInitialContact touch = {.body = {one, two}, .to = initial_target(b, pair)};
+    SbInitialContact touch = {
+      .body = {one, two}, .to = initial_target(b, pair), .width = width_of(b, pair)};
     SbDistance d;
 
     if (one == two || !counts(b, pair))
@@ -309,6 +310,59 @@ static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks prescribed vertices that stand just inside another body beside prescribed ones of it, as
+   the rims of two blocks that overlap on one clamped base; rims NULL: whether there are some here,
+   among the pairs of the places. */
+static uint8_t mark_sunk_rims(const Surfaces *b, uint8_t rims[])
+{
+  const SbContactSurface m = b->surface;
+  uint8_t any = 0;
+
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    PetscReal n[3];
+    PetscReal area;
+    SbDistance d;
+
+    if (!pair->rims || pair->kind != SB_PAIR_VERTEX_TRIANGLE || !m->driven[pair->v[0]] ||
+        SbContactPairGap(m, pair, b->motion.x, &d) >= m->rim)
+      continue;
+    area = SbContactTriangleArea(b->motion.x, pair->v + 1, n);
+    if (SbDot3(n, d.n) > -area) /* beside the facet, not behind it: |n| = 2 area */
+      continue;
+    any = SB_OVERLAP_INSIDE;
+    for (int k = 0; k < 4; k++)
+      if (rims && m->driven[pair->v[k]])
+        rims[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
+  }
+  return any;
+}
+
+/* Sunk rims never part, and their edges go through each other there: pairs of them are excluded.
+   Free vertices beside them stay guarded. Collective. */
+static PetscErrorCode find_sunk_rims(Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
+  uint8_t *rims;
+  uint8_t any;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(N, &rims));
+  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
+  any = mark_sunk_rims(b, rims);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_UINT8_T, MPI_MAX, m->space->comm));
+  if (any) {
+    PetscCallMPI(
+      MPI_Allreduce(MPI_IN_PLACE, rims, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
+    b->separation.rims = rims;
+    b->pairs->near = b->pairs->near ? b->pairs->near : rims;
+    b->pairs->known = b->motion.known = PETSC_FALSE;
+  } else
+    PetscCall(PetscFree(rims));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool *all,
                                         SbInitialContacts *list)
 {
@@ -316,8 +370,13 @@ static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool 
   const SbContactOverlap *o = &b->separation.overlap;
 
   PetscFunctionBeginUser;
-  if (!b->separation.overlapping)
+  if (!b->separation.overlapping) { /* supports that part would sink again */
+    uint8_t sunk = mark_sunk_rims(b, NULL);
+
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sunk, 1, MPI_UINT8_T, MPI_MAX, s->comm));
+    *all = (PetscBool)(*all && !sunk);
     PetscFunctionReturn(PETSC_SUCCESS);
+  }
   *all = (PetscBool)(*all && !b->contact.partner.obstacle && o->nway);
   for (PetscInt k = 0; k < o->nway; k++) {
     const PetscInt *part = o->way[k].part;
@@ -554,44 +613,6 @@ static void stiffen(Surfaces *b, PetscReal dt)
       (b->contact.base.effect->dynamic
          ? b->options.stiffness * m->space->material[i]->density * m->mean_edge / PetscSqr(dt)
          : 0.);
-}
-
-/* Prescribed vertices that stand just inside another body beside prescribed ones of it, as the rims
-   of two blocks that overlap on one clamped base, never part, and their edges go through each other
-   there: pairs of them are excluded. Free vertices beside them stay guarded. Collective. */
-static PetscErrorCode find_sunk_rims(Surfaces *b)
-{
-  const SbContactSurface m = b->surface;
-  const PetscInt N = m->nvertex - m->nbody_vertex + m->Nbody_vertex;
-  uint8_t *rims;
-  uint8_t any = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(N, &rims));
-  PetscCall(SbContactPairsFind(b->pairs, b->motion.x, b->motion.x));
-  for (PetscInt i = 0; i < b->pairs->n; i++) {
-    const SbContactPair *pair = &b->pairs->pair[i];
-    PetscReal n[3];
-    SbDistance d;
-
-    if (!pair->rims || pair->kind != SB_PAIR_VERTEX_TRIANGLE || !m->driven[pair->v[0]] ||
-        SbContactPairGap(m, pair, b->motion.x, &d) >= m->rim)
-      continue;
-    (void)SbContactTriangleArea(b->motion.x, pair->v + 1, n);
-    for (int k = 0; k < 4 && SbDot3(n, d.n) < 0.; k++)
-      if (m->driven[pair->v[k]])
-        any = rims[SbContactNumber(m, pair->v[k])] = SB_OVERLAP_INSIDE;
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_UINT8_T, MPI_MAX, m->space->comm));
-  if (any) {
-    PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, rims, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, m->space->comm));
-    b->separation.rims = rims;
-    b->pairs->near = b->pairs->near ? b->pairs->near : rims;
-    b->pairs->known = b->motion.known = PETSC_FALSE;
-  } else
-    PetscCall(PetscFree(rims));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,

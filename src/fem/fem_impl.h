@@ -44,6 +44,11 @@ typedef struct {
    docs/reference/theory.md. */
 #define SB_FOLLOW 4.
 
+/* residual.c */
+/* Per owned cell: Cauchy stress, symmetric, T[9] (Pa), and of P2 as in SbSpaceCellPiola() at its
+   points, point[ncell] (may be NULL). Not collective. */
+void SbSpaceCellCauchy(SbSpace space, const PetscReal u[], PetscReal T[], SbPointStress point[]);
+
 /* edge_gap.c: the gaps around edges that the volume of CR and DG cells misses. Not collective. */
 typedef struct _p_SbEdgeGaps *SbEdgeGaps;
 /* Faces in batches. Borrowed while gaps exist: node. */
@@ -53,19 +58,24 @@ typedef struct {
   const PetscInt *n;    /* [nbatch] faces in a batch */
   const PetscInt *node; /* [nbatch][8][SB_BATCH] as SbJumpCliques() */
 } SbFaceBatches;
-PetscErrorCode SbEdgeGapsCreate(SbSpace space, const SbFaceBatches *faces, SbEdgeGaps *gaps);
+PetscErrorCode SbEdgeGapsCreate(SbSpace space, const SbFaceBatches *faces, const uint8_t slides[],
+                                SbEdgeGaps *gaps);
 PetscErrorCode SbEdgeGapsDestroy(SbEdgeGaps *gaps);
 /* Whether a cell of this rank at x[nnode][3] has a pressure that the penalty does not bear;
    even[nbody]: pressures of loads, Pa, or NULL. */
-PetscBool SbEdgeGapsNeeded(SbSpace space, const PetscReal x[], const PetscReal even[]);
+PetscBool SbEdgeGapsNeeded(SbSpace space, const uint8_t slides[], const PetscReal x[],
+                           const PetscReal even[]);
+/* slides[nbody]: bodies that have no gaps, as one or two components are prescribed at a facet.
+   Collective. */
+PetscErrorCode SbEdgeGapsFindSliding(SbSpace space, uint8_t slides[]);
 /* Finds tensions and edges at x. change: by how much they change the energy of this rank's gaps, J,
    edge by edge. differ: some do. */
 PetscErrorCode SbEdgeGapsFollow(SbSpace space, SbEdgeGaps gaps, const PetscReal x[],
                                 const PetscReal even[], PetscReal *change, PetscBool *differ);
 /* Those found last become those of the energy. */
 void SbEdgeGapsRenew(SbEdgeGaps gaps);
-/* Mean of the tensions found last over the edges of an owned cell, 0 at those that are left out,
-   Pa. */
+/* Mean of the tensions found last over the edges of an owned cell, Pa; 0 where an edge is left
+   out. */
 PetscReal SbEdgeGapsTension(SbEdgeGaps gaps, PetscInt cell);
 /* f[nnode][3] += forces, N; complete on owned nodes. */
 void SbEdgeGapsAdd(SbSpace space, SbEdgeGaps gaps, const PetscReal x[], PetscReal f[]);

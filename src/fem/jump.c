@@ -70,6 +70,7 @@ struct _p_SbJump {
   PetscReal *V;       /* [ncell] rest volume, m^3 */
   PetscReal *modulus; /* [ncell] modulus m above, Pa */
   PetscInt nface;
+  uint8_t *slides;    /* [nbody] those without gaps around edges; NULL until a load step asks */
   SbEdgeGaps gaps;    /* NULL until a load step has a pressure that the penalty does not bear */
   PetscReal *tension; /* [ncell] mean of the gaps' tension at the cell's edges, Pa; NULL: no gaps on
                          any rank */
@@ -605,11 +606,16 @@ static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscRea
 {
   const SbJump j = s->jump;
   const SbFaceBatches faces = {j->nface, j->nbatch, j->face, j->n, j->node};
-  PetscBool needed = (PetscBool)(j->gaps || SbEdgeGapsNeeded(s, x, even));
+  PetscBool needed;
 
   PetscFunctionBeginUser;
+  if (!j->slides) {
+    PetscCall(PetscCalloc1(s->mesh->nbody, &j->slides));
+    PetscCall(SbEdgeGapsFindSliding(s, j->slides));
+  }
+  needed = (PetscBool)(j->gaps || SbEdgeGapsNeeded(s, j->slides, x, even));
   if (needed && !j->gaps)
-    PetscCall(SbEdgeGapsCreate(s, &faces, &j->gaps));
+    PetscCall(SbEdgeGapsCreate(s, &faces, j->slides, &j->gaps));
   if (j->gaps)
     PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change, differ));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &needed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
@@ -683,6 +689,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
   PetscCall(PetscFree(j->r));
   PetscCall(PetscFree(j->tension));
+  PetscCall(PetscFree(j->slides));
   PetscCall(SbEdgeGapsDestroy(&j->gaps));
   PetscCall(PetscFree(*jump));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -101,7 +101,7 @@ static const char *const pressed[] = {
          "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle "     \
          "plane:0,0,1,0 "                                                                     \
          "-effect_again_type contact -effect_again_response projected -effect_again_on zmin " \
-         "-effect_again_obstacle plane:0,0,1,3e-9 -effect_tilted_type contact "              \
+         "-effect_again_obstacle plane:0,0,1,3e-9 -effect_tilted_type contact "               \
          "-effect_tilted_response projected -effect_tilted_on zmin "                          \
          "-effect_tilted_obstacle plane:0,0.05,1,0.003 -effect_wall_type contact "            \
          "-effect_wall_response projected -effect_wall_on xmin -effect_wall_obstacle "        \
