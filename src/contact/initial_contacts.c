@@ -120,6 +120,18 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
+/* Whether supports push both bodies of a contact together along its normal, n: each prescribed
+   component of n counts. */
+static PetscBool is_pushed(const SbInitialContact *t, PetscInt nbody, const uint8_t fixed[])
+{
+  for (int k = 0; k < 2; k++)
+    for (int c = 0; c < 3; c++)
+      if (t->body[k] >= nbody ||
+          (PetscAbsReal(t->n[c]) > MISSED && !(fixed[t->body[k]] & (1 << c))))
+        return PETSC_FALSE;
+  return PETSC_TRUE;
+}
+
 /* Adds touches of supported bodies at u that are to be opened until they bear no force, where
    nothing overlaps. */
 static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInitialContacts *mine,
@@ -137,16 +149,12 @@ static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInit
   if (n)
     qsort(touch, (size_t)n, sizeof(*touch), by_value);
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *b = touch[i].body;
-
     touch[i].to = PetscMax(touch[i].to, touch[i].width);
-    closed = (PetscBool)(closed || (b[0] < nbody && b[1] < nbody && fixed[b[0]] && fixed[b[1]] &&
-                                    touch[i].gap < FREE * touch[i].to));
+    closed = (PetscBool)(closed ||
+                         (is_pushed(&touch[i], nbody, fixed) && touch[i].gap < FREE * touch[i].to));
   }
   for (PetscInt i = 0; i < n && closed; i++) {
-    const PetscInt *b = touch[i].body;
-
-    if (b[0] >= nbody || b[1] >= nbody || !fixed[b[0]] || !fixed[b[1]])
+    if (!is_pushed(&touch[i], nbody, fixed))
       continue;
     PetscCall(SbReserve(all->n + 1, sizeof(*all->touch), &all->size, &all->touch));
     all->touch[all->n++] = touch[i];
@@ -186,7 +194,7 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
   for (PetscInt i = before; i < all->n; i++) {
     SbInitialContact *touch = &all->touch[i];
 
-    directed = (PetscBool)(directed && fixed[touch->body[0]] && fixed[touch->body[1]]);
+    directed = (PetscBool)(directed && is_pushed(touch, nbody, fixed));
     for (int c = 0; c < 3; c++)
       touch->gap -= touch->n[c] * (shift[3 * touch->body[0] + c] - shift[3 * touch->body[1] + c]);
   }

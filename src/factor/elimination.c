@@ -15,6 +15,7 @@
 */
 #include <metis.h>
 #include "elimination.h"
+#include "sbsignal.h"
 
 /* Largest fraction of explicit zeros in a group of columns, by its number of nodes. */
 static const struct {
@@ -29,6 +30,7 @@ static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja
   idx_t options[METIS_NOPTIONS], *xadj, *adj, *perm, *iperm;
   idx_t k = 0;
   int status = METIS_OK;
+  sigset_t before;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc4(n + 1, &xadj, ia[n] + 1, &adj, n, &perm, n, &iperm));
@@ -40,8 +42,10 @@ static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja
   }
   xadj[n] = k;
   METIS_SetDefaultOptions(options);
+  SbSignalsHold(&before);
   if (n > 0)
     status = METIS_NodeND(&nvtxs, xadj, adj, NULL, options, perm, iperm);
+  SbSignalsRelease(&before);
   PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_NodeND failed with %d",
              status);
   for (PetscInt i = 0; i < n; i++)

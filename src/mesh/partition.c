@@ -23,6 +23,7 @@
 #include <petscpartitioner.h>
 #include <petsc/private/partitionerimpl.h> /* a type of one's own has no public interface */
 #include "mesh_impl.h"
+#include "sbsignal.h"
 
 #define METIS_MOST 50000 /* largest mesh for METIS by default, tets: it takes 0.05 s */
 #define SAMPLE 1024   /* sampled tets per part, at least: part sizes are within 3 % of the mean */
@@ -163,6 +164,7 @@ static SB_PARTITION_SIGNATURE(partition_metis)
     idx_t np = (idx_t)nparts;
     idx_t cut, options[METIS_NOPTIONS];
     idx_t *xadj, *adjncy, *result;
+    sigset_t before;
     int status;
 
     // in METIS' integers
@@ -174,8 +176,10 @@ static SB_PARTITION_SIGNATURE(partition_metis)
       adjncy[i] = (idx_t)next[i];
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
+    SbSignalsHold(&before);
     status = METIS_PartGraphKway(&nvertex, &ncon, xadj, adjncy, NULL, NULL, NULL, &np, NULL, NULL,
                                  options, &cut, result);
+    SbSignalsRelease(&before);
     PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB,
                "METIS_PartGraphKway() failed with %d", status);
     for (PetscInt i = 0; i < N; i++)

@@ -28,7 +28,7 @@ def run(name: str, depth: float, move: float, cells: str, ranks: int, extra: str
     return done, [{k: float(v) for k, v in zip(rows[0], row, strict=False)} for row in rows[2:]]
 
 
-CASES = [(depth, "2 1", 1, "") for depth in (0, 0.5 * WIDTH, 0.1 * SIZE, 0.33 * SIZE)]
+CASES = [(depth, "2 1", 1, "") for depth in (-0.9 * WIDTH, -0.6 * WIDTH, 0, 0.5 * WIDTH, 0.1 * SIZE, 0.33 * SIZE)]
 CASES += [(0.1 * SIZE, "3 2", 3, ""), (0.1 * SIZE, "2 1", 1, "-effect_meet_friction 0.3"), (0.1 * SIZE, "2 1", 1, "-effect_meet_response penalty"),
           (0.1 * SIZE, "2 1", 1, "-effect_meet_response projected"), (0.1 * SIZE, "2 1", 1, "-effect_meet_response multiplier")]
 CASES += [(depth, "2 2", 1, f"-body_default_element {element}") for element in ("p2", "cr", "dg") for depth in (0, 0.1 * SIZE)]
@@ -47,6 +47,14 @@ for i, (depth, cells, ranks, extra) in enumerate(CASES):
     passed, failed = passed + (not bad), failed + bool(bad)
     if bad:
         print(f"FAILED: {depth} m deep, cells {cells}, {ranks} ranks {extra}: {'; '.join(bad)}")
+
+# Rims of blocks on one clamped base, in each other by rounding and more, are no overlap.
+for depth in (1e-9, 1e-5):
+    done, rows = run(f"rims{depth}", depth, 0.0, "2 3", 1, "-effect_left_on a.zmin -effect_right_on b.zmin")
+    good = done.returncode == 0 and 0 < rows[-1]["strain"] < 0.1 and not rows[-1]["meet_unguarded"]
+    passed, failed = passed + good, failed + (not good)
+    if not good:
+        print(f"FAILED: rims {depth} m deep: exit code {done.returncode}: {done.stderr[-300:]}")
 
 done, _ = run("base", 0.1 * SIZE, 0.0, "2 1", 1, "-effect_left_on a.zmin -effect_right_on b.zmin")
 good = done.returncode != 0 and "overlap" in done.stderr and "-body_NAME_translate" in done.stderr and "PETSC ERROR" not in done.stderr
