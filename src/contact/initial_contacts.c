@@ -120,8 +120,8 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
-/* Whether supports push both bodies of a contact together along its normal, n: each prescribed
-   component of n counts. */
+/* Whether supports push both bodies of a contact together: each component that its normal has is
+   prescribed somewhere on them. */
 static PetscBool is_pushed(const SbInitialContact *t, PetscInt nbody, const uint8_t fixed[])
 {
   for (int k = 0; k < 2; k++)

@@ -109,7 +109,8 @@ static PetscErrorCode same_obstacle(const Pair *pair, PetscReal size, PetscBool 
   PetscReal end = 1.;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_max_time", &end, NULL));
+  if (pair->effect[0]->dynamic) /* else the load factor goes to 1 */
+    PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_max_time", &end, NULL));
   *same = same_shape(one, two);
   for (int k = 0; *same && k <= SAMPLES; k++) {
     PetscReal x[2][12];

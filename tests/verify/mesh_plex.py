@@ -109,10 +109,9 @@ for option, value in (
 # The file of -displacement_view is tried before anything is computed, and one that is there is left as it is.
 kept = OUT / "kept"
 kept.mkdir(exist_ok=True)
-for value, reason in ((f"hdf5:{OUT}/none/a.h5", "cannot be written: No such file"), (f"hdf5:{kept}", "cannot be written: Is a directory"),
-                      ("nonsense:a", "no viewer nonsense")):
+for value in (f"hdf5:{OUT}/none/a.h5", f"hdf5:{kept}", "nonsense:a"):
     text, _ = run("view_early", 2, *mesh, "-displacement_view", value)
-    check(reason in text and "steps " not in text, f"-displacement_view {value}: {text[-300:]}")
+    check(f"-displacement_view {value}" in text and "kinetic" not in text, f"-displacement_view {value}: {text[-300:]}")
 
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)
