@@ -6,10 +6,10 @@
   nodes (nodes.c).
 
   Response `auto` is the same for all effects of a scene, as Newton's method has one potential and
-  one set of constraints: `barrier` with contact between bodies. `projected` is exact, and safe for
-  half-spaces and bowls, where the surface is outside whenever its vertices are. Other obstacles can
-  penetrate edges and faces, or be passed within a step: there it is `barrier`, unless the scene
-  needs an option that it lacks.
+  one set of constraints: `barrier`, which has no active set that could fail to settle, unless the
+  scene needs what it lacks. Where it is exact, safe and cheaper, it is `projected`: without
+  friction in static runs against half-spaces and bowls, where the surface is outside whenever its
+  vertices are, and where -snes_type ksponly asks for one linear solve a step there.
 */
 #include "surfaces.h"
 #include "nodes.h"
@@ -39,10 +39,10 @@ static const SbOption rows[] = {
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "static coefficient of friction"},
   {"response", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|projected|multiplier|augmented|penalty|barrier",
-   "how contact is enforced. auto: barrier between bodies; with an obstacle projected where it is "
-   "a "
-   "half-space or bowl, or where an option needs it, else barrier. projected: active "
-   "set, constraints eliminated by solving in their null space; multiplier: Lagrange multipliers; "
+   "how contact is enforced. auto: barrier; projected in static runs without friction where all "
+   "obstacles are half-spaces or bowls, there also with -snes_type ksponly, and where -time or an "
+   "option needs it. projected: active set, constraints eliminated by solving in their null space; "
+   "multiplier: Lagrange multipliers; "
    "augmented: "
    "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; "
    "barrier: a "
@@ -138,6 +138,7 @@ typedef struct {
   PetscBool bodies;    /* some is contact between bodies */
   PetscBool facets;    /* some obstacle is neither a half-space nor a bowl */
   PetscBool lacks;     /* some obstacle has an option that `barrier` lacks */
+  PetscBool friction;  /* some has friction */
   SbResponse response; /* the option of the last one that gives it; AUTO: none does */
 } Wishes;
 
@@ -146,6 +147,7 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
 {
   char text[PETSC_MAX_PATH_LEN];
   int response;
+  PetscReal mu;
   SbScope scope;
 
   PetscFunctionBeginUser;
@@ -157,6 +159,8 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
   PetscCall(SbOptionChoice(&scope, "response", &response));
   if (response != AUTO)
     wishes->response = (SbResponse)response;
+  PetscCall(SbOptionReal(&scope, "friction", &mu));
+  wishes->friction = (PetscBool)(wishes->friction || mu > 0);
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
   if (!text[0]) {
     wishes->bodies = PETSC_TRUE;
@@ -179,7 +183,10 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
                              const char **why)
 {
   PetscBool possible = PETSC_TRUE;
+  PetscBool moves = PETSC_TRUE;
+  PetscBool once = PETSC_FALSE;
   Wishes wishes = {0};
+  char snes[SB_NAME_MAX] = "";
 
   PetscFunctionBeginUser;
 
@@ -205,7 +212,10 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
 
     PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
     possible = (PetscBool)(time == 0 || time == 6); /* euler_implicit, static */
+    moves = (PetscBool)(time != 6);
   }
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-snes_type", snes, sizeof(snes), NULL));
+  once = (PetscBool)!strcmp(snes, SNESKSPONLY);
 
   /* the first rule that holds */
   {
@@ -219,8 +229,11 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
       {(PetscBool)(wishes.response != AUTO), PROJECTED, "the same as another effect"},
       {(PetscBool)!possible, PROJECTED, "-time"},
       {wishes.lacks, PROJECTED, "an option that barrier lacks"},
-      {(PetscBool)!wishes.facets, PROJECTED, "half-spaces and bowls only"},
-      {PETSC_TRUE, BARRIER, "edges and corners may touch"},
+      {wishes.facets, BARRIER, "edges and corners may touch"},
+      {once, PROJECTED, "one linear solve a step, half-spaces and bowls only"},
+      {moves, BARRIER, "no active set has to settle in a step"},
+      {wishes.friction, BARRIER, "friction, whose active set may not settle"},
+      {PETSC_TRUE, PROJECTED, "half-spaces and bowls only, without motion and friction"},
     };
     size_t k = 0;
 

@@ -63,6 +63,9 @@ ARC = "-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 
 LIMIT = "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -effects low,press,x,y -effect_low_type fixed " \
     "-effect_low_on zmin -effect_low_components z -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type fixed -effect_y_on ymin " \
     "-effect_y_components y -effect_press_on zmax -time static -static_steps 10 -output_fields none -quiet"
+# A block that falls into the groove between two half-spaces.
+GROOVE = ("cube.opts -body_a_mesh box:0.1,0.1,0.1:2 -body_a_density 1000 -effects gravity,floor,wall -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+          "-effect_wall_type contact -effect_wall_obstacle plane:0.6,0,0.8,0 -time euler_implicit -time_max_halvings 0")
 SNAP = f"{TOP}/scenarios/snap.opts -body_bar_mesh box:0.2,0.004,0.005:40,1,2 -output_fields none -quiet"
 
 CASES = [
@@ -165,6 +168,12 @@ CASES = [
      ["meet", "of a with b", "barrier", "-effect_meet_multiplier_tolerance", "-ts_dt"]),
     ("R15", "warning", "cube.opts -body_a_mesh box:1,0.05,0.04:10,1,1 -body_a_element p2 -body_a_material corotated -body_a_young 1e6 -body_a_poisson 0 -effects hold,push "
      "-effect_hold_type fixed -effect_hold_on xmin -effect_push_type traction -effect_push_on xmax -effect_push_total -0.79,0,0", ["1 negative eigenvalue", "-static_unstable"]),
+    ("R16", "error", f"{GROOVE} -body_a_material linear -body_a_young 1e5 -body_a_velocity -0.75,0.18,-1 -body_a_translate 0.05,0,0.06 -ts_dt 0.01 -ts_max_time 0.2 "
+     "-effect_floor_response augmented -effect_wall_response augmented -effect_floor_friction 0.3 -effect_wall_friction 5 -effect_floor_friction_kinetic 0.3",
+     ["effect floor", "a node of a at (", "-effect_floor_response barrier"]),
+    ("R17", "warning", f"{GROOVE} -body_a_mesh box:0.1,0.1,0.1:3 -body_a_material corotated -body_a_young 1e6 -body_a_rotate 1,1,0,30 -body_a_translate 0.02,0,0.04 "
+     "-body_a_velocity -1,0.5,-1 -ts_dt 0.005 -ts_max_time 0.05 -effect_floor_response projected -effect_wall_response projected -effect_floor_friction 0.5 "
+     "-effect_wall_friction 0.7 -effect_floor_friction_kinetic 0.1 -effect_wall_friction_kinetic 0.1", ["effect wall", "a node of a at (", "0.069", "-effect_wall_response barrier"]),
     ("P1", "error", "bar.opts -pc_type lu -pc_factor_mat_solver_type mkl_pardiso", ["-pc_type lu", "mkl_pardiso", "-solver"]),
 ]
 FAILS_TOO = {"R11"}  # a warning before an error
