@@ -569,10 +569,12 @@ typedef struct _p_SbPlan {
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
   PetscReal *face_term[2]; /* factor of the identity in each block of both parts, N/m; or NULL */
-  PetscReal *edge_term[2]; /* vector v of v x in each block of both parts, [3] N/m; or NULL */
-  PetscInt nfix;           /* blocks that a prescribed unknown touches */
-  PetscInt *fix_block;     /* [nfix] block index as in offset */
-  PetscInt *fix_row;       /* [nfix] local row node */
+  PetscReal *edge_term
+    [2]; /* in each block of both parts, N/m: vector v of v x, and entries (y, z), (z, x), (x, y) of
+                              a symmetric matrix, [6]; or NULL */
+  PetscInt nfix;       /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block; /* [nfix] block index as in offset */
+  PetscInt *fix_row;   /* [nfix] local row node */
   uint8_t
     *fix_mask; /* [nfix] bits 0..2: rows, 3..5: columns of the block to clear; 6: diagonal block */
 } * SbPlan;

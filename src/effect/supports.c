@@ -31,8 +31,8 @@ typedef struct {
   PetscInt n, nowned; /* nodes with unknowns that it prescribes */
   PetscInt *node;     /* [n] local, ascending, owned ones first */
   uint8_t *bits;      /* [n] bit c: component c is prescribed by this effect */
-  PetscInt ncorner;   /* vertices of faces whose nodes are among them, */
-  PetscInt *corner;   /* [ncorner] in all directions; NULL without face nodes */
+  PetscInt ncorner;   /* vertices of faces whose nodes are among them */
+  PetscInt *corner;   /* [ncorner]; NULL without face nodes */
 
   /* owned nodes where an earlier effect prescribes what this one would */
   PetscInt nlost;
@@ -96,14 +96,14 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the vertices of faces whose nodes the effect prescribes in all directions. */
+/* Lists the vertices of faces whose nodes the effect prescribes. */
 static PetscErrorCode list_corners(Support *d, SbSpace space)
 {
   const SbMesh mesh = space->mesh;
   PetscBool *in, *seen;
 
   PetscFunctionBeginUser;
-  if (!space->vertex_value || d->components != 7)
+  if (!space->vertex_value)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc2(space->nnode, &in, mesh->nvert, &seen));
   PetscCall(PetscMalloc1(mesh->nvert, &d->corner));
@@ -213,9 +213,12 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
       if (d->bits[i] & (1 << c))
         space->fixed_value[3 * row + c] = u[c];
   }
-  for (PetscInt i = 0; i < d->ncorner; i++)
-    PetscCall(displacement_at(d, t, space->mesh->x + 3 * d->corner[i], sine,
-                              space->vertex_value + 3 * d->corner[i]));
+  for (PetscInt i = 0; i < d->ncorner; i++) {
+    PetscCall(displacement_at(d, t, space->mesh->x + 3 * d->corner[i], sine, u));
+    for (int c = 0; c < 3; c++)
+      if (d->components & (1 << c))
+        space->vertex_value[3 * d->corner[i] + c] = u[c];
+  }
 
   // what an earlier effect has there
   for (PetscInt i = 0, row = 0; d->watched && d->conflict < 0 && i < d->nlost; i++) {

@@ -23,18 +23,23 @@
 
   An edge whose ring of cells is open at the boundary counts if a support prescribes all of the
   displacement d of a facet at its end: with displacements less d, the ring ends in a rigid body.
-  What the ring does to the support goes to the nodes of these facets. Other edges at the boundary
-  are left out, and the penalty bears all of the pressure in their cells. A body with a facet of
-  which one or two components are prescribed has no gaps at all: there the edges bear the pressure
-  and their rings are open, and the penalty has to bear what it did without gaps (a cube confined by
-  smooth walls, nu 0.45, pressed by 0.3: no equilibrium beyond 0.6 of that with the gaps of the
-  other edges alone).
+  What the ring does to the support goes to the nodes of these facets. At a smooth wall, a facet
+  across an axis whose displacement is prescribed along that axis alone, the ring goes on in the
+  mirror image of the body: half of the pair of the last cell and its image is the body's, x x R x
+  with the reflection R of displacements less d, and t_e lies in the wall. Other edges at the
+  boundary are left out, and the penalty bears all of the pressure in their cells. A body that
+  slides along facets otherwise, as along an oblique wall, has no gaps at all: there the edges bear
+  the pressure and their rings are open, and the penalty has to bear what it did without gaps (a
+  cube confined by smooth walls, nu 0.45, pressed by 0.3: no equilibrium beyond 0.6 of that with the
+  gaps of the other edges alone).
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define LEAST 1e-2 /* det F below which a cell counts as degenerate: no pressure */
+#define LEAST 1e-2  /* det F below which a cell counts as degenerate: no pressure */
+#define SLANT 1e-10 /* square of the sine of the angle of a wall with an axis: rounding */
 #define OPEN (-1)
+#define NONE (-1)
 
 /* Two neighbours around an edge that ends at a support. */
 typedef struct {
@@ -43,6 +48,18 @@ typedef struct {
   PetscInt cell[2][4]; /* nodes of both: those opposite its ends, then the others */
   PetscInt node[2];    /* of the prescribed facets at the edge; the same twice: there is one */
 } End;
+
+/* An edge of a facet on a smooth wall. */
+typedef struct {
+  PetscInt edge;
+  PetscReal sign;   /* of its direction, as for a face from the cell to its image */
+  PetscReal share;  /* 1: its cell is this rank's own */
+  PetscInt axis;    /* normal of the wall, 0 to 2 */
+  PetscInt node[4]; /* of the cell: those opposite the ends of the edge, then the others */
+  PetscInt vertex[2];
+  PetscInt bears; /* node that gets what the ring does to the wall */
+  PetscBool all;  /* all components of that: the edge ends at a support */
+} Mirror;
 
 struct _p_SbEdgeGaps {
   PetscInt nbatch;       /* of faces */
@@ -63,6 +80,9 @@ struct _p_SbEdgeGaps {
   PetscInt *vertex;    /* [nbatch][3][SB_BATCH] corners of the faces */
   PetscInt nend;
   End *end;
+  PetscInt nmirror;
+  Mirror *mirror;
+  uint8_t *walls; /* [nedge] bits of the axes of walls at it */
 };
 
 /* Number of the edge between two vertices of a tet in SbTetEdge. */
@@ -75,6 +95,26 @@ static PetscBool is_held(SbSpace s, PetscInt face, PetscInt *node)
 
   *node = supported ? s->dirichlet_node[face] : s->cell_node[face];
   return (PetscBool)((s->mesh->face_set[face] & SB_ON_BOUNDARY) && s->fixed[*node] == 7);
+}
+
+/* Axis of the smooth wall that a boundary face is on, or NONE; its node. */
+static PetscInt wall_axis(SbSpace s, PetscInt face, PetscInt *node)
+{
+  const PetscInt *v = s->mesh->cell + 4 * (face / 4);
+  const PetscReal *corner = s->mesh->x + 3 * v[SbFaceVertex[face % 4][0]];
+  PetscReal a[3], b[3], n[3];
+  PetscInt axis = 0;
+
+  if (is_held(s, face, node) || !(s->mesh->face_set[face] & SB_ON_BOUNDARY))
+    return NONE;
+  while (axis < 3 && s->fixed[*node] != 1 << axis)
+    axis++;
+  if (axis == 3)
+    return NONE;
+  SbSubtract(s->mesh->x + 3 * v[SbFaceVertex[face % 4][1]], corner, a);
+  SbSubtract(s->mesh->x + 3 * v[SbFaceVertex[face % 4][2]], corner, b);
+  SbCross(a, b, n);
+  return PetscSqr(n[axis]) > (1. - SLANT) * SbDot3(n, n) ? axis : NONE;
 }
 
 /* Numbers the edges of the cells with nodes at faces. */
@@ -122,10 +162,10 @@ static PetscErrorCode number_edges(SbSpace s, SbEdgeGaps g)
 static PetscErrorCode close_rings(SbSpace s, SbEdgeGaps g, PetscInt held[])
 {
   const SbMesh mesh = s->mesh;
-  PetscInt *sides; /* [nedge] boundary faces at the edge */
+  PetscInt *sides; /* [nedge][2] boundary faces at the edge, those of them on walls */
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(g->nedge, &sides));
+  PetscCall(PetscCalloc1(2 * g->nedge, &sides));
   for (PetscInt i = 0; i < 2 * g->nedge; i++)
     held[i] = -1;
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
@@ -135,18 +175,23 @@ static PetscErrorCode close_rings(SbSpace s, SbEdgeGaps g, PetscInt held[])
     g->share[g->cell_edge[i]] += i / 6 < mesh->ncell_owned ? 1. : 0.;
   }
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    PetscInt node;
+    PetscInt node, axis;
 
     if (mesh->neighbour[i] >= 0 || g->cell_edge[6 * (i / 4)] == OPEN)
       continue;
+    axis = wall_axis(s, i, &node);
     for (int k = 0; k < 3; k++) {
       const PetscInt e =
         g->cell_edge[6 * (i / 4) +
                      edge_between[SbFaceVertex[i % 4][k]][SbFaceVertex[i % 4][(k + 1) % 3]]];
 
-      if (is_held(s, i, &node) && sides[e] < 2)
+      if (axis != NONE) {
+        g->walls[e] |= (uint8_t)(1 << axis);
+        sides[2 * e + 1]++;
+      } else if (is_held(s, i, &node) && sides[2 * e] < 2) {
         held[2 * e + (held[2 * e] >= 0)] = node;
-      sides[e]++;
+      }
+      sides[2 * e]++;
     }
   }
   for (PetscInt e = 0; e < g->nedge; e++)
@@ -154,7 +199,8 @@ static PetscErrorCode close_rings(SbSpace s, SbEdgeGaps g, PetscInt held[])
   for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
     const PetscInt e = g->cell_edge[i];
 
-    if (e != OPEN && sides[e] && (sides[e] != 2 || held[2 * e] < 0))
+    if (e != OPEN && sides[2 * e] &&
+        (sides[2 * e] != 2 || (held[2 * e] < 0 && sides[2 * e + 1] != 2)))
       g->cell_edge[i] = OPEN;
   }
   PetscCall(PetscFree(sides));
@@ -200,6 +246,53 @@ static PetscErrorCode list_ends(SbSpace s, SbEdgeGaps g, const PetscInt held[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Lists the edges of facets on smooth walls of cells with a node of this rank. */
+static PetscErrorCode list_mirrors(SbSpace s, SbEdgeGaps g, const PetscInt held[])
+{
+  const SbMesh mesh = s->mesh;
+  PetscInt room = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt cell = i / 4;
+    const PetscInt *v = mesh->cell + 4 * cell;
+    const int f = (int)(i % 4);
+    PetscBool owned = PETSC_FALSE;
+    PetscInt axis, wall;
+
+    if (mesh->neighbour[i] >= 0 || SbSpaceCellElement(s, cell)->nodes_per[0] ||
+        g->slides[mesh->cell_body[cell]])
+      continue;
+    axis = wall_axis(s, i, &wall);
+    owned = (PetscBool)(wall < s->nnode_owned);
+    for (int a = 0; a < 4; a++)
+      owned = (PetscBool)(owned || s->cell_node[4 * cell + a] < s->nnode_owned);
+    for (int k = 0; k < 3 && axis != NONE; k++) {
+      const int from = (f + 1 + k) % 4;
+      const int to = (f + 1 + (k + 1) % 3) % 4;
+      const PetscInt e = g->cell_edge[6 * cell + edge_between[from][to]];
+      Mirror *mirror;
+
+      if (e == OPEN || (!owned && (held[2 * e] < 0 || held[2 * e] >= s->nnode_owned)))
+        continue;
+      PetscCall(SbReserve(g->nmirror + 1, sizeof(Mirror), &room, &g->mirror));
+      mirror = &g->mirror[g->nmirror++];
+      *mirror = (Mirror){.edge = e,
+                         .sign = (v[from] < v[to]) == (f % 2 == 0) ? 1. : -1.,
+                         .share = cell < mesh->ncell_owned ? 1. : 0.,
+                         .axis = axis,
+                         .node = {s->cell_node[4 * cell + from], s->cell_node[4 * cell + to]},
+                         .vertex = {v[from], v[to]},
+                         .bears = held[2 * e] >= 0 ? held[2 * e] : wall,
+                         .all = (PetscBool)(held[2 * e] >= 0)};
+      for (int a = 0, n = 2; a < 4; a++)
+        if (a != from && a != to)
+          mirror->node[n++] = s->cell_node[4 * cell + a];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbEdgeGapsCreate(SbSpace s, const SbFaceBatches *faces, const uint8_t slides[],
                                 SbEdgeGaps *gaps)
 {
@@ -221,6 +314,7 @@ PetscErrorCode SbEdgeGapsCreate(SbSpace s, const SbFaceBatches *faces, const uin
   PetscCall(PetscCalloc5(g->nedge, &g->around, g->nedge, &g->share, g->nedge, &g->tension,
                          3 * g->nedge, &g->q, 3 * g->nedge, &g->next));
   PetscCall(PetscMalloc1(2 * g->nedge, &held));
+  PetscCall(PetscCalloc1(g->nedge, &g->walls));
   PetscCall(close_rings(s, g, held));
 
   /* the edges of the faces */
@@ -254,6 +348,7 @@ PetscErrorCode SbEdgeGapsCreate(SbSpace s, const SbFaceBatches *faces, const uin
     }
   }
   PetscCall(list_ends(s, g, held));
+  PetscCall(list_mirrors(s, g, held));
   PetscCall(PetscFree(held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -270,6 +365,8 @@ PetscErrorCode SbEdgeGapsDestroy(SbEdgeGaps *gaps)
   PetscCall(PetscFree2(g->face_edge, g->vertex));
   PetscCall(PetscFree2(g->sign, g->face_q));
   PetscCall(PetscFree(g->end));
+  PetscCall(PetscFree(g->mirror));
+  PetscCall(PetscFree(g->walls));
   PetscCall(PetscFree(*gaps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -309,7 +406,7 @@ SB_INLINE void gather_corners(SbSpace s, const SbEdgeGaps g, PetscInt b, const P
 }
 
 /* 1/2 int a(s) x b(s) ds over the edge from corner k, of functions linear in s. */
-SB_INLINE void edge_area(const PetscReal a[9], const PetscReal b[9], int k, PetscReal area[3])
+SB_INLINE void edge_area(const PetscReal a[], const PetscReal b[], int k, PetscReal area[3])
 {
   const int i = 3 * k;
   const int j = 3 * ((k + 1) % 3);
@@ -321,6 +418,23 @@ SB_INLINE void edge_area(const PetscReal a[9], const PetscReal b[9], int k, Pets
     area[c] = ((a[i + p] * (2. * b[i + q] + b[j + q]) + a[j + p] * (2. * b[j + q] + b[i + q])) -
                (a[i + q] * (2. * b[i + p] + b[j + p]) + a[j + q] * (2. * b[j + p] + b[i + p]))) /
               12.;
+  }
+}
+
+/* Displacements of the ends of an edge at a wall, less those of the support, and of their image. */
+static void gather_mirror(SbSpace s, const Mirror *m, const PetscReal x[], PetscReal w[6],
+                          PetscReal image[6])
+{
+  for (int c = 0; c < 3; c++) {
+    PetscReal S = 0.;
+
+    for (int a = 0; a < 4; a++)
+      S += x[3 * m->node[a] + c];
+    for (int i = 0; i < 2; i++) {
+      w[3 * i + c] = S - 3. * x[3 * m->node[i] + c] -
+                     (s->vertex_value ? s->vertex_value[3 * m->vertex[i] + c] : 0.);
+      image[3 * i + c] = c == m->axis ? -w[3 * i + c] : w[3 * i + c];
+    }
   }
 }
 
@@ -364,7 +478,7 @@ PetscErrorCode SbEdgeGapsFindSliding(SbSpace s, uint8_t slides[])
 
     if (SbSpaceCellElement(s, i / 4)->nodes_per[0] || !(s->mesh->face_set[i] & SB_ON_BOUNDARY))
       continue;
-    if (!is_held(s, i, &node) && s->fixed[node])
+    if (!is_held(s, i, &node) && s->fixed[node] && wall_axis(s, i, &node) == NONE)
       slides[s->mesh->cell_body[i / 4]] = 1;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, slides, (PetscMPIInt)s->mesh->nbody, MPI_UINT8_T,
@@ -441,6 +555,15 @@ static void sum_areas(SbSpace s, const SbEdgeGaps g, const PetscReal x[], PetscR
       }
     }
   }
+  for (PetscInt i = 0; i < g->nmirror; i++) {
+    const Mirror *m = &g->mirror[i];
+    PetscReal w[6], image[6], one[3];
+
+    gather_mirror(s, m, x, w, image);
+    edge_area(w, image, 0, one);
+    for (int c = 0; c < 3; c++)
+      area[3 * m->edge + c] += 0.5 * m->sign * one[c];
+  }
 }
 
 PetscErrorCode SbEdgeGapsFollow(SbSpace s, SbEdgeGaps g, const PetscReal x[],
@@ -460,7 +583,7 @@ PetscErrorCode SbEdgeGapsFollow(SbSpace s, SbEdgeGaps g, const PetscReal x[],
 
     g->tension[e] = PetscMin(sum[4 * e + 3] / n, 0.);
     for (int c = 0; c < 3; c++) {
-      g->next[3 * e + c] = g->tension[e] * sum[4 * e + c] / n;
+      g->next[3 * e + c] = g->walls[e] & 1 << c ? 0. : g->tension[e] * sum[4 * e + c] / n;
       energy += (g->next[3 * e + c] - g->q[3 * e + c]) * area[3 * e + c];
       *differ = (PetscBool)(*differ || g->next[3 * e + c] != g->q[3 * e + c]);
     }
@@ -486,8 +609,8 @@ void SbEdgeGapsRenew(SbEdgeGaps g)
 
 /* f += sign/2 int w(s) phi_i(s) ds x q at the ends i of the edge from corner k: derivatives of 1/2
    q . int a x b ds by the ends of a with w = b, sign 1, and of b with w = a, sign -1. */
-SB_INLINE void add_edge_force(const PetscReal w[9], const PetscReal q[3], int k, PetscReal sign,
-                              PetscReal f[9])
+SB_INLINE void add_edge_force(const PetscReal w[], const PetscReal q[3], int k, PetscReal sign,
+                              PetscReal f[])
 {
   const int i = 3 * k;
   const int j = 3 * ((k + 1) % 3);
@@ -500,6 +623,32 @@ SB_INLINE void add_edge_force(const PetscReal w[9], const PetscReal q[3], int k,
       sign / 12. * ((2. * w[i + a] + w[j + a]) * q[b] - (2. * w[i + b] + w[j + b]) * q[a]);
     f[j + c] +=
       sign / 12. * ((2. * w[j + a] + w[i + a]) * q[b] - (2. * w[j + b] + w[i + b]) * q[a]);
+  }
+}
+
+/* The forces of edges at walls, and what they do to these: -1/4 (sum of both ends of w + R w) x q
+   across the wall; or all of that of R w to a support at the edge, which gets that of w below. */
+static void add_mirrors(SbSpace s, const SbEdgeGaps g, const PetscReal x[], PetscReal f[])
+{
+  for (PetscInt i = 0; i < g->nmirror; i++) {
+    const Mirror *m = &g->mirror[i];
+    const PetscReal *q = g->q + 3 * m->edge;
+    PetscReal w[6], image[6];
+    PetscReal t[6] = {0.};
+    PetscReal both[3], wall[3];
+
+    gather_mirror(s, m, x, w, image);
+    add_edge_force(image, q, 0, m->sign, t);
+    for (int c = 0; c < 3; c++) {
+      const PetscReal all = t[c] + t[3 + c];
+
+      for (int a = 0; a < 4; a++)
+        f[3 * m->node[a] + c] += all - (a < 2 ? 3. * t[3 * a + c] : 0.);
+      both[c] = image[c] + image[3 + c] + (m->all ? 0. : w[c] + w[3 + c]);
+    }
+    SbCross(both, q, wall);
+    for (int c = 0; c < 3; c++)
+      f[3 * m->bears + c] -= m->all || c == m->axis ? 0.25 * m->sign * wall[c] : 0.;
   }
 }
 
@@ -533,6 +682,8 @@ void SbEdgeGapsAdd(SbSpace s, SbEdgeGaps g, const PetscReal x[], PetscReal f[])
     }
   }
 
+  add_mirrors(s, g, x, f);
+
   /* what the supports get, -1/4 (sum of both ends of w_{k+1} - w_k) x q */
   for (PetscInt i = 0; i < g->nend; i++) {
     const End *end = &g->end[i];
@@ -548,6 +699,52 @@ void SbEdgeGapsAdd(SbSpace s, SbEdgeGaps g, const PetscReal x[], PetscReal f[])
     for (int k = 0; k < 6; k++)
       f[3 * end->node[k / 3] + k % 3] -= 0.125 * end->sign * t[k % 3];
   }
+}
+
+PetscReal SbEdgeGapsMirrorEnergy(SbSpace s, SbEdgeGaps g, const PetscReal x[], PetscReal body[])
+{
+  PetscReal energy = 0.;
+
+  for (PetscInt i = 0; i < g->nmirror; i++) {
+    const Mirror *m = &g->mirror[i];
+    PetscReal w[6], image[6], area[3], one;
+
+    gather_mirror(s, m, x, w, image);
+    edge_area(w, image, 0, area);
+    one = 0.5 * m->share * m->sign * SbDot3(g->q + 3 * m->edge, area);
+    energy += one;
+    if (body)
+      body[s->node_body[m->node[0]]] += one;
+  }
+  return energy;
+}
+
+PetscInt SbEdgeGapsMirrors(SbEdgeGaps g)
+{
+  return g->nmirror;
+}
+
+const PetscInt *SbEdgeGapsMirrorMatrix(SbEdgeGaps g, PetscInt i, PetscReal v[4][4][3])
+{
+  static const PetscReal d[2][4] = {{-2, 1, 1, 1}, {1, -2, 1, 1}};
+  const Mirror *m = &g->mirror[i];
+  const PetscReal *q = g->q + 3 * m->edge;
+  const int j = (int)(m->axis + 1) % 3;
+  const int k = (int)(m->axis + 2) % 3;
+
+  /* W = q/24 . (2 a_1 x R a_1 + 2 a_2 x R a_2 + a_1 x R a_2 + a_2 x R a_1), and q . a x R b = q_k
+     (a_i b_j + a_j b_i) - q_j (a_i b_k + a_k b_i) with the axis i */
+  for (int a = 0; a < 16; a++) {
+    const PetscReal factor = m->sign *
+                             (d[0][a / 4] * (2. * d[0][a % 4] + d[1][a % 4]) +
+                              d[1][a / 4] * (2. * d[1][a % 4] + d[0][a % 4])) /
+                             12.;
+
+    v[a / 4][a % 4][m->axis] = 0.;
+    v[a / 4][a % 4][k] = factor * q[k];
+    v[a / 4][a % 4][j] = -factor * q[j];
+  }
+  return m->node;
 }
 
 PetscReal SbEdgeGapsEnergy(SbSpace s, SbEdgeGaps g, const PetscReal x[], PetscInt b, PetscInt l)

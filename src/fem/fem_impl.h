@@ -65,8 +65,8 @@ PetscErrorCode SbEdgeGapsDestroy(SbEdgeGaps *gaps);
    even[nbody]: pressures of loads, Pa, or NULL. */
 PetscBool SbEdgeGapsNeeded(SbSpace space, const uint8_t slides[], const PetscReal x[],
                            const PetscReal even[]);
-/* slides[nbody]: bodies that have no gaps, as one or two components are prescribed at a facet.
-   Collective. */
+/* slides[nbody]: bodies that have no gaps, as one or two components are prescribed at a facet that
+   is not on a smooth wall across an axis. Collective. */
 PetscErrorCode SbEdgeGapsFindSliding(SbSpace space, uint8_t slides[]);
 /* Finds tensions and edges at x. change: by how much they change the energy of this rank's gaps, J,
    edge by edge. differ: some do. */
@@ -82,6 +82,14 @@ void SbEdgeGapsAdd(SbSpace space, SbEdgeGaps gaps, const PetscReal x[], PetscRea
 /* Energy of a face, J. */
 PetscReal SbEdgeGapsEnergy(SbSpace space, SbEdgeGaps gaps, const PetscReal x[], PetscInt b,
                            PetscInt l);
+/* Energy of this rank's edges at smooth walls, J; body[nbody]: added to those of bodies, or
+   NULL. */
+PetscReal SbEdgeGapsMirrorEnergy(SbSpace space, SbEdgeGaps gaps, const PetscReal x[],
+                                 PetscReal body[]);
+/* Number of edges at walls; the four nodes of one, v[i][j]: the off-diagonal entries (y, z), (z,
+   x), (x, y) of the symmetric block of two of them, N/m. */
+PetscInt SbEdgeGapsMirrors(SbEdgeGaps gaps);
+const PetscInt *SbEdgeGapsMirrorMatrix(SbEdgeGaps gaps, PetscInt i, PetscReal v[4][4][3]);
 /* v[i][j]: the block of node i of the first side and node j of the other one is the matrix of v x,
    N/m; the other blocks follow by symmetry, and those of a side with itself are zero. */
 void SbEdgeGapsMatrix(SbEdgeGaps gaps, PetscInt b, PetscInt l, PetscReal v[4][4][3]);

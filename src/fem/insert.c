@@ -40,13 +40,14 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
         for (size_t c = 0; c < 3; c++)
           v[c * (rs + cs)] = factor * p->face_term[q][k];
 
-        /* those of edges are skew */
+        /* those of edges are skew, those at walls symmetric */
         for (size_t c = 0; p->edge_term[q] && c < 3; c++) {
           const size_t a = (c + 1) % 3;
           const size_t d = (c + 2) % 3;
+          const PetscReal *edges = p->edge_term[q] + 6 * (size_t)k;
 
-          v[d * rs + a * cs] = faces->shift_k * p->edge_term[q][3 * k + (PetscInt)c];
-          v[a * rs + d * cs] = -faces->shift_k * p->edge_term[q][3 * k + (PetscInt)c];
+          v[d * rs + a * cs] = faces->shift_k * (edges[3 + c] + edges[c]);
+          v[a * rs + d * cs] = faces->shift_k * (edges[3 + c] - edges[c]);
         }
       }
     }

@@ -547,6 +547,17 @@ static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], 
   return any;
 }
 
+/* Index of the block of a row and a column in the part q of the plan. */
+static inline PetscInt block_of(SbPlan p, int q, PetscInt row, PetscInt column)
+{
+  const PetscInt *j = q ? p->oj : p->dj;
+  PetscInt at = (q ? p->oi : p->di)[row];
+
+  while (j[at] != column)
+    at++;
+  return at;
+}
+
 PetscErrorCode SbJumpSumTerms(SbSpace s)
 {
   const SbPlan p = s->plan;
@@ -556,14 +567,14 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
 
   PetscFunctionBeginUser;
   if (gaps && !p->edge_term[0])
-    PetscCall(PetscMalloc2(3 * (size_t)p->di[s->nnode_owned], &p->edge_term[0],
-                           3 * (size_t)p->oi[s->nnode_owned], &p->edge_term[1]));
+    PetscCall(PetscMalloc2(6 * (size_t)p->di[s->nnode_owned], &p->edge_term[0],
+                           6 * (size_t)p->oi[s->nnode_owned], &p->edge_term[1]));
   for (int q = 0; q < 2; q++) {
     const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
 
     PetscCall(PetscArrayzero(p->face_term[q], n));
     if (gaps)
-      PetscCall(PetscArrayzero(p->edge_term[q], 3 * n));
+      PetscCall(PetscArrayzero(p->edge_term[q], 6 * n));
   }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
@@ -580,20 +591,32 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
         const PetscInt row = node[k / 8 * SB_BATCH];
         const PetscInt column = node[k % 8 * SB_BATCH];
         const int q = column >= s->nnode_owned;
-        const PetscInt *j = q ? p->oj : p->dj;
         PetscInt at;
 
         if (row >= s->nnode_owned)
           continue;
-        at = (q ? p->oi : p->di)[row];
-        while (j[at] != column)
-          at++;
+        at = block_of(p, q, row, column);
         p->face_term[q][at] += K[k / 8][k % 8];
 
         /* (v x)^T = -v x */
         for (int c = 0; gaps && k / 32 != k % 8 / 4 && c < 3; c++)
-          p->edge_term[q][3 * at + c] += k / 32 ? -v[k % 8][k / 8 - 4][c] : v[k / 8][k % 8 - 4][c];
+          p->edge_term[q][6 * at + c] += k / 32 ? -v[k % 8][k / 8 - 4][c] : v[k / 8][k % 8 - 4][c];
       }
+    }
+  }
+  for (PetscInt i = 0; gaps && i < SbEdgeGapsMirrors(gaps); i++) {
+    PetscReal v[4][4][3];
+    const PetscInt *node = SbEdgeGapsMirrorMatrix(gaps, i, v);
+
+    for (int k = 0; k < 16; k++) {
+      const int q = node[k % 4] >= s->nnode_owned;
+      PetscInt at;
+
+      if (node[k / 4] >= s->nnode_owned)
+        continue;
+      at = block_of(p, q, node[k / 4], node[k % 4]);
+      for (int c = 0; c < 3; c++)
+        p->edge_term[q][6 * at + 3 + c] += v[k / 4][k % 4][c];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -770,6 +793,8 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
     if (body)
       body[j->body[b]] += energy - before;
   }
+  if (j->gaps && factor == SB_JUMP_STIFFNESS)
+    energy += SbEdgeGapsMirrorEnergy(s, j->gaps, x, body);
   return energy;
 }
 

@@ -11,7 +11,8 @@
   The force is that of the solid, although the pressure is several times the shear modulus: the
   penalty alone would make the cube a quarter too stiff at half of its height.
 
-  A cube confined by smooth walls is in a uniform state, with the force of the law.
+  A cube confined by smooth walls is in a uniform state, with the force of the law. Cut at a plane
+  of symmetry, in plane strain, the bonded block has the force of P2, too.
 */
 #include "contact.h"
 
@@ -106,6 +107,43 @@ static PetscErrorCode check_confined(const char *element, PetscReal nu, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Half of a bonded block in plane strain, pressed to eight tenths of its height; N. */
+static PetscErrorCode press_half(const char *element, PetscReal *force)
+{
+  Record r = {0};
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material "
+    "stable_neohookean -body_a_young 5e4 -body_a_poisson 0.4999 -effects low,top,x,y "
+    "-effect_low_type fixed -effect_low_on zmin -effect_x_type fixed -effect_x_on xmin "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on ymin,ymax -effect_y_components y "
+    "-effect_top_type prescribed_displacement -effect_top_on zmax -effect_top_displacement "
+    "0;0;-0.02 -time static",
+    element));
+  PetscCall(record_solve(&t, &r));
+  PetscCall(contact_column(t.run, 1., "top", "reaction_z", force));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1.124 with the penalty alone. */
+static PetscErrorCode check_half(void)
+{
+  PetscReal force[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(press_half("p2", &force[0]));
+  PetscCall(press_half("cr", &force[1]));
+  PetscCall(press_half("dg", &force[2]));
+  verify_case("half of a block between plates, plane strain");
+  VERIFY_NEAR(force[1] / force[0], 1, 0.05, "force with CR, of that of P2");
+  VERIFY_NEAR(force[2] / force[0], 1, 0.05, "force with DG, of that of P2");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -115,5 +153,6 @@ int main(int argc, char **argv)
   PetscCall(check_force("dg"));
   PetscCall(check_confined("cr", 0.45, 0.03, 1132.447387));
   PetscCall(check_confined("dg", 0.49, 0.005, 855.563175));
+  PetscCall(check_half());
   SB_TEST_END();
 }
