@@ -441,7 +441,7 @@ void SbVtkhdfWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
 /* run_json.c: times of the phases, from the log events. */
 typedef struct {
-  PetscReal seconds[SB_PHASE_COUNT]; /* largest of all ranks */
+  PetscReal seconds[SB_PHASE_COUNT]; /* mean of the ranks */
   PetscReal cpu; /* CPU time of the slowest rank, s; less than `total` where others use the cores */
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
   PetscReal total;                  /* s */
