@@ -137,6 +137,7 @@ error 1 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -
 error 2 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -ksp_type fcg -ksp_fcg_mmax 0
 # as does what begins or ends like one of ours
 error 1 "-solver_type|-solver?" bar.opts -solver_type mumps
+error 1 "-solver hypre|did you mean cg_hypre" bar.opts -solver hypre
 error 2 "-history_every|-output_history_every" bar.opts -history_every 2
 
 # options that are right and of no use in this run are warned of by name, and the run goes on
