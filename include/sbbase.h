@@ -173,6 +173,9 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings);
   literal, begins error lines and warnings.
 */
 PetscErrorCode SbErrorHandlerInstall(const char *program);
+/* A crash (SIGSEGV, SIGFPE, ...) is one line with the options of solvers that were given; not with
+   -no_signal_handler. After PetscInitialize(). */
+PetscErrorCode SbErrorCatchCrashes(void);
 void SbErrorSetTrace(PetscBool trace); /* the stack of calls with every error, also of the input */
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);

@@ -103,6 +103,10 @@ typedef struct {
 } SbBody;
 /* Diagonal of the smallest body's box, m. Not collective. */
 PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[]);
+/* A point outside of the box of each body by more than a twentieth of its diagonal; *nearest: least
+   distance to a box, m. Not collective. */
+PetscBool SbBodyFarFrom(PetscInt nbody, const SbBody body[], const PetscReal point[3],
+                        PetscReal *nearest);
 
 /*
   A named set of the scenario: where loads and supports act. From a gmsh physical group of that name

@@ -81,6 +81,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   if (ierr)
     SbErrorFindYamlLine();
   PetscCall(ierr);
+  PetscCall(SbErrorCatchCrashes());
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN); /* a closed terminal must not end a run that writes files */

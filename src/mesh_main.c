@@ -17,6 +17,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   PetscCall(SbErrorHandlerInstall("supple-mesh"));
   PetscCall(SbToolCommandLine(&argc, argv, &line));
   PetscCall(SbOptionsInitialize(&argc, &argv, NULL));
+  PetscCall(SbErrorCatchCrashes());
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN);

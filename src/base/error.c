@@ -10,8 +10,13 @@
   message and aborts the run.
 
   Internal errors are printed with PETSc's trace immediately, and as one line at the end too.
+
+  A crash, as PETSc divides by zero where options of its solvers make no sense, is one line that
+  names these options, and the exit code of PETSc's own handler.
 */
+#include <signal.h>
 #include <stdarg.h>
+#include <strings.h>
 #include <unistd.h>
 #include "option.h"
 
@@ -79,50 +84,58 @@ static PetscBool is_wrong_viewer(const char *function, const char *file, const c
   return (PetscBool)(given[0] != 0);
 }
 
-/* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc
-   failed. */
-static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file,
-                                 size_t size, char given[])
+/* Whether an option is of supple: one of a class, or a program-wide key. */
+static PetscBool is_ours(const char *name)
 {
-  static const char *const rooms[] = {"src/ksp/", "src/snes/", "src/ts/",
-                                      "src/mat/", "src/vec/",  "src/dm/"};
-  static const int codes[] = {PETSC_ERR_SUP,
-                              PETSC_ERR_ARG_WRONG,
-                              PETSC_ERR_ARG_WRONGSTATE,
-                              PETSC_ERR_ARG_OUTOFRANGE,
-                              PETSC_ERR_ARG_INCOMP,
-                              PETSC_ERR_ARG_NULL,
-                              PETSC_ERR_USER,
-                              PETSC_ERR_ARG_UNKNOWN_TYPE,
-                              PETSC_ERR_MISSING_FACTOR};
-  PetscBool petsc = PETSC_FALSE;
-  PetscBool choice = PETSC_FALSE;
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
+    const char *klass = SbTheOptions.row[i].klass;
+    const size_t n = strlen(klass);
 
-  // raised by PETSc's solvers or containers, under a code of a wrong choice
+    if (n ? !strncasecmp(name, klass, n) && name[n] == '_'
+          : !strcasecmp(name, SbTheOptions.row[i].row->key))
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The options for PETSc's solvers, or for what cuts the mesh, that the user gave: "-pc_type mg
+   -pc_mg_levels 3"; "" if there are none. Not those that only show something. */
+static void solver_options(PetscBool cutting, size_t size, char text[])
+{
+  static const char *const words[] = {"ksp_", "pc_", "snes_", "mat_", "vec_", "dm_", "ts_"};
+  static const char *const shows[] = {"_view", "_monitor", "_converged_reason"};
+
+  text[0] = 0;
+  for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
+    const char *name = SbTheOptions.user[i].name;
+    const char *value = SbTheOptions.user[i].value;
+    PetscBool wanted = (PetscBool)(cutting && strstr(name, "petscpartitioner_"));
+
+    for (size_t k = 0; !cutting && k < PETSC_STATIC_ARRAY_LENGTH(words); k++)
+      wanted = (PetscBool)(wanted || strstr(name, words[k]));
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(shows); k++)
+      wanted = (PetscBool)(wanted && !strstr(name, shows[k]));
+    if (wanted && (cutting || !is_ours(name)))
+      SbAppend(size, text, "%s-%s%s%s", text[0] ? " " : "", name, value ? " " : "",
+               value ? value : "");
+  }
+}
+
+/* Whether options of solvers that the user gave, as "-pc_type bjacobi -pc_bjacobi_blocks 1000", are
+   why PETSc's solvers or containers failed. */
+static PetscBool is_wrong_choice(const char *function, const char *file, size_t size, char given[])
+{
+  static const char *const rooms[] = {"src/ksp/", "src/snes/", "src/ts/",         "src/mat/",
+                                      "src/vec/", "src/dm/",   "src/sys/objects/"};
+  PetscBool petsc = PETSC_FALSE;
+
   given[0] = 0;
   for (size_t i = 0; file && i < PETSC_STATIC_ARRAY_LENGTH(rooms); i++)
     if (strstr(file, rooms[i]))
       petsc = PETSC_TRUE;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(codes); i++)
-    if ((int)n == codes[i])
-      choice = PETSC_TRUE;
-  if (!petsc || !choice)
+  if (!petsc)
     return PETSC_FALSE;
-
-  // the types that the user gave
-  for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
-    const char *name = SbTheOptions.user[i].name;
-    const char *value = SbTheOptions.user[i].value;
-    const size_t length = strlen(name);
-    const PetscBool type = (PetscBool)(length > 5 && !strcmp(name + length - 5, "_type"));
-    const PetscBool solver = (PetscBool)(strstr(name, "ksp_") || strstr(name, "pc_") ||
-                                         strstr(name, "snes_") || strstr(name, "mat_"));
-    const PetscBool parts =
-      (PetscBool)(strstr(file, "src/dm/partitioner/") && strstr(name, "petscpartitioner_"));
-
-    if (type && (solver || parts))
-      SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value ? value : "");
-  }
+  solver_options((PetscBool)(strstr(file, "src/dm/partitioner/") != NULL), size, given);
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
 }
 
@@ -162,7 +175,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
     char given[256], own[256];
     const PetscBool choice =
       (PetscBool)(is_wrong_viewer(function, file, mess, sizeof(given), given) ||
-                  is_wrong_choice(n, function, file, sizeof(given), given));
+                  is_wrong_choice(function, file, sizeof(given), given));
 
     state.code = 1;
     state.pending = (PetscBool)(choice || is_user_error(n, function));
@@ -200,6 +213,55 @@ PetscErrorCode SbErrorHandlerInstall(const char *program)
   state.program = program;
   PetscCallMPI(MPI_Comm_dup(MPI_COMM_WORLD, &state.comm));
   PetscCall(PetscPushErrorHandler(handler, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Signal handler. The process is lost: what is said may fail where memory is damaged. */
+static PetscErrorCode crashed(int number, void *ctx)
+{
+  static const struct {
+    int number;
+    const char *words;
+  } kinds[] = {{SIGFPE, "a division by zero"},
+               {SIGSEGV, "memory out of reach"},
+               {SIGBUS, "memory out of reach"},
+               {SIGILL, "an instruction that this processor does not have"}};
+  static volatile sig_atomic_t again;
+  const char *what = NULL;
+  char given[512], line[1024];
+
+  (void)ctx;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(kinds); i++)
+    if (kinds[i].number == number)
+      what = kinds[i].words;
+  if (!what || state.trace || again)
+    return PetscSignalHandlerDefault(number, NULL);
+  again = 1;
+
+  // the lowest rank that crashed ends all; the others leave it the time, until its signal comes
+  if (PetscGlobalRank && sleep((unsigned)GRACE))
+    _exit(PETSC_ERR_SIG);
+  solver_options(PETSC_FALSE, sizeof(given), given);
+  SbFormat(sizeof(line), line,
+           "%s: error: a crash, %s (signal %d)%s%s%s; -error_trace shows more\n", state.program,
+           what, number, given[0] ? ", with " : "", given,
+           given[0] ? ": try other values of these, or leave them out"
+                    : ": an error of the program or of a library");
+  (void)!write(STDERR_FILENO, line, strlen(line));
+  if (PetscGlobalSize == 1)
+    _exit(PETSC_ERR_SIG);
+  (void)MPI_Abort(PETSC_COMM_WORLD, PETSC_ERR_SIG);
+  return PETSC_ERR_SIG;
+}
+
+PetscErrorCode SbErrorCatchCrashes(void)
+{
+  PetscBool none;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-no_signal_handler", &none));
+  if (!none)
+    PetscCall(PetscPushSignalHandler(crashed, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

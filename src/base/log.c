@@ -63,17 +63,17 @@ static PetscErrorCode add_seconds(PetscLogEvent event, PetscReal *seconds)
 
 PetscErrorCode SbLogSeconds(PetscReal seconds[SB_PHASE_COUNT])
 {
-  static const char *const solve[] = {"KSPSolve", "PCSetUp", "PCSetUpOnBlocks"};
+  /* PCSetUp has SB_EVENT_SOLVER_SETUP, and is in PCSetUpOnBlocks */
+  static const char *const solve[] = {"KSPSolve", "PCSetUp"};
   static const struct {
     SbPhase phase;
     SbEvent event;
-  } ours[] = {{SB_PHASE_MESH, SB_EVENT_MESH_READ},     {SB_PHASE_MESH, SB_EVENT_MESH_DISTRIBUTE},
-              {SB_PHASE_SETUP, SB_EVENT_SPACE_SETUP},  {SB_PHASE_SETUP, SB_EVENT_MATRIX_SETUP},
-              {SB_PHASE_SETUP, SB_EVENT_SOLVER_SETUP}, {SB_PHASE_RESIDUAL, SB_EVENT_RESIDUAL},
-              {SB_PHASE_TANGENT, SB_EVENT_TANGENT},    {SB_PHASE_SOLVE, SB_EVENT_CONTACT_SOLVE},
-              {SB_PHASE_CONTACT, SB_EVENT_CONTACT},    {SB_PHASE_SEARCH, SB_EVENT_SEARCH},
-              {SB_PHASE_ENERGY, SB_EVENT_ENERGY},      {SB_PHASE_OUTPUT, SB_EVENT_OUTPUT},
-              {SB_PHASE_OUTPUT, SB_EVENT_CHECKPOINT}};
+  } ours[] = {{SB_PHASE_MESH, SB_EVENT_MESH_READ},      {SB_PHASE_MESH, SB_EVENT_MESH_DISTRIBUTE},
+              {SB_PHASE_SETUP, SB_EVENT_SPACE_SETUP},   {SB_PHASE_SETUP, SB_EVENT_MATRIX_SETUP},
+              {SB_PHASE_RESIDUAL, SB_EVENT_RESIDUAL},   {SB_PHASE_TANGENT, SB_EVENT_TANGENT},
+              {SB_PHASE_SOLVE, SB_EVENT_CONTACT_SOLVE}, {SB_PHASE_CONTACT, SB_EVENT_CONTACT},
+              {SB_PHASE_SEARCH, SB_EVENT_SEARCH},       {SB_PHASE_ENERGY, SB_EVENT_ENERGY},
+              {SB_PHASE_OUTPUT, SB_EVENT_OUTPUT},       {SB_PHASE_OUTPUT, SB_EVENT_CHECKPOINT}};
 
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(seconds, SB_PHASE_COUNT));

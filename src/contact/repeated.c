@@ -67,8 +67,9 @@ static PetscErrorCode find_shared(const Pair *pair)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define SAMPLES 64 /* times at which paths are compared, evenly over the run */
-#define EQUAL 1e-9 /* difference of places that are the same, over their size */
+#define SAMPLES 1000              /* times of the run at which paths are compared, */
+#define APART 0.61803398874989485 /* so far from each other, over the run, and modulo its length */
+#define EQUAL 1e-9                /* difference of places that are the same, over their size */
 
 /* Whether numbers are the same but for rounding. */
 static PetscBool alike(PetscInt n, const PetscReal a[], const PetscReal b[])
@@ -83,49 +84,71 @@ static PetscBool alike(PetscInt n, const PetscReal a[], const PetscReal b[])
   return (PetscBool)(far <= EQUAL * size);
 }
 
-/* Whether both obstacles are the same at rest: by their numbers, of capsules and cylinders with
-   either end first, and by the file of a mesh. */
-static PetscBool same_shape(const SbPartner *one, const SbPartner *two)
+/* Where the surface of an obstacle is at a time, m: the same numbers however shape and path are
+   written, and wherever a plane or a sphere turns or slides in itself. */
+static PetscErrorCode place(const SbPartner *partner, PetscReal t, PetscReal size, PetscReal x[12])
 {
-  const SbObstacle a = one->obstacle;
-  const SbObstacle b = two->obstacle;
-  const PetscReal turned[7] = {b->p[3], b->p[4], b->p[5], b->p[0], b->p[1], b->p[2], b->p[6]};
+  const SbObstacle o = partner->obstacle;
+  const PetscReal *p = o->p;
+  PetscReal X[4][3] = {{0.}};
+  SbPose pose;
+  int n = 1;
 
-  if (a->shape != b->shape)
-    return PETSC_FALSE;
-  if (a->shape == MESH)
-    return (PetscBool)(!strcmp(a->file, b->file) && alike(1, &one->scale, &two->scale) &&
-                       alike(3, one->at, two->at));
-  return (PetscBool)(alike(7, a->p, b->p) ||
-                     ((a->shape == CAPSULE || a->shape == CYLINDER) && alike(7, a->p, turned)));
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++)
+    X[0][k] = o->shape == MESH ? partner->at[k] : o->shape == PLANE ? p[3] * p[k] : p[k];
+  if (o->shape == PLANE || o->shape == CAPSULE || o->shape == CYLINDER) {
+    n = 2;
+    for (int k = 0; k < 3; k++)
+      X[1][k] = o->shape == PLANE ? X[0][k] + size * p[k] : p[3 + k];
+  } else if (o->shape == BOX || o->shape == MESH) {
+    n = 4; // a corner and its neighbours, or the origin and points on the axes
+    for (int i = 1; i < n; i++) {
+      PetscCall(PetscArraycpy(X[i], X[0], 3));
+      X[i][i - 1] = o->shape == BOX ? p[2 + i] : X[0][i - 1] + partner->scale * size;
+    }
+  }
+  PetscCall(PetscArrayzero(x, 12));
+  PetscCall(SbPartnerPose(partner, t, &pose));
+  for (int i = 0; i < n; i++)
+    SbPoseApply(&pose, X[i], x + 3 * i);
+
+  // of a plane its normal, and its distance from the origin
+  if (o->shape == PLANE) {
+    SbSubtract(x + 3, x, x + 3);
+    x[6] = SbDot3(x, x + 3) / size;
+    PetscCall(PetscArrayzero(x, 3));
+  } else if (n < 4)
+    x[6] = o->shape == SPHERE || o->shape == BOWL ? p[3] : p[6];
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the obstacles of two effects are the same shape on the same path: at SAMPLES times of the
-   run four points of one are where those of the other are, however paths are written. */
+/* Whether the obstacles of two effects are the same shape on the same path: their surfaces are in
+   one place at SAMPLES irregular times of the run. */
 static PetscErrorCode same_obstacle(const Pair *pair, PetscReal size, PetscBool *same)
 {
   const SbPartner *one = &((const Contact *)pair->effect[0]->data)->partner;
   const SbPartner *two = &((const Contact *)pair->effect[1]->data)->partner;
+  const Shape shape = one->obstacle->shape;
   PetscReal end = 1.;
 
   PetscFunctionBeginUser;
   if (pair->effect[0]->dynamic) /* else the load factor goes to 1 */
     PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_max_time", &end, NULL));
-  *same = same_shape(one, two);
+  *same = (PetscBool)(shape == two->obstacle->shape &&
+                      (shape != MESH || !strcmp(one->obstacle->file, two->obstacle->file)));
   for (int k = 0; *same && k <= SAMPLES; k++) {
-    PetscReal x[2][12];
-    SbPose pose[2];
+    const PetscReal t = k < SAMPLES ? end * fmod(APART * k, 1.) : end;
+    PetscReal x[12], y[12];
 
-    PetscCall(SbPartnerPose(one, end * k / SAMPLES, &pose[0]));
-    PetscCall(SbPartnerPose(two, end * k / SAMPLES, &pose[1]));
-    for (int i = 0; i < 8; i++) {
-      PetscReal X[3] = {0., 0., 0.};
+    PetscCall(place(one, t, size, x));
+    PetscCall(place(two, t, size, y));
+    *same = alike(12, x, y);
+    if (!*same && (shape == CAPSULE || shape == CYLINDER)) { // with either end first
+      const PetscReal turned[7] = {y[3], y[4], y[5], y[0], y[1], y[2], y[6]};
 
-      if (i % 4)
-        X[i % 4 - 1] = size;
-      SbPoseApply(&pose[i / 4], X, x[i / 4] + 3 * (i % 4));
+      *same = alike(7, x, turned);
     }
-    *same = alike(12, x[0], x[1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -50,8 +50,31 @@ static PetscErrorCode note_release(void *p, int line, const char function[], con
   return (*noted.release)(p, line, function, file);
 }
 
+/* The first error of a set-up. */
+typedef struct {
+  int line;
+  const char *function, *file;
+  PetscErrorCode code;
+  char text[512];
+} First;
+
+static PetscErrorCode keep_first(MPI_Comm comm, int line, const char *function, const char *file,
+                                 PetscErrorCode code, PetscErrorType type, const char *text,
+                                 void *ctx)
+{
+  First *first = (First *)ctx;
+
+  (void)comm;
+  if (type == PETSC_ERROR_INITIAL) {
+    *first = (First){.line = line, .function = function, .file = file, .code = code};
+    SbFormat(sizeof(first->text), first->text, "%s", text ? text : "");
+  }
+  return code;
+}
+
 static PetscErrorCode guarded_setup(PC pc)
 {
+  First first = {.code = PETSC_SUCCESS};
   PetscErrorCode (*original)(PC) = NULL;
   PetscErrorCode error;
   MatFactorError before = MAT_FACTOR_NOERROR;
@@ -75,7 +98,7 @@ static PetscErrorCode guarded_setup(PC pc)
   noted.n = 0;
   PetscTrMalloc = note_allocate;
   PetscTrFree = note_release;
-  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  PetscCall(PetscPushErrorHandler(keep_first, &first));
   error = (*original)(pc);
   PetscCall(PetscPopErrorHandler());
   PetscTrMalloc = noted.allocate;
@@ -87,7 +110,12 @@ static PetscErrorCode guarded_setup(PC pc)
     PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(error); /* other errors are reported as usual, without the trace */
+
+  // other errors are reported as usual
+  if (error && first.code)
+    error = PetscError(PETSC_COMM_SELF, first.line, first.function, first.file, first.code,
+                       PETSC_ERROR_INITIAL, "%s", first.text);
+  PetscCall(error);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -59,8 +59,9 @@ PetscErrorCode SbMatGetBlocks(Mat A, PetscBool aij, SbMatBlocks *x)
     if (same)
       break;
   }
-  PetscCheck(type < 5 && (aij || type > 1), PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "%s and SBAIJ matrices, and this one is %s: leave -mat_type alone",
+  PetscCheck(type < 5 && (aij || type > 1), PetscObjectComm((PetscObject)A), PETSC_ERR_USER_INPUT,
+             "%s and SBAIJ matrices, and this one is %s: leave -mat_type alone, and -snes_type to "
+             "Newton's method",
              aij ? "Assembly takes AIJ, BAIJ" : "This preconditioner takes BAIJ",
              ((PetscObject)A)->type_name);
   *x = (SbMatBlocks){(SbMatrixKind)(type / 2), (PetscBool)(type == 4), {A, NULL}, {NULL, NULL}};

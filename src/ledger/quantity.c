@@ -68,7 +68,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   PetscCall(VecZeroEntries(q->weight));
   if (q->kind == SB_QUANTITY_DISPLACEMENT) {
     PetscReal least = PETSC_MAX_REAL;
-    PetscReal all;
+    PetscReal all, nearest;
     PetscInt first = PETSC_MAX_INT;
     PetscInt winner;
 
@@ -95,6 +95,12 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     for (int j = 0; j < 3; j++)
       q->x[j] = q->node < 0 ? 0. : s->node_x[3 * q->node + j];
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
+    if (SbBodyFarFrom(s->mesh->nbody, s->mesh->body, q->at, &nearest) && !l->run->counters.steps)
+      PetscCall(SbWarning(m->comm,
+                          "-ledger_at %g,%g,%g is %.3g m outside of the nearest body's box: the "
+                          "quantity is of the nearest node, at (%g, %g, %g) m",
+                          (double)q->at[0], (double)q->at[1], (double)q->at[2], (double)nearest,
+                          (double)q->x[0], (double)q->x[1], (double)q->x[2]));
   }
   for (PetscInt k = 0; k < m->nset; k++)
     if (!strcmp(m->set[k].name, q->on))

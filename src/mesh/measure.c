@@ -3,6 +3,8 @@
 */
 #include "mesh_impl.h"
 
+#define FAR 0.05 /* of a body's diagonal, outside of its box */
+
 const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
 
 /* Length, area or signed volume of a simplex with straight edges. */
@@ -146,6 +148,25 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   }
   facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbBodyFarFrom(PetscInt nbody, const SbBody body[], const PetscReal point[3],
+                        PetscReal *nearest)
+{
+  PetscBool far = PETSC_TRUE;
+
+  *nearest = PETSC_MAX_REAL;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const PetscReal *box = body[b].bbox;
+    PetscReal r[3], d;
+
+    for (int k = 0; k < 3; k++)
+      r[k] = PetscMax(0., PetscMax(box[k] - point[k], point[k] - box[3 + k]));
+    d = PetscSqrtReal(SbDot3(r, r));
+    *nearest = PetscMin(*nearest, d);
+    far = (PetscBool)(far && d > FAR * SbBoxDiagonal(box));
+  }
+  return far;
 }
 
 PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[])

@@ -39,6 +39,7 @@ PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched)
 /* touching.c: boundary facets that lie on each other without being one face */
 typedef struct {
   PetscInt n, ndoubled; /* pairs; those whose corners are at the same positions, as two vertices */
+  PetscInt ntwice;      /* those on the same side, of parts that are there twice */
   PetscInt npart;       /* parts of the body that hang together by faces, when n > 0 */
   int64_t number[2];    /* tets of the first pair, in the file */
   PetscReal at[3];      /* its place, m */

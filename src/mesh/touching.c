@@ -8,7 +8,9 @@
 
   Two facets lie on each other when their outward normals are opposite, the corners of one are in
   the plane of the other to 1e-6 of their longest edges, and they overlap by more than a thousandth
-  of the smaller area. Candidates are pairs of boxes in a tree. Curved facets are taken as flat.
+  of the smaller area. Facets with the same corners on the same side are of parts that the file has
+  twice: tets lie in each other, and their mass counts twice. Candidates are pairs of boxes in a
+  tree. Curved facets are taken as flat.
 
   Of a mesh in slabs every rank gets the boundary facets of all, and searches for those that lie on
   its own ones: 96 bytes for each, a hundredth or so of the mesh where that is large.
@@ -118,6 +120,17 @@ static PetscBool on_each_other(const PetscReal x[], const PetscInt v[3], const P
       return PETSC_FALSE;
   }
   return (PetscBool)(overlap2(x, v, f.n, w) > 1e-3 * PetscMin(f.area2, g.area2));
+}
+
+/* Whether two facets have one centre. */
+static PetscBool one_centre(const PetscReal x[], const PetscInt v[3], const PetscInt w[3],
+                            PetscReal rounding)
+{
+  PetscReal d[3] = {0, 0, 0};
+
+  for (int k = 0; k < 9; k++)
+    d[k % 3] += (x[3 * v[k / 3] + k % 3] - x[3 * w[k / 3] + k % 3]) / 3;
+  return (PetscBool)(SbDot3(d, d) <= PetscSqr(rounding));
 }
 
 /* Number of parts that hang together by faces of this rank; parent[ncell]. */
@@ -248,13 +261,17 @@ static PetscErrorCode find_pairs(PetscInt n, const Record facet[], PetscInt firs
       PetscInt j = pair[2 * k + 1];
       int nequal = 0;
       int nshared = 0;
+      PetscBool opposite;
 
       // with one tree in either order; with two the pair belongs to the rank of its lower facet
       if (all && i > j) {
         i = pair[2 * k + 1];
         j = pair[2 * k];
       }
-      if (i >= j || !on_each_other(x, vert + 3 * i, vert + 3 * j, rounding))
+      if (i >= j)
+        continue;
+      opposite = on_each_other(x, vert + 3 * i, vert + 3 * j, rounding);
+      if (!opposite && !one_centre(x, vert + 3 * i, vert + 3 * j, rounding))
         continue;
 
       // corners at one position, of which some are two vertices
@@ -263,8 +280,11 @@ static PetscErrorCode find_pairs(PetscInt n, const Record facet[], PetscInt firs
           SbDistance2(facet[i].x + 3 * (a / 3), facet[j].x + 3 * (a % 3)) <= PetscSqr(rounding);
         nshared += facet[i].vert[a / 3] == facet[j].vert[a % 3];
       }
+      if (!opposite && nequal != 3)
+        continue;
       t->n++;
-      t->ndoubled += nequal == 3 && nshared < 3;
+      t->ndoubled += opposite && nequal == 3 && nshared < 3;
+      t->ntwice += !opposite;
       if (*lowest < 0 || (PetscInt64)i * n + j < *lowest)
         *lowest = (PetscInt64)i * n + j;
     }
@@ -311,7 +331,7 @@ PetscErrorCode SbSlabTouching(MPI_Comm comm, PetscInt before, const SbImport *im
   const PetscInt nown = part->faces.nboundary;
   PetscInt n = 0;
   PetscInt first = 0;
-  PetscInt count[2];
+  PetscInt count[3];
   PetscInt64 lowest;
   Record *mine, *all;
   MPI_Datatype type;
@@ -328,9 +348,11 @@ PetscErrorCode SbSlabTouching(MPI_Comm comm, PetscInt before, const SbImport *im
   PetscCall(find_pairs(n, all, first, first + nown, t, &lowest));
   count[0] = t->n;
   count[1] = t->ndoubled;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, comm));
+  count[2] = t->ntwice;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT, MPI_SUM, comm));
   t->n = count[0];
   t->ndoubled = count[1];
+  t->ntwice = count[2];
   lowest = lowest < 0 ? INT64_MAX : lowest;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &lowest, 1, MPIU_INT64, MPI_MIN, comm));
   if (t->n) {
@@ -344,13 +366,19 @@ PetscErrorCode SbSlabTouching(MPI_Comm comm, PetscInt before, const SbImport *im
 void SbTouchingText(const SbTouching *t, const char *file, size_t size, char text[])
 {
   SbFormat(size, text,
-           "pairs of facets that lie on each other without joining: %" PetscInt_FMT
+           "pairs of facets that lie on each other without joining: %" PetscInt_FMT "%s"
            " (the first: of tetrahedra %lld and %lld, at (%.6g, %.6g, %.6g) m)",
-           t->n, (long long)t->number[0], (long long)t->number[1], (double)t->at[0],
-           (double)t->at[1], (double)t->at[2]);
+           t->n, t->ntwice ? ", some on the same side, of tets in each other" : "",
+           (long long)t->number[0], (long long)t->number[1], (double)t->at[0], (double)t->at[1],
+           (double)t->at[2]);
   if (!file)
     return;
-  if (t->ndoubled == t->n)
+  if (t->ntwice)
+    SbAppend(size, text,
+             "; parts are there twice, and their mass counts twice: supple-mesh repair %s OUT "
+             "drops the second ones",
+             file);
+  else if (t->ndoubled == t->n)
     SbAppend(size, text,
              "; vertices are there twice: join them by supple-mesh repair %s OUT, or let "
              "contact act between them",

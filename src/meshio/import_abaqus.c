@@ -391,6 +391,7 @@ static PetscErrorCode check_keyword(SbAbaqus *a)
     {"*ELEMENT", "FILE", "the elements are in another file; put them behind the line"},
     {"*ELEMENT", "OFFSET", "supple knows no offset of nodes; write the elements without"},
     {"*NMAP", NULL, "it moves nodes; let Abaqus write the mapped ones"},
+    {"*ADJUST", NULL, "it moves nodes; let Abaqus write the moved ones"},
     {"*IMPERFECTION", NULL, "it moves nodes; let Abaqus write the moved ones"},
     {"*IMPORT", NULL, "the mesh is that of another analysis; write its nodes and elements"},
     {"*SYMMETRIC MODEL GENERATION", NULL,

@@ -84,10 +84,12 @@ static PetscErrorCode find_type(Exodus *x, const char *name, int64_t nnode, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number and names of what has the given letters: eb, ss, ns, els. */
+/* Numbers and names of blocks or sets, by their letters: eb, ss, ns, els. */
 typedef struct {
+  const char *array; /* of the members, without its number */
   int64_t n;
   double *number; /* [n] or NULL */
+  double *status; /* [n] or NULL; 0: empty */
   char *name;     /* [n][width] or NULL */
   size_t width;
 } List;
@@ -98,7 +100,7 @@ static PetscErrorCode read_list(Exodus *x, const char *letters, const char *arra
   int64_t n;
 
   PetscFunctionBeginUser;
-  *list = (List){.n = -1};
+  *list = (List){.array = array, .n = -1};
   SbFormat(sizeof(path), path, "%s_prop1", letters);
   if (SbForeignHas(x->f, path))
     PetscCall(SbForeignNumbers(x->f, path, &list->n, &list->number));
@@ -108,6 +110,9 @@ static PetscErrorCode read_list(Exodus *x, const char *letters, const char *arra
     if (!SbForeignHas(x->f, path))
       break;
   }
+  SbFormat(sizeof(path), path, "%s_status", letters);
+  if (SbForeignHas(x->f, path))
+    PetscCall(SbForeignNumbers(x->f, path, &list->n, &list->status));
   SbFormat(sizeof(path), path, "%s_names", letters);
   if (!SbForeignHas(x->f, path))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,6 +120,28 @@ static PetscErrorCode read_list(Exodus *x, const char *letters, const char *arra
   if (n != list->n)
     SB_FOREIGN_ERROR(x->f, "%s has %lld names; expected %lld", path, (long long)n,
                      (long long)list->n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers of entry k of a list, and the name of their array, as connect2. An empty one, with n = 0,
+   has none. */
+static PetscErrorCode members_of(Exodus *x, const List *list, int64_t k, size_t size, char array[],
+                                 int64_t *n, double **number)
+{
+  PetscFunctionBeginUser;
+  *n = 0;
+  *number = NULL;
+  SbFormat(size, array, "%s%lld", list->array, (long long)k + 1);
+  if (SbForeignHas(x->f, array)) {
+    *n = -1;
+    PetscCall(SbForeignNumbers(x->f, array, n, number));
+  } else if (list->status && list->status[k] != 0)
+    SB_FOREIGN_ERROR(x->f,
+                     "there is no array %s in it, and its status says that it is not empty: "
+                     "the file is damaged, write or copy it again",
+                     array);
+  else if (!list->status)
+    SbImportRemark(x->f->im, "there is no array %s, taken as empty", array);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,16 +199,13 @@ static PetscErrorCode read_blocks(Exodus *x)
   for (int64_t b = 0; b < list.n; b++) {
     Block block = {.first = f->nelement};
     char path[64], name[SB_NAME_MAX];
-    int64_t all = -1;
+    int64_t all;
     PetscInt group, tags;
 
-    // a block without elements has no array
-    SbFormat(sizeof(path), path, "connect%lld", (long long)b + 1);
-    if (!SbForeignHas(f, path))
-      continue;
-    PetscCall(SbForeignNumbers(f, path, &all, &block.node));
-    PetscCall(SbForeignRows(f, path, &block.n));
-    if (!all || !block.n)
+    PetscCall(members_of(x, &list, b, sizeof(path), path, &all, &block.node));
+    if (all)
+      PetscCall(SbForeignRows(f, path, &block.n));
+    if (!block.n)
       continue;
     block.nnode = all / block.n;
     if (!SbForeignTextOf(f, path, "elem_type", sizeof(name), name))
@@ -227,15 +251,14 @@ static PetscErrorCode read_side_sets(Exodus *x)
   PetscCall(read_list(x, "ss", "elem_ss", &list));
   for (int64_t s = 0; s < list.n; s++) {
     char elements[64], sides[64];
-    int64_t n = -1;
+    int64_t n;
     double *element, *side;
     PetscInt group, tags;
 
-    SbFormat(sizeof(elements), elements, "elem_ss%lld", (long long)s + 1);
-    SbFormat(sizeof(sides), sides, "side_ss%lld", (long long)s + 1);
-    if (!SbForeignHas(f, elements))
+    PetscCall(members_of(x, &list, s, sizeof(elements), elements, &n, &element));
+    if (!n)
       continue;
-    PetscCall(SbForeignNumbers(f, elements, &n, &element));
+    SbFormat(sizeof(sides), sides, "side_ss%lld", (long long)s + 1);
     PetscCall(SbForeignNumbers(f, sides, &n, &side));
     PetscCall(group_of(x, &list, s, 2, &group));
     for (int64_t i = 0; i < n; i++) {
@@ -271,14 +294,11 @@ static PetscErrorCode read_node_sets(Exodus *x)
   PetscCall(read_list(x, "ns", "node_ns", &list));
   for (int64_t s = 0; s < list.n; s++) {
     char path[64];
-    int64_t n = -1;
+    int64_t n;
     double *node;
     PetscInt group;
 
-    SbFormat(sizeof(path), path, "node_ns%lld", (long long)s + 1);
-    if (!SbForeignHas(f, path))
-      continue;
-    PetscCall(SbForeignNumbers(f, path, &n, &node));
+    PetscCall(members_of(x, &list, s, sizeof(path), path, &n, &node));
     PetscCall(group_of(x, &list, s, 0, &group));
     for (int64_t i = 0; i < n; i++) {
       if (!(node[i] >= 1 && node[i] <= f->im->nvert) || node[i] != PetscFloorReal(node[i]))
@@ -299,13 +319,10 @@ static PetscErrorCode read_element_sets(Exodus *x)
   PetscCall(read_list(x, "els", "elem_els", &list));
   for (int64_t s = 0; s < list.n; s++) {
     char path[64];
-    int64_t n = -1;
+    int64_t n;
     double *element;
 
-    SbFormat(sizeof(path), path, "elem_els%lld", (long long)s + 1);
-    if (!SbForeignHas(f, path))
-      continue;
-    PetscCall(SbForeignNumbers(f, path, &n, &element));
+    PetscCall(members_of(x, &list, s, sizeof(path), path, &n, &element));
     for (int64_t i = 0; i < n; i++) {
       const Block *block;
       PetscInt group;

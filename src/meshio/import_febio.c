@@ -382,23 +382,52 @@ static PetscErrorCode read_surface(FEBio *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The section Geometry or Mesh. */
-static PetscErrorCode read_mesh(FEBio *f)
+/* A mesh, or a part of it, in another file is an error. */
+static PetscErrorCode check_from(FEBio *f)
 {
-  const int depth = f->xml.depth;
   char from[SB_GROUP_MAX];
-  PetscBool more;
 
   PetscFunctionBeginUser;
   PetscCall(name_of(f, "from", from));
   if (from[0])
-    SB_SCAN_ERROR(f->scan, "the mesh is in another file, '%.60s'; name that one", from);
+    SB_SCAN_ERROR(f->scan,
+                  "%s is in another file, '%.60s'; name that one, or put all into one file",
+                  f->xml.name, from);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lengths are taken as m; others are said. */
+static void read_units(FEBio *f)
+{
+  static const struct {
+    const char *name;
+    double length; /* m */
+  } units[] = {{"mm-N-s", 1e-3}, {"mm-kg-s", 1e-3}, {"um-nN-s", 1e-6}, {"CGS", 1e-2}};
+  char name[16] = "";
+
+  (void)SbXmlAttribute(&f->xml, "units", sizeof(name), name);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
+    if (!strcasecmp(name, units[i].name))
+      SbImportRemark(f->deck.im, "lengths are in units of %g m, taken as m: give this as scale",
+                     units[i].length);
+}
+
+/* The section Geometry or Mesh. */
+static PetscErrorCode read_mesh(FEBio *f)
+{
+  const int depth = f->xml.depth;
+  PetscBool more;
+
+  PetscFunctionBeginUser;
+  PetscCall(check_from(f));
   for (;;) {
     PetscCall(SbXmlNext(&f->xml, &more));
     if (f->xml.depth < depth)
       break;
     if (!f->xml.opens)
       continue;
+    if (f->xml.depth == depth + 1)
+      PetscCall(check_from(f));
     if (!strcmp(f->xml.name, "Part") || !strcmp(f->xml.name, "Instance"))
       SB_SCAN_ERROR(f->scan,
                     "%s moves nodes in a way that supple does not know; let FEBio Studio "
@@ -489,6 +518,7 @@ PetscErrorCode SbImportRead_FEBio(const char *path, SbImport *im)
   PetscCall(SbXmlNext(&f.xml, &more));
   if (!more || strcmp(f.xml.name, "febio_spec") != 0)
     SB_SCAN_ERROR(f.scan, "expected an element febio_spec; this is no input file of FEBio");
+  read_units(&f);
   for (;;) {
     PetscBool said = PETSC_TRUE;
 

@@ -3,11 +3,12 @@
   2429 to 2477: groups).
 
   A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their
-  coordinates (units and coordinate systems are ignored); tets, triangles, lines. An element belongs
-  to the group volume_N, surface_N or curve_N of its physical property N, and to the named groups
-  that list it. Groups of nodes are kept too. Errors: volume elements other than tets of 4 or 10
-  nodes.
+  coordinates (units are said where they are not m; local coordinate systems are errors); tets,
+  triangles, lines. An element belongs to the group volume_N, surface_N or curve_N of its physical
+  property N, and to the named groups that list it. Groups of nodes are kept too. Errors: volume
+  elements other than tets of 4 or 10 nodes.
 */
+#include <stdlib.h>
 #include "meshio_impl.h"
 
 /* FE descriptor ids, and gmsh's types. Others (springs, masses) are skipped. */
@@ -152,6 +153,24 @@ static PetscErrorCode read_systems(SbDeck *d, SbNumbers *local)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Units: a line of their code and name, then the unit of length per m. It is said only: bodies have
+   a scale. */
+static void read_units(SbDeck *d)
+{
+  SbScan *s = &d->im->scan;
+  char text[41] = "";
+  double factor;
+
+  SbScanEndOfLine(s);
+  (void)snprintf(text, sizeof(text), "%.*s", (int)PetscMin(40, s->end - s->at), s->at);
+  for (char *c = text; *c; c++)
+    *c = (char)(*c == 'D' || *c == 'd' ? 'e' : *c);
+  factor = strtod(text, NULL);
+  if (factor > 0. && isfinite(factor) && PetscAbsReal(factor - 1.) > 1e-12)
+    SbImportRemark(d->im, "lengths are in units of %g m, taken as m: give this as scale",
+                   1. / factor);
+}
+
 /* Reads the data sets; the numbers of `local` are the caller's to free. */
 static PetscErrorCode read_sets(SbDeck *d, SbNumbers *local)
 {
@@ -188,6 +207,8 @@ static PetscErrorCode read_sets(SbDeck *d, SbNumbers *local)
       PetscCall(read_systems(d, local));
     if (id == 2412 && !im->nvert)
       SB_SCAN_ERROR(s, "elements before the nodes");
+    if (id == 164)
+      read_units(d);
     for (;;) {
       // the data set ends at a delimiter; the end of the file is an error
       while (s->at < s->end && (*s->at == '\n' || *s->at == '\r'))

@@ -339,6 +339,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscCall(SbH5PutReal(&h, h.file, run->monitors.checkpoint[i].name,
                           *run->monitors.checkpoint[i].value));
   PetscCall(SbProbesWrite(run, out, &h));
+  PetscCall(SbHistoryWrite(run, out, step->step, &h));
 
   /* values of live formulas */
   for (PetscInt i = 0; i < SbLiveCount(); i++)
@@ -559,6 +560,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   }
   if (*ok)
     PetscCall(SbProbesRead(run, out, &h));
+  if (*ok)
+    PetscCall(SbHistoryRead(run, out, &h));
   for (PetscInt i = 0; *ok && i < SbLiveCount(); i++) {
     PetscReal value;
 

@@ -170,6 +170,52 @@ static void write_row(SbHistory h, char message[SB_MESSAGE_MAX])
     SbFormat(SB_MESSAGE_MAX, message, "cannot write to %s, its last row is incomplete", h->path);
 }
 
+/* Number of columns of effects; of column k the name in a checkpoint, where name is not NULL. */
+static PetscInt effect_columns(SbRun run, PetscInt k, size_t size, char name[])
+{
+  PetscInt n = 0;
+
+  for (PetscInt e = 0; e < run->model->nhistory; e++) {
+    const SbEffect effect = run->model->history[e];
+
+    if (name && k >= n && k < n + effect->ncolumn)
+      SbFormat(size, name, "history_%s_%s", effect->name, effect->column[k - n]);
+    n += effect->ncolumn;
+  }
+  return n;
+}
+
+PetscErrorCode SbHistoryWrite(SbRun run, SbOutput out, PetscInt step, SbH5 *h)
+{
+  const PetscInt n = effect_columns(run, 0, 0, NULL);
+  char name[4 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; out->hist && out->hist->last_step == step && k < n; k++) {
+    (void)effect_columns(run, k, sizeof(name), name);
+    PetscCall(SbH5PutReal(h, h->file, name, out->hist->sum[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbHistoryRead(SbRun run, SbOutput out, SbH5 *h)
+{
+  const PetscInt n = effect_columns(run, 0, 0, NULL);
+  PetscBool all = PETSC_TRUE;
+  char name[4 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(out->resumed));
+  PetscCall(PetscMalloc1(n, &out->resumed));
+  for (PetscInt k = 0; k < n && all; k++) {
+    (void)effect_columns(run, k, sizeof(name), name);
+    SbH5GetReal(h->file, name, &out->resumed[k], &all);
+  }
+  if (!all)
+    PetscCall(PetscFree(out->resumed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
@@ -180,10 +226,15 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscReal *values = h->mine;
   PetscReal *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS;
   SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
+  const PetscBool resumed = (PetscBool)(step->step == run->clock.step0 && step->step > 0);
   const PetscReal *residual;
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
+
+  // forces of contact are of the step before, which this run, or that on this mesh, did not solve
+  if (resumed && model->contacts.n && !out->resumed)
+    PetscFunctionReturn(PETSC_SUCCESS);
   if (h->last_step >= step->step ||
       (step->step != run->clock.step0 && !step->last && step->step % out->history_every))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -229,6 +280,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   for (PetscInt b = 0; b < nbody; b++) // centres are means
     for (int k = 1; k <= 3; k++)
       h->sum[h->nextra - (nbody - b - 1) * SB_BODY_SUMS - k] /= h->mass[b][3];
+
+  if (resumed && out->resumed)
+    PetscCall(PetscArraycpy(h->sum, out->resumed, effect_columns(run, 0, 0, NULL)));
 
   /* the row, as text, for one call */
   h->last_step = step->step;
@@ -348,7 +402,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
       PetscCall(open_file(run, out, message));
     PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
     PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
-  }
+  } else
+    PetscCall(PetscFree(out->resumed));
 
   /* from now on rows are those of this run */
   PetscCall(SbProbesFind(run, out));
@@ -366,6 +421,7 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   SbHistory h = out->hist;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscFree(out->resumed));
   if (!h)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (h->fd >= 0)

@@ -259,6 +259,7 @@ struct _p_SbOutput {
   SbIndex
     contact_index; /* of them, on rank 0; NULL when there are none to write and none to keep */
   SbHistory hist;
+  PetscReal *resumed; /* [columns of effects] the row of the step of the checkpoint; or NULL */
   SbProgress line;
   char started[32]; /* date and time */
   PetscInt nremeshed, remeshed_size;
@@ -353,6 +354,10 @@ PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
+/* Columns of effects in a checkpoint: forces of contact are those of the step before, which the
+   state does not tell. Of this step's row, if there is one. Collective. */
+PetscErrorCode SbHistoryWrite(SbRun run, SbOutput out, PetscInt step, SbH5 *h);
+PetscErrorCode SbHistoryRead(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */
@@ -441,7 +446,7 @@ void SbVtkhdfWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
 /* run_json.c: times of the phases, from the log events. */
 typedef struct {
-  PetscReal seconds[SB_PHASE_COUNT]; /* largest of all ranks */
+  PetscReal seconds[SB_PHASE_COUNT]; /* mean of the ranks */
   PetscReal cpu; /* CPU time of the slowest rank, s; less than `total` where others use the cores */
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
   PetscReal total;                  /* s */

@@ -21,7 +21,6 @@
 
 /* Numbers of a probe in a checkpoint: the position, the body. */
 #define NNUMBER 4
-#define FAR 0.05 /* of a body's diagonal: warn of points farther from the box of each body */
 static const char *const number_names[NNUMBER] = {"x", "y", "z", "body"};
 
 static const char *const keys[] = {"at", "on",
@@ -278,32 +277,6 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Warns of a point far outside of all bodies. */
-static PetscErrorCode warn_far(const SbMesh mesh, SbOutput out, const SbProbe *probe)
-{
-  PetscReal nearest = PETSC_MAX_REAL;
-  PetscBool far = PETSC_TRUE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    const PetscReal *box = mesh->body[b].bbox;
-    PetscReal r[3], d;
-
-    for (int k = 0; k < 3; k++)
-      r[k] = PetscMax(0., PetscMax(box[k] - probe->at[k], probe->at[k] - box[3 + k]));
-    d = PetscSqrtReal(SbDot3(r, r));
-    nearest = PetscMin(nearest, d);
-    far = (PetscBool)(far && d > FAR * SbBoxDiagonal(box));
-  }
-  if (far)
-    PetscCall(SbWarning(out->comm,
-                        "-probe_%s_at %g,%g,%g is %.3g m outside of the nearest body's box: the "
-                        "probe follows the nearest vertex",
-                        probe->name, (double)probe->at[0], (double)probe->at[1],
-                        (double)probe->at[2], (double)nearest));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* On the first mesh the nearest vertex or node; later that at the probe's rest position, or the tet
    there. */
 static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
@@ -329,7 +302,12 @@ static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
     PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
     PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
     probe->found = PETSC_TRUE;
-    PetscCall(warn_far(mesh, out, probe));
+    if (SbBodyFarFrom(mesh->nbody, mesh->body, probe->at, &best))
+      PetscCall(SbWarning(out->comm,
+                          "-probe_%s_at %g,%g,%g is %.3g m outside of the nearest body's box: the "
+                          "probe follows the nearest vertex",
+                          probe->name, (double)probe->at[0], (double)probe->at[1],
+                          (double)probe->at[2], (double)best));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (best == 0.)

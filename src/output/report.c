@@ -1,6 +1,6 @@
 /*
   Console output: a header before the run, a table after it. Eighty columns. Seconds of a phase are
-  those of the slowest rank; the last phase is the rest of the wall time.
+  the mean of the ranks; the last phase is the rest of the wall time.
 */
 #include <stdarg.h>
 #include <time.h>

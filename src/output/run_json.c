@@ -191,14 +191,18 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
   p->cpu = SB_CPU_SECONDS - out->cpu_start;
   (void)getrusage(RUSAGE_SELF, &usage);
   p->memory_max = p->memory_sum = 1024. * (PetscReal)usage.ru_maxrss;
+  p->total = p->seconds[SB_PHASE_OTHER];
   PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, p->seconds, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+    MPI_Allreduce(MPI_IN_PLACE, p->seconds, SB_PHASE_COUNT, MPIU_REAL, MPI_SUM, out->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->total, 1, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
-  p->total = p->seconds[SB_PHASE_OTHER];
-  for (int i = 0; i < SB_PHASE_OTHER; i++)
+  p->seconds[SB_PHASE_OTHER] = p->total;
+  for (int i = 0; i < SB_PHASE_OTHER; i++) {
+    p->seconds[i] /= out->size;
     p->seconds[SB_PHASE_OTHER] -= p->seconds[i];
+  }
   p->seconds[SB_PHASE_OTHER] = PetscMax(p->seconds[SB_PHASE_OTHER], 0.);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,6 @@
 /*
-  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name. Areas,
+  triangles.c - reads the triangles of a surface file; the reader is chosen by the first
+  bytes of the file, or its name. Areas,
   edges, volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
 
   For a gmsh file the surface is the boundary of its tets, or, without tets, its triangles.
@@ -7,17 +8,24 @@
 #include <strings.h>
 #include "surface_impl.h"
 
+enum {
+  STL,
+  OBJ,
+  OFF,
+  PLY
+};
+static const SbTriangleFormat formats[] = {
+  [STL] = {".stl", SbTrianglesRead_STL},
+  [OBJ] = {".obj", SbTrianglesRead_OBJ},
+  [OFF] = {".off", SbTrianglesRead_OFF},
+  [PLY] = {".ply", SbTrianglesRead_PLY},
+  {".poly", SbTrianglesRead_Poly},
+  {".smesh", SbTrianglesRead_Poly},
+  {".msh", NULL},
+};
+
 const SbTriangleFormat *SbTrianglesFormat(const char *path)
 {
-  static const SbTriangleFormat formats[] = {
-    {".stl", SbTrianglesRead_STL},
-    {".obj", SbTrianglesRead_OBJ},
-    {".off", SbTrianglesRead_OFF},
-    {".ply", SbTrianglesRead_PLY},
-    {".poly", SbTrianglesRead_Poly},
-    {".smesh", SbTrianglesRead_Poly},
-    {".msh", NULL},
-  };
   const char *dot = strrchr(path, '.');
 
   for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(formats); i++)
@@ -26,9 +34,36 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path)
   return NULL;
 }
 
+/* The format that the first bytes of a file are of, whatever its name: obj has no mark. */
+static const SbTriangleFormat *format_of(const char *path, const SbTriangleFormat *named)
+{
+  static const char *const heads[] = {"OFF", "COFF", "NOFF", "CNOFF", "STOFF"};
+  char text[1024];
+  const char *begin;
+  size_t n;
+  FILE *file;
+
+  if (SbFileOpen(path, 0, &file) || !file)
+    return named;
+  n = fread(text, 1, sizeof(text) - 1, file);
+  (void)fclose(file);
+  text[n] = 0;
+  begin = text + strspn(text, " \t\r\n");
+  n = strcspn(begin, " \t\r\n");
+  if (!strncasecmp(begin, "solid", 5) && strstr(begin, "facet") && strstr(begin, "vertex"))
+    return &formats[STL];
+  if (n == 3 && !strncmp(begin, "ply", 3) && strstr(begin, "format"))
+    return &formats[PLY];
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(heads); i++)
+    if (n == strlen(heads[i]) && !strncmp(begin, heads[i], n))
+      return &formats[OFF];
+  return named;
+}
+
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
 {
-  const SbTriangleFormat *format = SbTrianglesFormat(path);
+  const SbTriangleFormat *named = SbTrianglesFormat(path);
+  const SbTriangleFormat *format = format_of(path, named);
   SbImport *im = f->im;
   const SbItems *tri = &im->item[2];
   SbFaces faces = {0};
@@ -36,6 +71,9 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
 
   PetscFunctionBeginUser;
   f->path = path;
+  if (format != named)
+    SbAppend(sizeof(im->note), im->note, "%sread as a file of %s, which it is in spite of its name",
+             im->note[0] ? ", " : "", format->extension);
   f->sheets = (PetscBool)(format->read == SbTrianglesRead_Poly);
   if (format->read) {
     PetscCall(SbScanOpen(f->where, path, &im->scan));

@@ -125,8 +125,19 @@ check "-ksp_nothing is not reported" grep -qxF "supple: warning: nobody read the
 error 2 "-ksp_rtoll|-ksp_rtol" bar.opts -ksp_rtoll 1e-3
 error 1 "-pc_tpye|-pc_type" bar.opts -pc_tpye jacobi
 error 1 "-snes_monitr|-snes_monitor" bar.opts -snes_monitr
+# values with which PETSc's solvers fail, or crash, are named
+error 2 "-pc_type mg|-pc_mg_levels 3" bar.opts -output_dir opts_bad -pc_type mg -pc_mg_levels 3
+error 2 "-pc_bjacobi_blocks 1000000" bar.opts -output_dir opts_bad -pc_type bjacobi -pc_bjacobi_blocks 1000000
+error 1 "-pc_redundant_number 100" bar.opts -output_dir opts_bad -pc_type redundant -pc_redundant_number 100
+error 1 "-pc_factor_mat_ordering_type nothing" bar.opts -output_dir opts_bad -pc_type cholesky -pc_factor_mat_ordering_type nothing
+error 1 "-ksp_rtol abc" bar.opts -output_dir opts_bad -ksp_rtol abc
+error 1 "-snes_type" bar.opts -output_dir opts_bad -snes_type fas
+error 2 "-snes_lag_jacobian 0" bar.opts -output_dir opts_bad -snes_lag_jacobian 0
+error 1 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -ksp_type fcg -ksp_fcg_mmax 0
+error 2 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -ksp_type fcg -ksp_fcg_mmax 0
 # as does what begins or ends like one of ours
 error 1 "-solver_type|-solver?" bar.opts -solver_type mumps
+error 1 "-solver hypre|did you mean cg_hypre" bar.opts -solver hypre
 error 2 "-history_every|-output_history_every" bar.opts -history_every 2
 
 # options that are right and of no use in this run are warned of by name, and the run goes on

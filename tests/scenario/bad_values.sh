@@ -134,6 +134,7 @@ $EndNodes\n$Elements\n2\n1 2 2 1 1 1 2 3\n2 4 2 2 1 1 2 3 4\n$EndElements\n' $na
   warns "group:$name|block" block.opts -body_block_mesh named.msh "${hold[@]}" -effects hold -effect_hold_on $name
 done
 warns "-probe_tip_at|0.9 m" block.opts -probes tip -probe_tip_at 1,0,0
+warns "-ledger_at|0.9 m" block.opts -ledger -ledger_quantity displacement -ledger_at 1,0,0
 
 # Lines longer than any buffer: they are read whole, and counted as one.
 long=$(head -c 300000 /dev/zero | tr '\0' x)

@@ -98,9 +98,18 @@ for response in ALL:
     ends = "-effect_meet_obstacle capsule:0,0,0.2,0.1,0,0.2,0.01 -effect_again_obstacle capsule:0.1,0,0.2,0,0,0.2,0.01 "
     code, text, _ = run("ends", floors + ends, response)
     check(f"ends {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text, text)
+    spheres = "-effect_meet_obstacle sphere:0,0,0.3,0.1 -effect_again_obstacle sphere:0,0,0.4,0.1 -effect_again_displacement 0;0;-0.1"
+    code, text, _ = run("spheres", floors + spheres, response)
+    check(f"spheres {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text, text)
+    slides = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_again_displacement t;0;0"
+    code, text, _ = run("slides", slides, response)
+    check(f"slides {response}", code == 1 and "effect_meet_obstacle" in text and "effect_again_obstacle" in text, text)
     other = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_again_displacement 0;0;-t"
     code, text, _ = run("other", other, response)
     check(f"other {response}", code == 0, text)
+    even = floors + floor.format("meet", 1) + floor.format("again", 1) + "-effect_again_displacement 0;0;-0.001*sin(64*pi*t/0.05)^2"
+    code, text, _ = run("even", even, response)
+    check(f"even {response}", code == 0, text)
 
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)

@@ -54,6 +54,16 @@ check "info: exit code $code on a full disk: $(cat err.txt)" test "$code $(grep 
 says " volume 6 m^3"
 ok info "$data/odd.msh"
 says " to know: unused vertices left out: 2, inverted tets turned: 1, parts that share no vertex: 2"
+# a tet of second order whose edge 1 2 goes through the others folds over itself: where, and that repair makes it straight
+# shellcheck disable=SC2016 # gmsh's own
+printf '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n10\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0.5 0.9 0.9\n6 0.5 0.5 0\n7 0 0.5 0
+8 0 0 0.5\n9 0 0.5 0.5\n10 0.5 0 0.5\n$EndNodes\n$Elements\n1\n7 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n' >fold.msh
+ok info fold.msh
+says "made straight: 1 (the first: tetrahedron 7 at (0.25, 0.25, 0.25) m)"
+ok repair fold.msh unfolded.msh
+says "made straight, the first tetrahedron 7"
+ok info unfolded.msh
+check "a repaired mesh folds" test "$(grep -c straight out.txt)" = 0
 refuses "$data/bad_twice.msh|1 and 3" info "$data/bad_twice.msh"
 says " tets 3"
 

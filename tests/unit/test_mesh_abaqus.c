@@ -257,6 +257,7 @@ static PetscErrorCode test_refused(void)
      "line 8|*ELCOPY with REFLECT"},
     {NODE TET "*IMPERFECTION, FILE=x\n", "line 8|*IMPERFECTION"},
     {NODE TET "*NMAP\n", "line 8|*NMAP"},
+    {NODE TET "*ADJUST, NODE SET=n, SURFACE=s\n", "line 8|*ADJUST"},
     {"*SYSTEM\n0,0,0,1,0,0\n" NODE TET, "line 1|*SYSTEM"},
     {"*SYSTEM\n0,0,0,1,0,0\n2,0,0\n" NODE TET, "line 1|*SYSTEM"},
     {NODE "*ELEMENT, TYPE=C3D8\n1,1,2,3,4,1,2,3,4\n*SURFACE, NAME=s\n1, S6\n", "hexahedra"},

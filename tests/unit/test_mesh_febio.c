@@ -60,10 +60,18 @@ static const struct {
                "<SolidDomain name=\"all\" mat=\"m\"/></MeshDomains></febio_spec>",
    {{3, "all", 2}, {0, "p", 3}, {3, "one", 1}},
    ""},
+  {SPEC("4.0\" units=\"mm-N-s") "<Mesh>" NODES
+                                "<Elements type=\"tet4\" name=\"all\"><elem id=\"1\">1,2,3,4"
+                                "</elem><elem id=\"2\">2,3,4,7</elem></Elements></Mesh>"
+                                "</febio_spec>\n",
+   {{3, "all", 2}},
+   "units of 0.001 m"},
 };
 
 /* What must be refused, and what the message says. */
 static const char *const bad[][2] = {
+  {SPEC("4.0") "<Mesh>" NODES "<Elements from=\"other.feb\"/></Mesh></febio_spec>",
+   "line 8|Elements|other.feb"},
   {SPEC("4.0") "<Mesh>" NODES "</Mesh></febio_spec>", "no tetrahedra"},
   {SPEC("4.0") "<Mesh>" NODES "<Elements type=\"hex8\" name=\"h\"><elem id=\"1\">1,2,3,4,7,1,2,3"
                "</elem></Elements></Mesh></febio_spec>",

@@ -26,6 +26,11 @@ static const struct {
   {BEGIN "8\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0 0 0\n6 1 0 0\n7 0 1 0\n8 0 0 -1\n$EndNodes\n"
          "$Elements\n2\n1 4 2 1 1 1 2 3 4\n2 4 2 1 1 5 6 7 8\n" END,
    1, 1, 2, "repair"},
+  /* a tet that is there twice, each with vertices of its own */
+  {BEGIN
+   "8\n1 0 0 1\n2 1 0 0\n3 0 1 0\n4 -1 -1 0\n5 0 0 1\n6 1 0 0\n7 0 1 0\n8 -1 -1 0\n$EndNodes\n"
+   "$Elements\n2\n1 4 2 1 1 1 2 3 4\n2 4 2 1 1 5 6 7 8\n" END,
+   4, 0, 2, "counts twice"},
   /* a gap of a thousandth; faces that meet at an edge */
   {BEGIN "8\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0 0 -.001\n6 1 0 -.001\n7 0 1 -.001\n8 0 0 -1\n"
          "$EndNodes\n$Elements\n2\n1 4 2 1 1 1 2 3 4\n2 4 2 1 1 5 6 7 8\n" END,

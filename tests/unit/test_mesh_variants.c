@@ -87,6 +87,9 @@ static const struct {
    "Tetrahedra\r1\r1 2 3 4 7\rEnd\r",
    3, "volume_7", ""},
   {"a.unv", UNODE UEND "made by hand\n\n" UTET UEND "and of no use\n", 3, "volume_2", ""},
+  {"a.unv",
+   "    -1\n   164\n 5mm (milli-newton)  2\n 1.0D+03 1. 1.\n 273.\n" UEND UNODE UEND UTET UEND, 3,
+   "volume_2", "units of 0.001 m"},
   {"a.unv", UNODE UEND UTET "2 136 1 1 7 2\n 1 2\n" UEND, 3, "volume_2",
    "elements of kind 136 (1)"},
   {"a.unv",
@@ -124,6 +127,18 @@ static const struct {
    "solid s\n" FACET("0 0 0", "0 1 0", "1 0 0") FACET("0 0 0", "1 0 0", "0 0 1")
      FACET("1 0 0", "0 1 0", "0 0 1") FACET("0 0 0", "0 0 1", "0 1 0") "endsolid\n",
    "s"},
+  // contents beat the ending
+  {"b.obj",
+   "solid s\n" FACET("0 0 0", "0 1 0", "1 0 0") FACET("0 0 0", "1 0 0", "0 0 1")
+     FACET("1 0 0", "0 1 0", "0 0 1") FACET("0 0 0", "0 0 1", "0 1 0") "endsolid\n",
+   "s"},
+  {"b.stl", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n", NULL},
+  {"b.off",
+   "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+   "element face 4\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 "
+   "1\n"
+   "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n",
+   NULL},
 };
 
 /* Files that would be read as something else, or of another kind. */

@@ -175,10 +175,51 @@ static PetscErrorCode test_quiet(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Spends so many seconds. */
+static void spend(double seconds)
+{
+  const double end = MPI_Wtime() + seconds;
+
+  while (MPI_Wtime() < end)
+    continue;
+}
+
+/* Phases are parts of the whole: also where one is within another, and where ranks are in different
+   ones. */
+static PetscErrorCode test_phases(void)
+{
+  TestScene scene;
+  SbPhases phases;
+  PetscReal sum = 0.;
+  PetscLogEvent setup;
+  const PetscLogEvent own = SbEvents[test_rank ? SB_EVENT_RESIDUAL : SB_EVENT_ENERGY];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    test_scene_open_in(dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1", &scene));
+  PetscCall(PetscLogEventGetId("PCSetUp", &setup));
+  PetscCall(PetscLogEventBegin(setup, 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], 0, 0, 0, 0));
+  spend(0.2);
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], 0, 0, 0, 0));
+  PetscCall(PetscLogEventEnd(setup, 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(own, 0, 0, 0, 0));
+  spend(0.2);
+  PetscCall(PetscLogEventEnd(own, 0, 0, 0, 0));
+  PetscCall(SbPhasesGet((SbOutput)scene.run->monitors.output, &phases));
+  for (int i = 0; i < SB_PHASE_COUNT; i++)
+    sum += phases.seconds[i];
+  SB_CHECK(sum <= phases.total * (1. + 1e-9), "phases of %g s in %g s", (double)sum,
+           (double)phases.total);
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(dir));
+  PetscCall(test_phases()); // first: events count from the start of the program
   PetscCall(test_report());
   PetscCall(test_elements());
   PetscCall(test_early_end());

@@ -108,6 +108,17 @@ def check(name, options, end, several, tolerance):
         compare(f"whole-{name}", folder, tolerance)
 
 
+def check_elsewhere():
+    """The first row of a history in another folder is the row of the checkpoint's step, with the forces of contact."""
+    checkpoint = next((OUT / "half-tool-projected").glob("checkpoint_*.h5"))
+    run(1, "elsewhere", TOOL.format(end=0.4) + f"projected -restart {checkpoint}")
+    (names, whole), (_, rows) = history("whole-tool-projected"), history("elsewhere")
+    force = names.index("tool_force_z")
+    there = next(row for row in whole if row[0] == rows[0][0])
+    if abs(rows[0][force] - there[force]) > 1e-6 * abs(there[force]) or not there[force]:
+        sys.exit(f"tool_force_z is {rows[0][force]} in the first row after a restart, and was {there[force]}")
+
+
 def check_damage():
     """Numbers of the state that were changed are noticed."""
     folder = OUT / "parts-damaged"
@@ -150,6 +161,7 @@ def main():
     check("pressed", PRESSED, 0.32, (1, 2), 1e-6)
     check("swing", SWING, 0.48, (1, 3), 1e-6)
     check_begun()
+    check_elsewhere()
     check_damage()
     print("contact is taken up as if not interrupted")
 

@@ -132,6 +132,24 @@ refuses("Exodus in a plane", exodus("flat", lambda f, _: f.__delitem__("coordz")
 refuses("Exodus, a side that is not there", exodus("side", set_of("side_ss1", [5])), "side_ss1", "side 5 of element 1")
 refuses("Exodus, an element that is not there", exodus("element", set_of("elem_ss1", [9])), "elem_ss1", "element 9")
 refuses("Exodus, a node that is not there", exodus("ns", set_of("node_ns1", [0])), "node_ns1", "node 0")
+
+
+def second(of: str, status: int | None):
+    """Change of a file that announces a second block or set, of which there is no array."""
+    def change(f, _):
+        f.pop(f"{of}_prop1", None)
+        f[f"{of}_prop1"] = [7, 8]
+        f.pop(f"{of}_names", None)
+        if status is not None:
+            f[f"{of}_status"] = [1, status]
+    return change
+
+
+for letters, array in (("eb", "connect2"), ("ss", "elem_ss2"), ("ns", "node_ns2")):
+    refuses(f"Exodus, no {array}", exodus(f"no_{array}", second(letters, 1)), array, "status")
+    reads(f"Exodus, empty {array}", exodus(f"empty_{array}", second(letters, 0)), r"volume +0.5 m\^3")
+    reads(f"Exodus, {array} without status", exodus(f"unknown_{array}", second(letters, None)), f"no array {array}")
+refuses("Exodus, no sides", exodus("sides", lambda f, _: f.__delitem__("side_ss1")), "side_ss1")
 refuses("Exodus, no coordinates", exodus("none", lambda f, _: [f.__delitem__("coord" + c) for c in "xyz"]), "no nodes")
 
 # ---------------------------------------------------------------- CGNS
