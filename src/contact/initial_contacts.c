@@ -280,6 +280,8 @@ PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, Pets
   PetscBool go_on = PETSC_TRUE;
 
   PetscFunctionBeginUser;
+  if (t == 0. && contacts->n)
+    PetscCall(SbContactSetCheckInside(contacts, t, U));
   if (!contacts->npotential)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalWrite(s, U, &u));
