@@ -363,6 +363,56 @@ static PetscErrorCode find_sunk_rims(Surfaces *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether prescribed vertices here stand in the obstacle, or on it, and edges and triangles beside
+   them may meet it: half-spaces and bowls have none. */
+static uint8_t has_sunk_supports(const Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  const PetscReal close = NEXT * b->contact.base.width;
+  uint8_t any = 0;
+
+  for (PetscInt v = 0; v < m->nbody_vertex && m->side == SB_SIDE_NONE; v++) {
+    PetscReal X[3], n[3];
+
+    SbPoseInvert(&b->contact.partner.pose[0], b->motion.x + 3 * v, X);
+    if (m->own[v] && m->driven[v] && SbObstacleDistance(b->contact.partner.obstacle, X, n) < close)
+      any = SB_OVERLAP_INSIDE;
+  }
+  return any;
+}
+
+/* What bodies overlap of a half-space, bowl, sphere or capsule: each point with its own
+   direction. */
+static PetscErrorCode add_points(const Surfaces *b, SbSpace s, SbInitialContacts *list)
+{
+  const SbContactOverlap *o = &b->separation.overlap;
+  SbInitialContacts mine = {0};
+  SbInitialContact *touch;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(o->n, sizeof(*mine.touch), &mine.size, &mine.touch));
+  for (PetscInt i = 0; i < o->n; i++) {
+    const SbPenetration *p = &o->point[i];
+    const PetscInt body = b->surface->part[p->v[0]];
+
+    touch = &mine.touch[mine.n++];
+    *touch =
+      (SbInitialContact){.body = {body, s->mesh->nbody}, .gap = -p->depth, .to = b->widths.w[body]};
+    for (int k = 0; k < 3; k++)
+      touch->n[k] = p->normal[k];
+  }
+  PetscCall(SbAllgatherv(s->comm, MPI_BYTE, mine.n * (PetscInt)sizeof(*touch), mine.touch, &n,
+                         &touch, NULL));
+  n /= (PetscInt)sizeof(*touch);
+  PetscCall(SbReserve(list->n + n, sizeof(*touch), &list->size, &list->touch));
+  PetscCall(PetscArraycpy(list->touch + list->n, touch, n));
+  list->n += n;
+  PetscCall(PetscFree(touch));
+  PetscCall(PetscFree(mine.touch));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool *all,
                                         SbInitialContacts *list)
 {
@@ -370,14 +420,19 @@ static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool 
   const SbContactOverlap *o = &b->separation.overlap;
 
   PetscFunctionBeginUser;
-  if (!b->separation.overlapping) { /* supports that part would sink again */
-    uint8_t sunk = mark_sunk_rims(b, NULL);
+  if (!b->separation.overlapping || b->contact.partner.obstacle) { /* supports would sink again */
+    uint8_t sunk = b->contact.partner.obstacle ? has_sunk_supports(b) : mark_sunk_rims(b, NULL);
 
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sunk, 1, MPI_UINT8_T, MPI_MAX, s->comm));
     *all = (PetscBool)(*all && !sunk);
+  }
+  if (!b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->surface->side != SB_SIDE_NONE || b->surface->radius > 0.) {
+    PetscCall(add_points(b, s, list));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  *all = (PetscBool)(*all && !b->contact.partner.obstacle && o->nway);
+  *all = (PetscBool)(*all && o->nway);
   for (PetscInt k = 0; k < o->nway; k++) {
     const PetscInt *part = o->way[k].part;
     SbInitialContact touch = {.body = {part[0], part[1]},

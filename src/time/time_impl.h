@@ -124,9 +124,10 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: load steps */
-/* Before them: bodies that overlap were shifted by S; supports bring them back, under contact of
-   the potential k. Collective. */
-PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k);
+/* Before them: bodies that touch or overlap were shifted by S, and supports bring them back; NULL:
+   only their surfaces were moved apart, or nothing was. What they have of strain energy in
+   equilibrium, beyond `strain`, J, is work of the contact c. Collective. */
+PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain);
 /* turn.c. The largest angle, rad, by which moving supports turn a set of nodes from the load factor
    `from` to `to`, and the effect that does. Collective. */
 PetscErrorCode SbRunSupportsTurn(SbRun run, PetscReal from, PetscReal to, PetscReal *angle,
