@@ -52,6 +52,7 @@
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
 #define SUMS 6      /* in the first record of a checkpoint */
 #define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
+#define MEAN 1.5    /* of the mean of several vertices' displacements, by which their node moves */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
@@ -470,13 +471,14 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
                      open */
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
   PetscReal *begin;         /* u at the beginning */
+  PetscReal *node;          /* node[4 i]: sum of displacements of node i, and their number */
   PetscReal far = 0.;       /* farthest that a node has moved since, m */
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   if (b->motion.begun || t != 0.)
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
-  PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
+  PetscCall(PetscMalloc2(3 * s->nnode_owned, &begin, 4 * s->nnode_owned, &node));
   PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
   most = FARTHEST * (b->contact.base.width + b->separation.sunk);
   for (int pass = 0; pass < PASSES && far < most; pass++) {
@@ -531,11 +533,25 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
     *moved = (PetscBool)(*moved || n);
     PetscCall(SbContactSurfaceSum(m, 4, push));
+
+    /* a node moves by the mean of the vertices that have it: of CR and DG these are many */
+    PetscCall(PetscArrayzero(node, 4 * s->nnode_owned));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
-        for (int i = 0; i < 3 && m->node[j] >= 0 && m->node[j] < s->nnode_owned; i++)
-          if (!(m->fixed[j] >> i & 1))
-            u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
+      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++) {
+        PetscReal *to = node + 4 * m->node[j];
+
+        if (m->node[j] < 0 || m->node[j] >= s->nnode_owned)
+          continue;
+        for (int i = 0; i < 3; i++)
+          to[i] += push[4 * v + i] / push[4 * v + 3];
+        to[3]++;
+      }
+    }
+    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++) {
+      const PetscReal number = node[4 * (k / 3) + 3];
+
+      if (number > 0. && !(s->fixed[k / 3] >> (k % 3) & 1))
+        u[k] += (number > 1. ? MEAN : 1.) * node[k + k / 3] / number;
     }
     PetscCall(PetscFree2(push, normal));
     if (!n)
@@ -545,7 +561,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, s->comm));
     PetscCall(SbSpaceUpdateGhosts(s, u));
   }
-  PetscCall(PetscFree(begin));
+  PetscCall(PetscFree2(begin, node));
   b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
