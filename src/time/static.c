@@ -30,7 +30,7 @@
   1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
 #define SHARE 0.01 /* of the volume, above which cells that turn far matter */
 #define CUTS 6     /* halvings of a load step for their sake, then it is accepted with a warning */
-#define PUSH_LEAST 1e-3 /* shortest step of pushing together, over a load step */
+#define PUSH_LEAST 1e-2 /* shortest step of pushing together, over a load step */
 #define EXCESS \
   0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
