@@ -157,7 +157,7 @@ struct _p_SbContact {
   PetscReal width;         /* the smallest gap below which surfaces repel, m */
   PetscReal work;          /* on the bodies in the last accepted step, this rank's, J */
   PetscReal given;         /* strain energy given by moving vertices apart when the run began, J:
-                              SbContactSetGive(); on rank 0, part of the work */
+                              SbContactGive(); on rank 0, part of the work */
   char unsettled[512];     /* why the solution of this step is none, in words; "": it is one */
 };
 
@@ -201,12 +201,17 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 
   Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
               moved apart rigidly, as far as potentials ask for it.
-  Shift     - then, in a static run: supported bodies that touch or overlap are moved apart rigidly,
-              by S, as if nothing held them, so that a solution can push them together again; k: the
-              first potential with such bodies, -1: nothing was moved.
+  Shift     - then, in a static run: supported bodies that touch or overlap each other or an
+  obstacle
+              are moved apart rigidly, by S, as if nothing held them, so that a solution can push
+              them together again; of: the first potential with such bodies, NULL: nothing was
+              moved.
+  FindPenetrated - the first contact of nodes with some inside its obstacle; NULL: there is none.
   Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved
-              apart; moved: some were. Give - by the start the bodies got this energy, J, of which
-              `counted` is in the work of its steps already.
+              apart; moved: some were.
+  Give      - by the start the bodies got this energy from a contact, J, of which `counted` is in
+  the
+              work of its steps already.
   Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
   BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
               unchanged until the step ends. speed: SbModelStepSpeed(), the scale of tolerances,
@@ -216,9 +221,11 @@ PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, Pets
 PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
                                 PetscBool *moved);
 PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U,
-                                 Vec S, PetscInt *k);
-void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy,
-                      PetscReal counted);
+                                 Vec S, SbContact *of);
+PetscErrorCode SbContactSetFindPenetrated(const SbContactSet *contacts, PetscReal t, Vec U,
+                                          SbContact *found);
+/* Not collective. */
+void SbContactGive(SbContact c, SbSpace space, PetscReal energy, PetscReal counted);
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts);
 PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
                                      PetscReal speed, Vec U0, Vec V0);

@@ -110,5 +110,9 @@ void SbPartnerAddForce(const SbPartner *partner, const SbPose *pose, const Petsc
    Collective. */
 PetscErrorCode SbContactSetCheckRestitution(SbContactSet *contacts, Vec U, PetscBool *again);
 
+/* inside.c: an error where a body is wholly inside an obstacle at t with the displacement U.
+   Collective. */
+PetscErrorCode SbContactSetCheckInside(const SbContactSet *contacts, PetscReal t, Vec U);
+
 /* repeated.c: an error where two contacts treat the same surfaces. Collective. */
 PetscErrorCode SbContactSetCheckRepeated(const SbContactSet *contacts);

@@ -120,14 +120,13 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
-/* Whether supports push both bodies of a contact together: each component that its normal has is
-   prescribed somewhere on them. */
-static PetscBool is_pushed(const SbInitialContact *t, PetscInt nbody, const uint8_t fixed[])
+/* Whether both sides of a contact are pushed together by supports: each component that its normal
+   has is prescribed somewhere on them. Of an obstacle all are. */
+static PetscBool is_pushed(const SbInitialContact *t, const uint8_t fixed[])
 {
   for (int k = 0; k < 2; k++)
     for (int c = 0; c < 3; c++)
-      if (t->body[k] >= nbody ||
-          (PetscAbsReal(t->n[c]) > MISSED && !(fixed[t->body[k]] & (1 << c))))
+      if (PetscAbsReal(t->n[c]) > MISSED && !(fixed[t->body[k]] & (1 << c)))
         return PETSC_FALSE;
   return PETSC_TRUE;
 }
@@ -137,7 +136,6 @@ static PetscBool is_pushed(const SbInitialContact *t, PetscInt nbody, const uint
 static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInitialContacts *mine,
                                   SbInitialContacts *all)
 {
-  const PetscInt nbody = s->mesh->nbody;
   SbInitialContact *touch;
   PetscInt n;
   PetscBool closed = PETSC_FALSE;
@@ -150,11 +148,11 @@ static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInit
     qsort(touch, (size_t)n, sizeof(*touch), by_value);
   for (PetscInt i = 0; i < n; i++) {
     touch[i].to = PetscMax(touch[i].to, touch[i].width);
-    closed = (PetscBool)(closed ||
-                         (is_pushed(&touch[i], nbody, fixed) && touch[i].gap < FREE * touch[i].to));
+    closed =
+      (PetscBool)(closed || (is_pushed(&touch[i], fixed) && touch[i].gap < FREE * touch[i].to));
   }
   for (PetscInt i = 0; i < n && closed; i++) {
-    if (!is_pushed(&touch[i], nbody, fixed))
+    if (!is_pushed(&touch[i], fixed))
       continue;
     PetscCall(SbReserve(all->n + 1, sizeof(*all->touch), &all->size, &all->touch));
     all->touch[all->n++] = touch[i];
@@ -191,10 +189,12 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
     PetscCall(PetscFree(mine.touch));
     *k = *k < 0 && all->n > n ? i : *k;
   }
+  if (all->n > before)
+    qsort(all->touch + before, (size_t)(all->n - before), sizeof(*all->touch), by_value);
   for (PetscInt i = before; i < all->n; i++) {
     SbInitialContact *touch = &all->touch[i];
 
-    directed = (PetscBool)(directed && is_pushed(touch, nbody, fixed));
+    directed = (PetscBool)(directed && is_pushed(touch, fixed));
     for (int c = 0; c < 3; c++)
       touch->gap -= touch->n[c] * (shift[3 * touch->body[0] + c] - shift[3 * touch->body[1] + c]);
   }
@@ -231,9 +231,10 @@ static PetscErrorCode find_supported(SbSpace s, uint8_t fixed[])
 }
 
 PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U,
-                                 Vec S, PetscInt *k)
+                                 Vec S, SbContact *of)
 {
   const SbSpace s = contacts->space;
+  PetscInt k = -1;
   SbInitialContacts list = {0};
   PetscReal *u, *shift;
   PetscScalar *way;
@@ -241,7 +242,6 @@ PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, Pets
   PetscBool apart = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  *k = -1;
   PetscCall(PetscCalloc2(3 * (s->mesh->nbody + 1), &shift, s->mesh->nbody + 1, &fixed));
   PetscCall(find_supported(s, fixed));
   PetscCall(SbSpaceGetLocalWrite(s, U, &u));
@@ -249,20 +249,21 @@ PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, Pets
   for (int round = 0; round < ROUNDS && !apart; round++) {
     const PetscInt n = list.n;
 
-    PetscCall(shift_once(contacts, t, dt, fixed, u, shift, &list, k, &apart));
+    PetscCall(shift_once(contacts, t, dt, fixed, u, shift, &list, &k, &apart));
     if (!apart && list.n == n)
       break;
   }
 
   /* where some stay in each other all stay, and springs have to part them */
   if (!apart)
-    *k = -1;
-  for (PetscInt i = 0; i < 3 * s->nnode && *k < 0; i++)
+    k = -1;
+  *of = k < 0 ? NULL : contacts->potential[k];
+  for (PetscInt i = 0; i < 3 * s->nnode && k < 0; i++)
     u[i] -= shift[3 * s->node_body[i / 3] + i % 3];
   PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
   PetscCall(VecGetArray(S, &way));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    way[i] = *k < 0 ? 0. : shift[3 * s->node_body[i / 3] + i % 3];
+    way[i] = k < 0 ? 0. : shift[3 * s->node_body[i / 3] + i % 3];
   PetscCall(VecRestoreArray(S, &way));
   PetscCall(PetscFree(list.touch));
   PetscCall(PetscFree2(shift, fixed));
@@ -280,6 +281,8 @@ PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, Pets
   PetscBool go_on = PETSC_TRUE;
 
   PetscFunctionBeginUser;
+  if (t == 0. && contacts->n)
+    PetscCall(SbContactSetCheckInside(contacts, t, U));
   if (!contacts->npotential)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalWrite(s, U, &u));
@@ -327,11 +330,35 @@ PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactSetGive(const SbContactSet *contacts, PetscInt k, PetscReal energy, PetscReal counted)
+PetscErrorCode SbContactSetFindPenetrated(const SbContactSet *contacts, PetscReal t, Vec U,
+                                          SbContact *found)
 {
-  const SbContact c = contacts->potential[k];
-  const PetscBool here = (PetscBool)!contacts->space->rank;
+  const SbSpace s = contacts->space;
+  SbStage stage = {.t = t, .shift_k = 1.};
+  PetscReal *gap, *normal;
+  PetscInt first = contacts->n;
 
-  c->work = here ? energy : 0.;
-  c->given = here ? energy - counted : 0.;
+  PetscFunctionBeginUser;
+  *found = NULL;
+  PetscCall(PetscCalloc2(s->nnode, &gap, 3 * s->nnode, &normal));
+  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
+  for (PetscInt k = 0; k < contacts->n && first == contacts->n; k++) {
+    if (!contacts->contact[k]->ops->start_active_set)
+      continue;
+    CONTACT_CALL(contacts->contact[k], gap, s, &stage, gap, normal);
+    for (PetscInt i = 0; i < s->nnode_owned; i++)
+      first = gap[i] < 0. ? k : first;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
+  PetscCall(PetscFree2(gap, normal));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPIU_INT, MPI_MIN, s->comm));
+  if (first < contacts->n)
+    *found = contacts->contact[first];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbContactGive(SbContact c, SbSpace s, PetscReal energy, PetscReal counted)
+{
+  c->work = s->rank ? 0. : energy;
+  c->given = s->rank ? 0. : energy - counted;
 }

@@ -528,6 +528,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   SbPose pose;
 
   PetscFunctionBeginUser;
+  c->contact.base.work = 0.; /* that of the start is counted */
   PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   PetscCall(warn_of_passing(c, space, stage->t, &pose, stage->u));
   PetscCall(warn_of_pull(c, space, stage->t));

@@ -52,6 +52,7 @@
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
 #define SUMS 6      /* in the first record of a checkpoint */
 #define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
+#define MEAN 1.5    /* of the mean of several vertices' displacements, by which their node moves */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
@@ -363,6 +364,56 @@ static PetscErrorCode find_sunk_rims(Surfaces *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether prescribed vertices here stand in the obstacle, or on it, and edges and triangles beside
+   them may meet it: half-spaces and bowls have none. */
+static uint8_t has_sunk_supports(const Surfaces *b)
+{
+  const SbContactSurface m = b->surface;
+  const PetscReal close = NEXT * b->contact.base.width;
+  uint8_t any = 0;
+
+  for (PetscInt v = 0; v < m->nbody_vertex && m->side == SB_SIDE_NONE; v++) {
+    PetscReal X[3], n[3];
+
+    SbPoseInvert(&b->contact.partner.pose[0], b->motion.x + 3 * v, X);
+    if (m->own[v] && m->driven[v] && SbObstacleDistance(b->contact.partner.obstacle, X, n) < close)
+      any = SB_OVERLAP_INSIDE;
+  }
+  return any;
+}
+
+/* What bodies overlap of a half-space, bowl, sphere or capsule: each point with its own
+   direction. */
+static PetscErrorCode add_points(const Surfaces *b, SbSpace s, SbInitialContacts *list)
+{
+  const SbContactOverlap *o = &b->separation.overlap;
+  SbInitialContacts mine = {0};
+  SbInitialContact *touch;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(o->n, sizeof(*mine.touch), &mine.size, &mine.touch));
+  for (PetscInt i = 0; i < o->n; i++) {
+    const SbPenetration *p = &o->point[i];
+    const PetscInt body = b->surface->part[p->v[0]];
+
+    touch = &mine.touch[mine.n++];
+    *touch =
+      (SbInitialContact){.body = {body, s->mesh->nbody}, .gap = -p->depth, .to = b->widths.w[body]};
+    for (int k = 0; k < 3; k++)
+      touch->n[k] = p->normal[k];
+  }
+  PetscCall(SbAllgatherv(s->comm, MPI_BYTE, mine.n * (PetscInt)sizeof(*touch), mine.touch, &n,
+                         &touch, NULL));
+  n /= (PetscInt)sizeof(*touch);
+  PetscCall(SbReserve(list->n + n, sizeof(*touch), &list->size, &list->touch));
+  PetscCall(PetscArraycpy(list->touch + list->n, touch, n));
+  list->n += n;
+  PetscCall(PetscFree(touch));
+  PetscCall(PetscFree(mine.touch));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool *all,
                                         SbInitialContacts *list)
 {
@@ -370,14 +421,19 @@ static PetscErrorCode overlaps_surfaces(SbContact contact, SbSpace s, PetscBool 
   const SbContactOverlap *o = &b->separation.overlap;
 
   PetscFunctionBeginUser;
-  if (!b->separation.overlapping) { /* supports that part would sink again */
-    uint8_t sunk = mark_sunk_rims(b, NULL);
+  if (!b->separation.overlapping || b->contact.partner.obstacle) { /* supports would sink again */
+    uint8_t sunk = b->contact.partner.obstacle ? has_sunk_supports(b) : mark_sunk_rims(b, NULL);
 
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sunk, 1, MPI_UINT8_T, MPI_MAX, s->comm));
     *all = (PetscBool)(*all && !sunk);
+  }
+  if (!b->separation.overlapping)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->surface->side != SB_SIDE_NONE || b->surface->radius > 0.) {
+    PetscCall(add_points(b, s, list));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  *all = (PetscBool)(*all && !b->contact.partner.obstacle && o->nway);
+  *all = (PetscBool)(*all && o->nway);
   for (PetscInt k = 0; k < o->nway; k++) {
     const PetscInt *part = o->way[k].part;
     SbInitialContact touch = {.body = {part[0], part[1]},
@@ -415,13 +471,14 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
                      open */
   PetscReal *normal, *push; /* push[4 v]: sum of displacements of vertex v, and their number */
   PetscReal *begin;         /* u at the beginning */
+  PetscReal *node;          /* node[4 i]: sum of displacements of node i, and their number */
   PetscReal far = 0.;       /* farthest that a node has moved since, m */
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   if (b->motion.begun || t != 0.)
     PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
-  PetscCall(PetscMalloc1(3 * s->nnode_owned, &begin));
+  PetscCall(PetscMalloc2(3 * s->nnode_owned, &begin, 4 * s->nnode_owned, &node));
   PetscCall(PetscArraycpy(begin, u, 3 * s->nnode_owned));
   most = FARTHEST * (b->contact.base.width + b->separation.sunk);
   for (int pass = 0; pass < PASSES && far < most; pass++) {
@@ -476,11 +533,25 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
     *moved = (PetscBool)(*moved || n);
     PetscCall(SbContactSurfaceSum(m, 4, push));
+
+    /* a node moves by the mean of the vertices that have it: of CR and DG these are many */
+    PetscCall(PetscArrayzero(node, 4 * s->nnode_owned));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++)
-        for (int i = 0; i < 3 && m->node[j] >= 0 && m->node[j] < s->nnode_owned; i++)
-          if (!(m->fixed[j] >> i & 1))
-            u[3 * m->node[j] + i] += push[4 * v + i] / push[4 * v + 3];
+      for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++) {
+        PetscReal *to = node + 4 * m->node[j];
+
+        if (m->node[j] < 0 || m->node[j] >= s->nnode_owned)
+          continue;
+        for (int i = 0; i < 3; i++)
+          to[i] += push[4 * v + i] / push[4 * v + 3];
+        to[3]++;
+      }
+    }
+    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++) {
+      const PetscReal number = node[4 * (k / 3) + 3];
+
+      if (number > 0. && !(s->fixed[k / 3] >> (k % 3) & 1))
+        u[k] += (number > 1. ? MEAN : 1.) * node[k + k / 3] / number;
     }
     PetscCall(PetscFree2(push, normal));
     if (!n)
@@ -490,7 +561,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, s->comm));
     PetscCall(SbSpaceUpdateGhosts(s, u));
   }
-  PetscCall(PetscFree(begin));
+  PetscCall(PetscFree2(begin, node));
   b->motion.known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

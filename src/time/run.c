@@ -285,38 +285,43 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
 }
 
 /* Bodies that touch when the run begins are moved apart; the energy that this gives them is work of
-   the contact. */
+   the contact: what they begin with, in a static run what they have in equilibrium, when their
+   supports are back. */
 static PetscErrorCode start_contacts(SbRun run)
 {
   const SbModel m = run->model;
   const PetscReal t = run->clock.t0;
-  PetscInt shifted = -1;
-  Vec shift = NULL;
+  SbContact first = NULL; /* that has something to resolve */
+  PetscBool shifted;
+  SbEnergies energies = {0};
+  PetscReal start, now;
+  Vec shift;
 
   PetscFunctionBeginUser;
+  if (!m->contacts.n)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbContactSetStart(&m->contacts, t, run->clock.dt, run->state.U));
-  if (!m->dynamic && m->contacts.npotential) {
-    PetscCall(VecDuplicate(run->state.U, &shift));
-    PetscCall(SbContactSetShift(&m->contacts, t, run->clock.dt, run->state.U, shift, &shifted));
-  }
+  PetscCall(VecDuplicate(run->state.U, &shift));
+  if (!m->dynamic && m->contacts.npotential)
+    PetscCall(SbContactSetShift(&m->contacts, t, run->clock.dt, run->state.U, shift, &first));
+  shifted = (PetscBool)(first != NULL);
+  PetscCall(SbModelEnergies(m, run->state.U, run->state.V, &energies));
+  start = now = energies.strain;
   for (PetscInt k = 0; k < m->contacts.npotential; k++) {
-    SbEnergies before = {0};
-    SbEnergies after = {0};
     PetscBool moved;
-    Vec old;
 
-    PetscCall(VecDuplicate(run->state.U, &old));
-    PetscCall(VecCopy(run->state.U, old));
     PetscCall(SbContactSetPart(&m->contacts, k, t, run->state.U, &moved));
-    if (moved) {
-      PetscCall(SbModelEnergies(m, old, run->state.V, &before));
-      PetscCall(SbModelEnergies(m, run->state.U, run->state.V, &after));
-      SbContactSetGive(&m->contacts, k, after.strain - before.strain, 0.);
-    }
-    PetscCall(VecDestroy(&old));
+    if (!moved)
+      continue;
+    PetscCall(SbModelEnergies(m, run->state.U, run->state.V, &energies));
+    SbContactGive(m->contacts.potential[k], m->space, energies.strain - now, 0.);
+    now = energies.strain;
+    first = first ? first : m->contacts.potential[k];
   }
-  if (shifted >= 0)
-    PetscCall(SbStaticPush(run, shift, shifted));
+  if (!first && !m->dynamic && t == 0.)
+    PetscCall(SbContactSetFindPenetrated(&m->contacts, t, run->state.U, &first));
+  if (!m->dynamic && first)
+    PetscCall(SbStaticPush(run, shifted ? shift : NULL, first, start));
   PetscCall(VecDestroy(&shift));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,7 +5,8 @@
   again.
 
   Bodies that overlap when the run begins are moved apart, rigidly and with their supports, without
-  load; these go back in as many steps, and push the bodies together (SbStaticPush()).
+  load; these go back in as many steps, and push the bodies together (SbStaticPush()). Where only
+  their surfaces could be moved apart, they come into equilibrium without load.
 
   With -static_adapt a step without contact that converges slowly is given up early and halved, at
   most EARLY times in a row: beyond a limit load the energy has to be searched.
@@ -29,7 +30,7 @@
   1e-3 /* cosine of the angle between forces and a free motion above which forces drive it */
 #define SHARE 0.01 /* of the volume, above which cells that turn far matter */
 #define CUTS 6     /* halvings of a load step for their sake, then it is accepted with a warning */
-#define PUSH_LEAST 1e-3 /* shortest step of pushing together, over a load step */
+#define PUSH_LEAST 1e-2 /* shortest step of pushing together, over a load step */
 #define EXCESS \
   0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
@@ -104,6 +105,18 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The step failed as nothing (`but`: but its loads) holds a body against a motion. */
+static PetscErrorCode report_free(const LoadStep *l, const char *but, PetscInt body,
+                                  const char motion[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRunFail(
+    l->run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
+    (double)l->factor, but, l->run->model->body[body].name, motion,
+    l->contact ? ", or let it come to rest in a dynamic run" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Searches for an unsupported body, before a step is solved or after it was tried; *found:
    run->clock.stop_reason describes it. */
 static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved,
@@ -147,10 +160,7 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
   }
   *found = (PetscBool)(body >= 0);
   if (*found)
-    PetscCall(SbRunFail(
-      run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
-      (double)l->factor, loads, run->model->body[body].name, motion,
-      l->contact ? ", or let it come to rest in a dynamic run" : ""));
+    PetscCall(report_free(l, loads, body, motion));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,36 +204,47 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   }
 
   /* with balanced loads a singular system has solutions, up to any rigid motion */
-  if (*ok && !l->run->counters.steps && !l->contact && l->run->counters.newton_step) {
+  if (*ok && !l->contact && !l->run->counters.steps && l->run->counters.newton_step) {
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
+  }
+  if (*ok && l->contact && l->run->counters.newton_step) {
+    PetscInt body;
+    char motion[256];
+
+    PetscCall(SbRunLostBody(l->run, l->X, &body, sizeof(motion), motion));
+    *ok = (PetscBool)(body < 0);
+    if (body >= 0)
+      PetscCall(report_free(l, "", body, motion));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k)
+PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
 {
   const SbModel m = run->model;
   const PetscReal nominal = 1. / (PetscReal)run->clock.static_steps;
   const PetscReal least = PUSH_LEAST * nominal;
   PetscReal part = 1.;
-  PetscReal length = nominal;
-  PetscReal work = 0.;
-  SbEnergies before = {0};
+  PetscReal length = 1.; /* what only touches comes back in one step */
+  PetscReal work = 0.;   /* of all contacts */
+  PetscReal way = 0.;
   SbEnergies after = {0};
   Vec X;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->state.U, &X));
   m->load = run->clock.t0;
-  PetscCall(SbModelEnergies(m, run->state.U, NULL, &before));
+  if (S)
+    PetscCall(VecNorm(S, NORM_INFINITY, &way));
+  if (way > 2. * c->width)
+    length = nominal;
   while (part > 0.) {
     const PetscReal next = part - length < 1e-9 ? 0. : part - length;
     LoadStep load = {.run = run, .X = X, .contact = PETSC_TRUE, .shift = S, .part = next};
     const SbSolvedStep end = {0., 0., run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     SbStage stage = {.shift_k = 1.};
-    PetscReal sum;
     PetscBool ok;
 
     PetscCall(SbRunAttempt(run, &attempt, &ok));
@@ -232,7 +253,7 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k)
 
       length *= 0.5;
       run->solve.tangent_known = PETSC_FALSE;
-      if (run->clock.stopped)
+      if (run->clock.stopped || !S)
         break;
       if (length >= least)
         continue;
@@ -242,7 +263,7 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k)
         "The effect %s: bodies that overlap when the run begins were moved apart, and could be "
         "pushed together by their supports up to %.2g of the way: %s. Move them apart in the "
         "meshes, or by -body_NAME_translate",
-        m->contacts.potential[k]->effect->name, 1. - (double)part, why);
+        c->effect->name, 1. - (double)part, why);
     }
     run->clock.stop_reason[0] = 0;
     PetscCall(VecCopy(X, run->state.U));
@@ -250,15 +271,22 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k)
     for (PetscInt e = 0; e < m->naccept; e++)
       SbEffectCall(m->accept[e], accept, m->space, &stage);
     PetscCall(SbSpaceRestoreLocalRead(m->space, run->state.U, &stage.u));
-    sum = m->contacts.potential[k]->work;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, m->comm));
-    work += sum;
+    for (PetscInt i = 0; i < m->contacts.npotential; i++)
+      work += m->contacts.potential[i]->work;
     part = next;
     length = PetscMin(2. * length, nominal);
   }
-  PetscCall(SbModelEnergies(m, run->state.U, NULL, &after));
-  SbContactSetGive(&m->contacts, k, after.strain - before.strain, work);
   PetscCall(VecDestroy(&X));
+  if (part > 0.) { /* stopped, or nothing was away and it takes loads to hold the bodies */
+    if (!run->clock.stopped)
+      run->clock.stop_reason[0] = 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &work, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(SbModelEnergies(m, run->state.U, NULL, &after));
+  for (PetscInt i = 0; i < m->contacts.npotential; i++)
+    SbContactGive(m->contacts.potential[i], m->space, 0., 0.);
+  SbContactGive(c, m->space, after.strain - strain, work);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

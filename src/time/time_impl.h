@@ -124,9 +124,10 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: load steps */
-/* Before them: bodies that overlap were shifted by S; supports bring them back, under contact of
-   the potential k. Collective. */
-PetscErrorCode SbStaticPush(SbRun run, Vec S, PetscInt k);
+/* Before them: bodies that touch or overlap were shifted by S, and supports bring them back; NULL:
+   only their surfaces were moved apart, or nothing was. What they have of strain energy in
+   equilibrium, beyond `strain`, J, is work of the contact c. Collective. */
+PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain);
 /* turn.c. The largest angle, rad, by which moving supports turn a set of nodes from the load factor
    `from` to `to`, and the effect that does. Collective. */
 PetscErrorCode SbRunSupportsTurn(SbRun run, PetscReal from, PetscReal to, PetscReal *angle,
@@ -148,6 +149,9 @@ PetscErrorCode SbArcLengthSolve(SbRun run);
 /* rigid_modes.c, after a static solve: a body with a free rigid motion, -1: none; motion: in words;
    along: as displacements, not normalised (may be NULL). Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
+/* The same of a solution X with contact: a body that is far from where it was, along motions that
+   nothing resists. Collective. */
+PetscErrorCode SbRunLostBody(SbRun run, Vec X, PetscInt *body, size_t size, char motion[]);
 /* Whether displacements X exceed the bodies' size by far: the matrix must have been singular.
    Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);

@@ -28,7 +28,7 @@ cat >bodies.opts <<'END'
 -time static
 -output_fields none
 END
-floor="-effect_meet_type contact -effect_meet_response projected -effect_meet_on under -effect_meet_obstacle plane:0,0,1,0.0505"
+floor="-effect_meet_type contact -effect_meet_response projected -effect_meet_on b.zmin -effect_meet_obstacle plane:0,0,1,0.0505"
 slides="body b|(1.00, 0.00, 0.00)"
 
 solvers="auto direct"

@@ -102,5 +102,16 @@ for i, (depth, hold, cells, ranks, extra) in enumerate(CASES):
     passed, failed = passed + (not bad), failed + bool(bad)
     if bad:
         print(f"FAILED: {depth} deep, held: {hold}, cells {cells}, {ranks} ranks {extra}: {'; '.join(bad)}")
+
+# A plate whose surface vertices are means over nodes of both its sides, between two held blocks: its start makes no overlap.
+for other in ("p1", "cr"):
+    for depth in (0.0, 1e-5, -1e-5):
+        done, rows = run("plate", depth, "both", "2 1", 1, f"-bodies a,b,c -body_c_mesh box:0.1,0.1,0.1:2 -body_c_translate {SIZE + 0.02 - 2 * depth:.17g},0,0 "
+                         f"-body_b_mesh box:0.02,0.1,0.1:1 -body_default_element {other} -body_b_element cr -effect_h_on a.xmin,c.xmax -ts_max_time 0.02 {VERIFY}")
+        most = max((row["meet_work"] for row in rows), default=0.0)
+        good = done.returncode == 0 and not done.stderr and not any(row["meet_unguarded"] for row in rows) and 0 < most < 0.35  # 0.11 to 0.29 J; 0.39 to 1.5 J where nodes moved by the sum
+        passed, failed = passed + good, failed + (not good)
+        if not good:
+            print(f"FAILED: plate of cr between blocks of {other}, {depth} m deep: {done.returncode}, {most} J, {done.stderr[-300:]}")
 print(f"{passed} passed, {failed} failed")
 sys.exit(failed > 0)

@@ -48,16 +48,23 @@ for i, (depth, cells, ranks, extra) in enumerate(CASES):
     if bad:
         print(f"FAILED: {depth} m deep, cells {cells}, {ranks} ranks {extra}: {'; '.join(bad)}")
 
-# Rims of blocks on one clamped base, in each other by rounding and more, are no overlap.
-for depth in (1e-9, 1e-5):
-    done, rows = run(f"rims{depth}", depth, 0.0, "2 3", 1, "-effect_left_on a.zmin -effect_right_on b.zmin")
+# Rims of blocks on one clamped base, in each other by rounding and more, are no overlap; what is between held blocks, sticking, cannot be moved apart. Their
+# surfaces are, come into equilibrium without load, and have the strain energy as work.
+BASE = "-effect_left_on a.zmin -effect_right_on b.zmin"
+BETWEEN = ("-bodies a,b,c -body_c_mesh box:0.1,0.1,0.1:2 -body_c_translate 0,0,0 -body_a_translate {0:.17g},0,0 -body_b_translate {1:.17g},0,0 "
+           "-effect_left_on c.xmin -effect_meet_friction 0.3")
+CASES = [(f"rims {response}", depth, BASE + f" -effect_meet_response {response}") for response in ("barrier", "penalty") for depth in (1e-9, 1e-5)]
+CASES += [("between", depth, BETWEEN.format(SIZE - depth, 2 * (SIZE - depth))) for depth in (0.0, 1e-5)]
+for name, depth, extra in CASES:
+    done, rows = run(f"{name.split()[0]}{depth}", depth, 0.0, "2 3", 1, extra)
     good = done.returncode == 0 and 0 < rows[-1]["strain"] < 0.1 and not rows[-1]["meet_unguarded"]
+    good = good and all(abs(row["strain"] - row["meet_work"]) + abs(row["integrator_loss"]) < 1e-6 * row["strain"] for row in rows)
     passed, failed = passed + good, failed + (not good)
     if not good:
-        print(f"FAILED: rims {depth} m deep: exit code {done.returncode}: {done.stderr[-300:]}")
+        print(f"FAILED: {name} {depth} m deep: exit code {done.returncode}: {done.stderr[-300:]} {rows}")
 
-done, _ = run("base", 0.1 * SIZE, 0.0, "2 1", 1, "-effect_left_on a.zmin -effect_right_on b.zmin")
-good = done.returncode != 0 and "overlap" in done.stderr and "-body_NAME_translate" in done.stderr and "PETSC ERROR" not in done.stderr
+done, _ = run("base", 0.1 * SIZE, 0.0, "2 1", 1, BASE)
+good = done.returncode == 1 and "error: The effect meet" in done.stderr and "-body_NAME_translate" in done.stderr
 passed, failed = passed + good, failed + (not good)
 if not good:
     print(f"FAILED: on one base: {done.returncode}, {done.stderr[-600:]}")
