@@ -260,8 +260,10 @@ PetscErrorCode SbErrorCatchCrashes(void)
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-no_signal_handler", &none));
-  if (!none)
-    PetscCall(PetscPushSignalHandler(crashed, NULL));
+  if (none)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscPushSignalHandler(crashed, NULL));
+  PetscCall(PetscRegisterFinalize(PetscPopSignalHandler));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
