@@ -21,9 +21,7 @@
 
 #define ALLOWED 1e-13 /* largest l of an admissible motion: rounding */
 #define FREE 1e-13    /* largest l of a free motion: sums over the nodes have rounding of 1e-15 */
-#define DRIFT 0.02    /* motion of a part along free motions over its size, if it is lost */
-#define SIZE 0.2 /* least of that size over the body's diagonal: of solid ones, 0.29 and more */
-#define FAR 1e6  /* displacement over the body's size beyond which a static system was singular */
+#define FAR 1e6 /* displacement over the body's size beyond which a static system was singular */
 
 /* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees
    it. */
@@ -156,9 +154,9 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* C: rows of contact between bodies at the displacement X, NULL without it. Collective; the
+/* C: rows of contact between bodies at the state of the run, NULL without it. Collective; the
    caller destroys it. */
-static PetscErrorCode find_rows(SbRun run, Vec X, Mat *C)
+static PetscErrorCode find_rows(SbRun run, Mat *C)
 {
   const SbModel m = run->model;
   SbConstraintRows rows = {0};
@@ -168,7 +166,7 @@ static PetscErrorCode find_rows(SbRun run, Vec X, Mat *C)
   *C = NULL;
   if (!m->contacts.npotential)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactSetHolding(&m->contacts, X, &rows));
+  PetscCall(SbContactSetHolding(&m->contacts, run->state.U, &rows));
   PetscCall(SbConstraintRowsReserve(&rows, 1, 0));
   PetscCall(PetscMalloc1(rows.n, &length));
   PetscCall(SbConstraintRowsMatrix(&rows, m->comm, 3 * m->space->nnode_owned, length, C));
@@ -225,38 +223,9 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Mat C, Vec lost[6], Vec z[6]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest displacement of a node in the part of `moved` that is in the span of n motions y;
-   columns of E: their combinations that are orthonormal by the diagonal d. */
-static PetscErrorCode find_drift(PetscInt n, const Vec y[], PetscInt nfree, const PetscReal E[36],
-                                 Vec d, Vec moved, PetscReal *drift)
-{
-  PetscReal product[6];
-  PetscReal share[6] = {0.};
-  Vec w;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(d, &w));
-  PetscCall(VecPointwiseMult(w, d, moved));
-  PetscCall(VecMDot(w, n, y, product));
-  for (PetscInt j = 0; j < nfree; j++) {
-    PetscReal along = 0.;
-
-    for (PetscInt i = 0; i < n; i++)
-      along += E[6 * j + i] * product[i];
-    for (PetscInt i = 0; i < n; i++)
-      share[i] += E[6 * j + i] * along;
-  }
-  PetscCall(VecZeroEntries(w));
-  PetscCall(VecMAXPY(w, n, share, (Vec *)y));
-  PetscCall(VecNorm(w, NORM_INFINITY, drift));
-  PetscCall(VecDestroy(&w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Finds the free motions of a part, of one that `moved` takes far along them (NULL: of any); along:
-   displacements of one of them (may be NULL). */
-static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Mat C, Vec moved,
-                              Part *part, Vec along)
+/* Finds the free motions of a part; along: displacements of one of them (may be NULL). */
+static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Mat C, Part *part,
+                              Vec along)
 {
   const SbSpace s = run->model->space;
   const PetscScalar *u;
@@ -331,15 +300,6 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Mat C, V
     PetscCall(eigen(n, E, M, value, &ok));
     while (ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE)
       part->nfree++;
-    if (part->nfree && moved) {
-      PetscReal drift;
-
-      PetscCall(find_drift(n, y, part->nfree, E, d, moved, &drift));
-      PetscCall(
-        PetscInfo(NULL, "it moved by %g of its size along them\n", (double)(drift / part->size)));
-      if (drift < DRIFT * part->size)
-        part->nfree = 0;
-    }
     PetscCall(PetscInfo(
       NULL, "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
       run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
@@ -429,10 +389,7 @@ static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first body with a free motion at X, as SbRunFreeBody() and, with `moved`, SbRunLostBody()
-   say. */
-static PetscErrorCode find_free(SbRun run, Vec X, Vec moved, PetscInt *body, size_t size,
-                                char motion[], Vec along)
+PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
 {
   const SbSpace s = run->model->space;
   PetscInt *label, *own, *list;
@@ -454,7 +411,7 @@ static PetscErrorCode find_free(SbRun run, Vec X, Vec moved, PetscInt *body, siz
   PetscCall(SbSpaceCreateVec(s, &d));
   PetscCall(MatGetDiagonal(run->solve.J, d));
   PetscCall(VecAbs(d));
-  PetscCall(find_rows(run, X, &C));
+  PetscCall(find_rows(run, &C));
   PetscCall(label_parts(s, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
@@ -464,7 +421,7 @@ static PetscErrorCode find_free(SbRun run, Vec X, Vec moved, PetscInt *body, siz
   PetscCall(PetscSortInt(npart, list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
     part.label = list[k];
-    PetscCall(examine(run, label, d, C, moved, &part, along));
+    PetscCall(examine(run, label, d, C, &part, along));
     if (part.nfree)
       *body = part.body;
   }
@@ -484,33 +441,6 @@ static PetscErrorCode find_free(SbRun run, Vec X, Vec moved, PetscInt *body, siz
   PetscCall(PetscFree(list));
   PetscCall(MatDestroy(&C));
   PetscCall(VecDestroy(&d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunLostBody(SbRun run, Vec X, PetscInt *body, size_t size, char motion[])
-{
-  const SbMesh mesh = run->model->space->mesh;
-  PetscReal most;
-  PetscReal least = PETSC_MAX_REAL; /* diagonal of the smallest body */
-  Vec moved;
-
-  PetscFunctionBeginUser;
-  *body = -1;
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    least = PetscMin(least, PetscSqrtReal(SbDistance2(mesh->body[b].bbox, mesh->body[b].bbox + 3)));
-  PetscCall(VecDuplicate(X, &moved));
-  PetscCall(VecWAXPY(moved, -1., run->state.U, X));
-  PetscCall(VecNorm(moved, NORM_INFINITY, &most));
-  if (most > SIZE * DRIFT * least)
-    PetscCall(find_free(run, X, moved, body, size, motion, NULL));
-  PetscCall(VecDestroy(&moved));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
-{
-  PetscFunctionBeginUser;
-  PetscCall(find_free(run, run->state.U, NULL, body, size, motion, along));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

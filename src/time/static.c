@@ -208,15 +208,6 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
   }
-  if (*ok && l->contact && l->run->counters.newton_step) {
-    PetscInt body;
-    char motion[256];
-
-    PetscCall(SbRunLostBody(l->run, l->X, &body, sizeof(motion), motion));
-    *ok = (PetscBool)(body < 0);
-    if (body >= 0)
-      PetscCall(report_free(l, "", body, motion));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

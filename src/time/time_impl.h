@@ -149,9 +149,6 @@ PetscErrorCode SbArcLengthSolve(SbRun run);
 /* rigid_modes.c, after a static solve: a body with a free rigid motion, -1: none; motion: in words;
    along: as displacements, not normalised (may be NULL). Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
-/* The same of a solution X with contact: a body that is far from where it was, along motions that
-   nothing resists. Collective. */
-PetscErrorCode SbRunLostBody(SbRun run, Vec X, PetscInt *body, size_t size, char motion[]);
 /* Whether displacements X exceed the bodies' size by far: the matrix must have been singular.
    Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
