@@ -52,7 +52,7 @@
           to 1e-6 with 0.1 and 0.01, to 4e-4 with 0.001 */
 #define SUMS 6      /* in the first record of a checkpoint */
 #define FARTHEST 2. /* of the width and the depth: largest displacement of a node by that */
-#define MEAN 1.5    /* of the mean of several vertices' displacements, by which their node moves */
+#define MEAN 1.5    /* in time, of the mean of several vertices' displacements, for their node */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
@@ -473,6 +473,7 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
   PetscReal *begin;         /* u at the beginning */
   PetscReal *node;          /* node[4 i]: sum of displacements of node i, and their number */
   PetscReal far = 0.;       /* farthest that a node has moved since, m */
+  const PetscReal beyond = b->contact.base.effect->dynamic ? MEAN : 1.;
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
@@ -538,20 +539,20 @@ static PetscErrorCode part_surfaces(SbContact contact, SbSpace s, PetscReal t, P
     PetscCall(PetscArrayzero(node, 4 * s->nnode_owned));
     for (PetscInt v = 0; v < m->nbody_vertex; v++) {
       for (PetscInt j = m->start[v]; push[4 * v + 3] > 0. && j < m->start[v + 1]; j++) {
-        PetscReal *to = node + 4 * m->node[j];
+        const PetscInt to = 4 * m->node[j];
 
-        if (m->node[j] < 0 || m->node[j] >= s->nnode_owned)
+        if (to < 0 || to >= 4 * s->nnode_owned)
           continue;
         for (int i = 0; i < 3; i++)
-          to[i] += push[4 * v + i] / push[4 * v + 3];
-        to[3]++;
+          node[to + i] += push[4 * v + i] / push[4 * v + 3];
+        node[to + 3]++;
       }
     }
     for (PetscInt k = 0; k < 3 * s->nnode_owned; k++) {
       const PetscReal number = node[4 * (k / 3) + 3];
 
       if (number > 0. && !(s->fixed[k / 3] >> (k % 3) & 1))
-        u[k] += (number > 1. ? MEAN : 1.) * node[k + k / 3] / number;
+        u[k] += (number > 1. ? beyond : 1.) * node[k + k / 3] / number;
     }
     PetscCall(PetscFree2(push, normal));
     if (!n)

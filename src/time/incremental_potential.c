@@ -327,14 +327,31 @@ SbContactSystem SbPotentialContactSystem(SbPotential q)
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved)
 {
   const SbPotential q = run->solve.potential;
+  PetscInt fresh = 0;
   KSPConvergedReason reason;
+  Vec U, F, rhs;
 
   PetscFunctionBeginUser;
+
+  /* Newton's method had nothing to do in this step: its barriers are those at its start */
+  if (!q->nblock && q->problem.barrier) {
+    PetscCall(SNESGetSolution(run->solve.snes, &U));
+    PetscCall(VecDuplicate(U, &F));
+    PetscCall(VecDuplicate(U, &rhs));
+    PetscCall(VecZeroEntries(F));
+    PetscCall(hessian(q, U, F, SB_HESSIAN_PROJECTED, rhs, &fresh));
+    if (fresh)
+      PetscCall(SNESComputeJacobian(run->solve.snes, U, run->solve.system, run->solve.J));
+    PetscCall(VecDestroy(&F));
+    PetscCall(VecDestroy(&rhs));
+  }
   *solved = (PetscBool)(q->nblock > 0);
   if (!*solved)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactSystemSolve(q->system, run->solve.J, &q->blocks, PETSC_FALSE, B, X, &reason,
-                                 iterations));
+  if (!q->system)
+    PetscCall(SbContactSystemCreate(run->model->space, run->solve.contact_choice, &q->system));
+  PetscCall(SbContactSystemSolve(q->system, run->solve.J, &q->blocks, (PetscBool)(fresh > 0), B, X,
+                                 &reason, iterations));
   if (reason < 0)
     PetscCall(VecZeroEntries(X));
   PetscFunctionReturn(PETSC_SUCCESS);

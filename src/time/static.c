@@ -268,6 +268,7 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
     length = PetscMin(2. * length, nominal);
   }
   PetscCall(VecDestroy(&X));
+  run->solve.tangent_known = PETSC_FALSE; /* that of the last push, not of its end */
   if (part > 0.) { /* stopped, or nothing was away and it takes loads to hold the bodies */
     if (!run->clock.stopped)
       run->clock.stop_reason[0] = 0;

@@ -199,8 +199,9 @@ static PetscErrorCode check_stiff_friction(void)
         text, sizeof(text),
         "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_translate -0.05,-0.05,0.005 "
         "-body_a_material corotated -body_a_poisson 0.4 -effects gravity,c -effect_c_type contact "
-        "-effect_c_obstacle plane:0,0,1,0 -effect_c_friction 0.5 -ts_dt 0.02 -ts_max_time 0.06 %s "
-        "-solver %s",
+        "-effect_c_response projected -effect_c_obstacle plane:0,0,1,0 -effect_c_friction 0.5 "
+        "-ts_dt "
+        "0.02 -ts_max_time 0.06 %s -solver %s",
         bodies[b], solvers[k]));
       PetscCall(run(text, "", &o));
       SB_CHECK(!o.stop[0], "%s: %s", text, o.stop);

@@ -21,7 +21,8 @@
 #define FLOOR                                                                           \
   "-bodies a -body_a_mesh box:0.2,0.15,0.1:4,3,2 -body_a_translate 0,0,0.002" STUFF(    \
     a) "-body_a_velocity 0.5,0,-0.3 -effects weight,floor -effect_weight_type gravity " \
-       "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 -ts_dt 0.005 "
+       "-effect_floor_type contact -effect_floor_response projected "                   \
+       "-effect_floor_obstacle plane:0,0,1,0 -ts_dt 0.005 "
 #define PAIR                                                                                       \
   "-bodies a,b -body_a_mesh box:0.2,0.2,0.2:3,3,3 -body_b_mesh box:0.2,0.2,0.2:4,4,4 "             \
   "-body_b_translate 0.202,0.03,0.02" STUFF(a) STUFF(                                              \
