@@ -72,7 +72,7 @@ for n, element, cells, said in (
 # a stiff block that lands with friction ends in few iterations, where the solver has to change, which is said
 for n, box, solver in ((1, "0.12,0.12,0.12:3", "cholmod"), (2, "0.25,0.25,0.02:2", "auto")):
     case(f"stiff {solver}", ["-body_b_mesh", f"box:{box}", "-body_b_translate", "0,0,0.005", "-body_b_young", "6e9", "-body_b_poisson", "0.4", "-effects", "gravity,c",
-                             "-effect_c_type", "contact", "-effect_c_obstacle", "plane:0,0,1,0", "-effect_c_friction", "0.5", "-solver", solver,
+                             "-effect_c_type", "contact", "-effect_c_response", "projected", "-effect_c_obstacle", "plane:0,0,1,0", "-effect_c_friction", "0.5", "-solver", solver,
                              "-ts_dt", "0.02", "-ts_max_time", "0.06"], ranks=n, said=("warning", "constraints of contact"))
     names, _, *rows = (line.split(",") for line in (OUT / "run/history.csv").read_text().splitlines())
     linear = sum(int(row[names.index("linear")]) for row in rows)
