@@ -400,7 +400,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  if (fresh || !c->rows.value)
+  if (fresh || !c->nsolve)
     PetscCall(merge(c, K, blocks));
 
   /* factor by choice, if small, while CG pauses, or if a factor of these values exists */
