@@ -201,17 +201,16 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 
   Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
               moved apart rigidly, as far as potentials ask for it.
-  Shift     - then, in a static run: supported bodies that touch or overlap each other or an
-  obstacle
-              are moved apart rigidly, by S, as if nothing held them, so that a solution can push
-              them together again; of: the first potential with such bodies, NULL: nothing was
-              moved.
-  FindPenetrated - the first contact of nodes with some inside its obstacle; NULL: there is none.
+  Shift     - then, in a static run: supported bodies that touch or overlap, each other or an
+              obstacle, are moved apart rigidly, by S, as if nothing held them, so that a solution
+              can push them together again; of: the first potential with such bodies, NULL: nothing
+              was moved.
+  FindPenetrated - the first contact of nodes with some inside its obstacle, where supports hold
+              every body along all axes; NULL: there is none.
   Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved
               apart; moved: some were.
   Give      - by the start the bodies got this energy from a contact, J, of which `counted` is in
-  the
-              work of its steps already.
+              the work of its steps already.
   Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
   BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
               unchanged until the step ends. speed: SbModelStepSpeed(), the scale of tolerances,

@@ -569,9 +569,9 @@ typedef struct _p_SbPlan {
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
   PetscReal *face_term[2]; /* factor of the identity in each block of both parts, N/m; or NULL */
-  PetscReal *edge_term
-    [2]; /* in each block of both parts, N/m: vector v of v x, and entries (y, z), (z, x), (x, y) of
-                              a symmetric matrix, [6]; or NULL */
+  /* in each block of both parts, [6] N/m: vector v of v x, then the entries (y, z), (z, x), (x, y)
+     of a symmetric matrix; or NULL */
+  PetscReal *edge_term[2];
   PetscInt nfix;       /* blocks that a prescribed unknown touches */
   PetscInt *fix_block; /* [nfix] block index as in offset */
   PetscInt *fix_row;   /* [nfix] local row node */

@@ -337,9 +337,21 @@ PetscErrorCode SbContactSetFindPenetrated(const SbContactSet *contacts, PetscRea
   SbStage stage = {.t = t, .shift_k = 1.};
   PetscReal *gap, *normal;
   PetscInt first = contacts->n;
+  PetscBool held = PETSC_TRUE;
+  uint8_t *fixed;
 
   PetscFunctionBeginUser;
   *found = NULL;
+
+  /* what is not held needs its loads to stay in contact */
+  PetscCall(PetscCalloc1(s->mesh->nbody + 1, &fixed));
+  PetscCall(find_supported(s, fixed));
+  for (PetscInt b = 0; b < s->mesh->nbody; b++)
+    held = (PetscBool)(held && fixed[b] == 7);
+  PetscCall(PetscFree(fixed));
+  if (!held)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
   PetscCall(PetscCalloc2(s->nnode, &gap, 3 * s->nnode, &normal));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   for (PetscInt k = 0; k < contacts->n && first == contacts->n; k++) {

@@ -351,13 +351,13 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 PetscErrorCode SbContactsList(SbOutput out, hid_t frame, PetscReal time, const char *path);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
-PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
-PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
-/* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
 /* Columns of effects in a checkpoint: forces of contact are those of the step before, which the
    state does not tell. Of this step's row, if there is one. Collective. */
 PetscErrorCode SbHistoryWrite(SbRun run, SbOutput out, PetscInt step, SbH5 *h);
 PetscErrorCode SbHistoryRead(SbRun run, SbOutput out, SbH5 *h);
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
+PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
+/* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[number of columns] += this rank's part of the columns of all probes. Collective. */

@@ -1,7 +1,7 @@
 /*
   triangles.c - reads the triangles of a surface file; the reader is chosen by the first
-  bytes of the file, or its name. Areas,
-  edges, volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
+  bytes of the file, or its name. Areas, edges, volumes and solid angles (van Oosterom and Strackee
+  1983) of triangles.
 
   For a gmsh file the surface is the boundary of its tets, or, without tets, its triangles.
 */

@@ -284,25 +284,6 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether supports hold each body along all axes: it needs no loads to stay in contact. */
-static PetscErrorCode bodies_are_held(const SbModel m, PetscBool *held)
-{
-  const SbSpace s = m->space;
-  uint8_t *bits; /* [nbody] */
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(m->nbody, &bits));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    bits[s->node_body[i]] |= s->fixed[i];
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, bits, (PetscMPIInt)m->nbody, MPI_UINT8_T, MPI_BOR, m->comm));
-  *held = PETSC_TRUE;
-  for (PetscInt b = 0; b < m->nbody; b++)
-    *held = (PetscBool)(*held && bits[b] == 7);
-  PetscCall(PetscFree(bits));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Bodies that touch when the run begins are moved apart; the energy that this gives them is work of
    the contact: what they begin with, in a static run what they have in equilibrium, when their
    supports are back. */
@@ -311,7 +292,6 @@ static PetscErrorCode start_contacts(SbRun run)
   const SbModel m = run->model;
   const PetscReal t = run->clock.t0;
   SbContact first = NULL; /* that has something to resolve */
-  PetscBool held = PETSC_FALSE;
   PetscBool shifted;
   SbEnergies energies = {0};
   PetscReal start, now;
@@ -339,8 +319,6 @@ static PetscErrorCode start_contacts(SbRun run)
     first = first ? first : m->contacts.potential[k];
   }
   if (!first && !m->dynamic && t == 0.)
-    PetscCall(bodies_are_held(m, &held));
-  if (held)
     PetscCall(SbContactSetFindPenetrated(&m->contacts, t, run->state.U, &first));
   if (!m->dynamic && first)
     PetscCall(SbStaticPush(run, shifted ? shift : NULL, first, start));

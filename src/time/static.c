@@ -105,18 +105,6 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The step failed as nothing (`but`: but its loads) holds a body against a motion. */
-static PetscErrorCode report_free(const LoadStep *l, const char *but, PetscInt body,
-                                  const char motion[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbRunFail(
-    l->run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
-    (double)l->factor, but, l->run->model->body[body].name, motion,
-    l->contact ? ", or let it come to rest in a dynamic run" : ""));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Searches for an unsupported body, before a step is solved or after it was tried; *found:
    run->clock.stop_reason describes it. */
 static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBool solved,
@@ -160,7 +148,10 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
   }
   *found = (PetscBool)(body >= 0);
   if (*found)
-    PetscCall(report_free(l, loads, body, motion));
+    PetscCall(SbRunFail(
+      run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
+      (double)l->factor, loads, run->model->body[body].name, motion,
+      l->contact ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,7 +195,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   }
 
   /* with balanced loads a singular system has solutions, up to any rigid motion */
-  if (*ok && !l->contact && !l->run->counters.steps && l->run->counters.newton_step) {
+  if (*ok && !l->run->counters.steps && !l->contact && l->run->counters.newton_step) {
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
   }

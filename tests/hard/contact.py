@@ -218,7 +218,7 @@ def mat(s):
 
 
 def rods(s, turns, seconds):
-    # not the aim: rods snap, and rounding decides how many iterations those steps take: 64 to 173 of 12 to 15; ten turns 547 to 1816 of 24 to 30, 3 to 5 rejected, tets invert
+    # not the aim: rods snap, and rounding decides how many iterations those steps take: 64 to 173 of 12 to 15; ten turns 547 to 1816 of 24 to 30, 3 to 5 rejected, tets invert (how far was not kept)
     s.newton, s.median = (260, 22) if turns < 10 else (2700, 45)
     if turns >= 10:
         s.rejected, s.min_J = 8, -10
@@ -344,7 +344,7 @@ def heap(s):
 
 @case("heap.mixed", "fifty mixed bodies fall into a bowl", seconds=20000)
 def mixed(s):
-    s.newton, s.median, s.rejected, s.min_J = 400, 70, 6, -2  # not the aim: 178 to 270 of 45 to 49, 3 to 4 rejected, some tets invert
+    s.newton, s.median, s.rejected, s.min_J = 400, 70, 6, -2  # not the aim: 178 to 270 of 45 to 49, 3 to 4 rejected, some tets invert (how far was not kept)
     shapes = [meshes.ball(4, 0.03), meshes.ring(0.025, 0.008, 20, 2), meshes.spike(4, 0.06, 0.06), meshes.box((0.05, 0.03, 0.04), (5, 3, 4)), meshes.box((0.09, 0.02, 0.02), (12, 3, 3))]
     for i in range(50):
         layer, row, column = i // 9, i // 3 % 3 - 1, i % 3 - 1
