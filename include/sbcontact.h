@@ -202,9 +202,9 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
   Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
               moved apart rigidly, as far as potentials ask for it.
   Shift     - then, in a static run: supported bodies that touch or overlap, each other or an
-              obstacle, are moved apart rigidly, by S, as if nothing held them, so that a solution
-              can push them together again; of: the first potential with such bodies, NULL: nothing
-              was moved.
+              obstacle, and bodies between them, are moved apart rigidly, by S, as if nothing held
+              them, so that a solution can push them together again; of: the first potential with
+              such bodies, NULL: nothing was moved.
   FindPenetrated - the first contact of nodes with some inside its obstacle, where supports hold
               every body along all axes; NULL: there is none.
   Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved

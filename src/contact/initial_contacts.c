@@ -120,8 +120,43 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
+/* held[nbody + 1]: fixed[], and the components in which a body without supports is between
+   supported ones, which would push it together: contacts lead to them on both of its sides, maybe
+   by way of others. */
+static PetscErrorCode find_held(PetscInt n, const SbInitialContact touch[], PetscInt nbody,
+                                const uint8_t fixed[], uint8_t held[])
+{
+  uint8_t *side[2]; /* components in which there is a supported body above it, and below it */
+  PetscBool again = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(nbody + 1, &side[0], nbody + 1, &side[1]));
+  for (int k = 0; k < 2; k++)
+    PetscCall(PetscArraycpy(side[k], fixed, nbody + 1));
+  while (again) {
+    again = PETSC_FALSE;
+    for (PetscInt i = 0; i < 6 * n; i++) {
+      const SbInitialContact *t = &touch[i / 6];
+      const int c = i % 3;
+      const int first = i / 3 % 2; /* this body of the contact, on the side k of the other one */
+      const int k = (t->n[c] > 0.) == (first == 0);
+      const uint8_t above = side[k][t->body[!first]] & (1 << c);
+
+      if (PetscAbsReal(t->n[c]) <= MISSED || !above || side[k][t->body[first]] & above)
+        continue;
+      side[k][t->body[first]] |= above;
+      again = PETSC_TRUE;
+    }
+  }
+  for (PetscInt b = 0; b <= nbody; b++)
+    held[b] = fixed[b] | (side[0][b] & side[1][b]);
+  PetscCall(PetscFree2(side[0], side[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether both sides of a contact are pushed together by supports: each component that its normal
-   has is prescribed somewhere on them. Of an obstacle all are. */
+   has is in fixed[], or, of bodies between others, in that of find_held(). Of an obstacle all
+   are. */
 static PetscBool is_pushed(const SbInitialContact *t, const uint8_t fixed[])
 {
   for (int k = 0; k < 2; k++)
@@ -131,37 +166,49 @@ static PetscBool is_pushed(const SbInitialContact *t, const uint8_t fixed[])
   return PETSC_TRUE;
 }
 
-/* Adds touches of supported bodies at u that are to be opened until they bear no force, where
-   nothing overlaps. */
-static PetscErrorCode add_touches(SbSpace s, const uint8_t fixed[], const SbInitialContacts *mine,
-                                  SbInitialContacts *all)
+/* Appends the touches of all ranks. Collective. */
+static PetscErrorCode gather_touches(SbSpace s, const SbInitialContacts *mine,
+                                     SbInitialContacts *touches)
 {
   SbInitialContact *touch;
   PetscInt n;
-  PetscBool closed = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(SbAllgatherv(s->comm, MPI_BYTE, mine->n * (PetscInt)sizeof(*touch), mine->touch, &n,
                          &touch, NULL));
   n /= (PetscInt)sizeof(*touch);
-  if (n)
-    qsort(touch, (size_t)n, sizeof(*touch), by_value);
-  for (PetscInt i = 0; i < n; i++) {
-    touch[i].to = PetscMax(touch[i].to, touch[i].width);
-    closed =
-      (PetscBool)(closed || (is_pushed(&touch[i], fixed) && touch[i].gap < FREE * touch[i].to));
-  }
-  for (PetscInt i = 0; i < n && closed; i++) {
-    if (!is_pushed(&touch[i], fixed))
-      continue;
-    PetscCall(SbReserve(all->n + 1, sizeof(*all->touch), &all->size, &all->touch));
-    all->touch[all->n++] = touch[i];
-  }
+  PetscCall(SbReserve(touches->n + n, sizeof(*touch), &touches->size, &touches->touch));
+  PetscCall(PetscArraycpy(touches->touch + touches->n, touch, n));
+  touches->n += n;
   PetscCall(PetscFree(touch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves supported bodies that touch or overlap apart from where they are, u, which was moved by
+/* Adds touches of supported bodies that are to be opened until they bear no force. */
+static PetscErrorCode add_touches(const uint8_t fixed[], SbInitialContacts *touches,
+                                  SbInitialContacts *all)
+{
+  PetscBool closed = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (touches->n)
+    qsort(touches->touch, (size_t)touches->n, sizeof(*touches->touch), by_value);
+  for (PetscInt i = 0; i < touches->n; i++) {
+    SbInitialContact *t = &touches->touch[i];
+
+    t->to = PetscMax(t->to, t->width);
+    closed = (PetscBool)(closed || (is_pushed(t, fixed) && t->gap < FREE * t->to));
+  }
+  for (PetscInt i = 0; i < touches->n && closed; i++) {
+    if (!is_pushed(&touches->touch[i], fixed))
+      continue;
+    PetscCall(SbReserve(all->n + 1, sizeof(*all->touch), &all->size, &all->touch));
+    all->touch[all->n++] = touches->touch[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves held bodies that touch or overlap apart from where they are, u, which was moved by
    shift[nbody + 1][3] so far; *k: the first potential that has some, -1: none; *apart: none do any
    more. all: contacts that were found so far, from the first positions. */
 static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, PetscReal dt,
@@ -171,33 +218,46 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
   const SbSpace s = contacts->space;
   const PetscInt nbody = s->mesh->nbody;
   const PetscInt before = all->n;
-  uint8_t *none;
+  SbInitialContacts touches = {0};
+  uint8_t *none, *held;
   PetscReal *way;
   PetscBool directed = PETSC_TRUE;
 
+  /* overlaps and touches */
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < contacts->npotential; i++) {
     const PetscInt n = all->n;
+    const PetscInt ntouch = touches.n;
     SbInitialContacts mine = {0};
     PetscBool first = PETSC_FALSE;
 
     PHASE_CALL(contacts->potential[i], initial_contacts, s, t, dt, u, &first, &mine);
-    if (first)
+    if (first) {
       PHASE_CALL(contacts->potential[i], overlaps, s, &directed, all);
-    if (first && directed && all->n == n)
-      PetscCall(add_touches(s, fixed, &mine, all));
+      PetscCall(gather_touches(s, &mine, &touches));
+    }
     PetscCall(PetscFree(mine.touch));
-    *k = *k < 0 && all->n > n ? i : *k;
+    *k = *k < 0 && all->n + touches.n > n + ntouch ? i : *k;
   }
+
+  /* those of bodies that are held; touches where nothing overlaps */
+  PetscCall(PetscMalloc1(nbody + 1, &held));
+  PetscCall(SbReserve(all->n + touches.n, sizeof(*all->touch), &all->size, &all->touch));
+  PetscCall(PetscArraycpy(all->touch + all->n, touches.touch, touches.n));
+  PetscCall(find_held(all->n + touches.n, all->touch, nbody, fixed, held));
+  if (directed && all->n == before)
+    PetscCall(add_touches(fixed, &touches, all));
+  PetscCall(PetscFree(touches.touch));
   if (all->n > before)
     qsort(all->touch + before, (size_t)(all->n - before), sizeof(*all->touch), by_value);
   for (PetscInt i = before; i < all->n; i++) {
     SbInitialContact *touch = &all->touch[i];
 
-    directed = (PetscBool)(directed && is_pushed(touch, fixed));
+    directed = (PetscBool)(directed && is_pushed(touch, held));
     for (int c = 0; c < 3; c++)
       touch->gap -= touch->n[c] * (shift[3 * touch->body[0] + c] - shift[3 * touch->body[1] + c]);
   }
+  PetscCall(PetscFree(held));
   *apart = (PetscBool)(directed && all->n == before);
   if (*apart || !directed) {
     all->n = before;

@@ -5,7 +5,8 @@
   again.
 
   Bodies that overlap when the run begins are moved apart, rigidly and with their supports, without
-  load; these go back in as many steps, and push the bodies together (SbStaticPush()). Where only
+  load; these go back in as many steps, and push the bodies together (SbStaticPush()), with bodies
+  without supports that are between them, which must not slip out. Where only
   their surfaces could be moved apart, they come into equilibrium without load.
 
   With -static_adapt a step without contact that converges slowly is given up early and halved, at
@@ -31,6 +32,8 @@
 #define SHARE 0.01 /* of the volume, above which cells that turn far matter */
 #define CUTS 6     /* halvings of a load step for their sake, then it is accepted with a warning */
 #define PUSH_LEAST 1e-2 /* shortest step of pushing together, over a load step */
+#define SLIPPED \
+  4. /* mean displacement of a body without supports, over the way by which others push it */
 #define EXCESS \
   0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
@@ -202,6 +205,44 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bodies without supports that others pushed together by `way`, m, have to be held by them: where
+   nothing does, they slip out, or end where chance takes them. */
+static PetscErrorCode check_held(SbRun run, SbContact c, PetscReal way)
+{
+  const SbModel m = run->model;
+  const SbSpace s = m->space;
+  const PetscScalar *u;
+  PetscReal *sum; /* of each body: displacements, nodes, prescribed ones */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(5 * m->nbody, &sum));
+  PetscCall(VecGetArrayRead(run->state.U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal *of = sum + 5 * s->node_body[i];
+
+    for (int k = 0; k < 3; k++)
+      of[k] += PetscRealPart(u[3 * i + k]);
+    of[3] += 1.;
+    of[4] += s->fixed[i] != 0;
+  }
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(5 * m->nbody), MPIU_REAL, MPI_SUM, s->comm));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const PetscReal *of = sum + 5 * b;
+    const PetscReal moved = PetscSqrtReal(SbDot3(of, of)) / of[3];
+
+    PetscCheck(
+      of[4] > 0. || moved <= SLIPPED * way, m->comm, PETSC_ERR_USER_INPUT,
+      "The effect %s: the body %s overlaps others when the run begins, and slips by %.2g m "
+      "when they are pushed together by %.2g m, as nothing holds it; hold it by a support "
+      "or by -effect_%s_friction, or let it come to rest in a dynamic run",
+      c->effect->name, m->body[b].name, (double)moved, (double)way, c->effect->name);
+  }
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
 {
   const SbModel m = run->model;
@@ -265,6 +306,8 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
       run->clock.stop_reason[0] = 0;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (way > 2. * c->width)
+    PetscCall(check_held(run, c, way));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &work, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscCall(SbModelEnergies(m, run->state.U, NULL, &after));
   for (PetscInt i = 0; i < m->contacts.npotential; i++)

@@ -63,6 +63,20 @@ for name, depth, extra in CASES:
     if not good:
         print(f"FAILED: {name} {depth} m deep: exit code {done.returncode}: {done.stderr[-300:]} {rows}")
 
+# A body without supports between held ones, in both of them: as if it had started apart from them. Without friction it slips out of place: an error.
+FREE = "-bodies a,c,b -body_c_mesh box:0.1,0.1,0.1:2 -body_c_translate {0:.17g},0,0 -body_b_translate {1:.17g},0,0 -effect_meet_response {2} -effect_meet_friction {3}"
+DEEP, GAP = 1e-2 * SIZE, 5e-3 * SIZE
+_, pushed = run("freepushed", 0.0, -2 * (DEEP + GAP), "3 2", 1, FREE.format(SIZE + GAP, 2 * (SIZE + GAP), "barrier", 0.3))
+for response, ranks in (("barrier", 1), ("barrier", 3), ("projected", 1), ("multiplier", 1)):
+    done, rows = run(f"free{response}{ranks}", 0.0, 0.0, "3 2", ranks, FREE.format(SIZE - DEEP, 2 * (SIZE - DEEP), response, 0.3))
+    good = done.returncode == 0 and abs(rows[-1]["strain"] / pushed[-1]["strain"] - 1) < 0.02  # that of a gap of 2 % of the way
+    good = good and abs(rows[-1]["strain"] - rows[-1]["meet_work"]) < 1e-3 * rows[-1]["strain"] and not rows[-1]["meet_unguarded"]
+    slips, _ = run(f"slips{response}{ranks}", 0.0, 0.0, "3 2", ranks, FREE.format(SIZE - DEEP, 2 * (SIZE - DEEP), response, 0))
+    good = good and slips.returncode == 1 and "effect meet" in slips.stderr and "body c" in slips.stderr and "hold it" in slips.stderr
+    passed, failed = passed + good, failed + (not good)
+    if not good:
+        print(f"FAILED: a free body, {response}, {ranks} ranks: exit code {done.returncode}: {done.stderr[-300:]} {rows}; {slips.returncode}: {slips.stderr[-300:]}")
+
 done, _ = run("base", 0.1 * SIZE, 0.0, "2 1", 1, BASE)
 good = done.returncode == 1 and "effect meet" in done.stderr and "-body_NAME_translate" in done.stderr
 passed, failed = passed + good, failed + (not good)
