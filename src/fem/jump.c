@@ -62,7 +62,10 @@
 #define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
 #define FLAT \
   2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
-#define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
+#define MANY 0.1 /* part of the tets of a body, likewise: few slivers do no harm */
+#define UNBORNE \
+  2. /* new penalty over the old one from which that is too small for the stress, by up to \
+        SB_FOLLOW */
 #define SAME 1e-12 /* relative change that is rounding */
 
 struct _p_SbJump {
@@ -80,6 +83,7 @@ struct _p_SbJump {
   PetscInt *node;  /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
   SbPack *c0, *c1; /* [nbatch] factors above, N/m; zero in padding */
   SbPack *r; /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
+  SbWalls walls;   /* facets on smooth walls */
   PetscBool began; /* the run has made time steps, or its checkpoint has */
   PetscBool renew; /* penalties restored from a checkpoint differ from those of the rest state */
   SbPack *
@@ -214,6 +218,18 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbJumpFindWalls(SbSpace s)
+{
+  const SbJump j = s->jump;
+  PetscReal c0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbWallsFind(s, &j->walls));
+  for (PetscInt w = 0; w < j->walls.n; w++)
+    face_factors(s, j, &j->walls.wall[w].face, PETSC_TRUE, &c0, &j->walls.wall[w].c1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
    stiffness of twist modes under the pressure `even` of loads; keep: m may not decrease. Returns
    whether some m changed. */
@@ -339,8 +355,21 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-/* By how much new penalties change the energy of this rank's jumps at x, J, face by face. */
-static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
+/* The same of a wall. */
+static PetscReal held_part_of_wall(SbSpace s, const SbWall *wall, const PetscReal x[],
+                                   PetscReal J[3])
+{
+  const PetscReal square = SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  PetscReal along = 0.;
+
+  for (int i = 0; i < 3; i++)
+    along += (J[i] - wall->r[i]) * J[i];
+  return square > 0. ? PetscMax(along / square, 0.) : 1.;
+}
+
+/* By how much new penalties change the energy of this rank's jumps at x, J, face by face. unborne:
+   some are so much larger that the old ones do not bear the stress. */
+static PetscReal change_of_energy(SbSpace s, const PetscReal x[], PetscBool *unborne)
 {
   const SbJump j = s->jump;
   PetscReal change = 0.;
@@ -353,9 +382,26 @@ static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
       gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
       face_factors(s, j, &j->face[i], PETSC_FALSE, &c0, &c1);
       change += 0.5 * j->share[b][l] * PetscAbsReal(c1 - j->c1[b][l]) * squares_of(J);
+      *unborne = (PetscBool)(*unborne || c1 > UNBORNE * j->c1[b][l]);
     }
   }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    const SbWall *wall = &j->walls.wall[w];
+    PetscReal J[3], c0, c1;
+
+    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &c1);
+    change +=
+      wall->share * PetscAbsReal(c1 - wall->c1) * SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  }
   return change;
+}
+
+/* Part of its jumps that a face keeps with a new penalty, so that it keeps its energy or, in the
+   first step, its force. part: kept before; kept: its old penalty over the new one; least: that at
+   rest over the new one. */
+static PetscReal new_part(PetscReal part, PetscReal kept, PetscReal least, PetscBool first)
+{
+  return PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), PetscSqr(least), 1.);
 }
 
 /* Updates the penalties. keep: the faces' energies at x are kept or, first, their forces; else r =
@@ -372,20 +418,31 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, Pets
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
       const PetscReal part = keep ? held_part(j, b, l, x, J) : 1.;
-      PetscReal c0, least, held, kept;
+      PetscReal c0, least, held;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
       if (!keep || j->c1[b][l] == 0.)
         continue;
 
-      /* scale the jumps so that the face keeps its energy or, in the first step, its force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
-      kept = before / j->c1[b][l];
-      held = PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)),
-                               PetscSqr(least / j->c1[b][l]), 1.);
+      held = new_part(part, before / j->c1[b][l], least / j->c1[b][l], first);
       for (int k = 0; k < 9; k++)
         j->r[9 * b + k][l] = (1. - held) * J[k];
     }
+  }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    SbWall *wall = &j->walls.wall[w];
+    const PetscReal before = wall->c1;
+    const PetscReal part = keep ? held_part_of_wall(s, wall, x, J) : 1.;
+    PetscReal c0, least, held;
+
+    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &wall->c1);
+    if (!keep)
+      continue;
+    face_factors(s, j, &wall->face, PETSC_TRUE, &c0, &least);
+    held = new_part(part, before / wall->c1, least / wall->c1, first);
+    for (int k = 0; k < 3; k++)
+      wall->r[k] = (1. - held) * J[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -494,6 +551,13 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
       }
     }
   }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    const SbWall *wall = &j->walls.wall[w];
+
+    if (wall->share > 0.)
+      k[5 * wall->face.cell[0] + wall->face.face[0]] =
+        wall->c1 * PetscSqr(held_part_of_wall(s, wall, x, J));
+  }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -521,6 +585,16 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
       if (PetscAbsReal(j->c1[b][l] - before) > SAME * before)
         j->renew = PETSC_TRUE;
     }
+  }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    SbWall *wall = &j->walls.wall[w];
+    const PetscReal before = wall->c1;
+    const PetscReal saved = k[5 * wall->face.cell[0] + wall->face.face[0]];
+
+    /* 0: of a state whose walls had no penalty */
+    wall->c1 = saved > 0. ? saved : before;
+    if (PetscAbsReal(wall->c1 - before) > SAME * before)
+      j->renew = PETSC_TRUE;
   }
   for (PetscInt c = 0; c < s->mesh->ncell; c++)
     j->modulus[c] = k[5 * c + 4];
@@ -562,6 +636,7 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
 {
   const SbPlan p = s->plan;
   const SbEdgeGaps gaps = s->jump->gaps;
+  const SbWalls *walls = &s->jump->walls;
   const PetscInt *nodes;
   const PetscInt nbatch = SbJumpCliques(s, &nodes);
 
@@ -569,12 +644,17 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
   if (gaps && !p->edge_term[0])
     PetscCall(PetscMalloc2(6 * (size_t)p->di[s->nnode_owned], &p->edge_term[0],
                            6 * (size_t)p->oi[s->nnode_owned], &p->edge_term[1]));
+  if (walls->n && !p->wall_term[0])
+    PetscCall(PetscMalloc2(3 * (size_t)p->di[s->nnode_owned], &p->wall_term[0],
+                           3 * (size_t)p->oi[s->nnode_owned], &p->wall_term[1]));
   for (int q = 0; q < 2; q++) {
     const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
 
     PetscCall(PetscArrayzero(p->face_term[q], n));
     if (gaps)
       PetscCall(PetscArrayzero(p->edge_term[q], 6 * n));
+    if (walls->n)
+      PetscCall(PetscArrayzero(p->wall_term[q], 3 * n));
   }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
@@ -604,6 +684,20 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
       }
     }
   }
+  for (PetscInt w = 0; w < walls->n; w++) {
+    const SbWall *wall = &walls->wall[w];
+    PetscReal K[3][3];
+
+    SbWallMatrix(wall, K);
+    for (int k = 0; k < 9; k++) {
+      const PetscInt row = wall->node[k / 3];
+      const PetscInt column = wall->node[k % 3];
+      const int q = column >= s->nnode_owned;
+
+      if (row < s->nnode_owned)
+        p->wall_term[q][3 * block_of(p, q, row, column) + wall->axis] += K[k / 3][k % 3];
+    }
+  }
   for (PetscInt i = 0; gaps && i < SbEdgeGapsMirrors(gaps); i++) {
     PetscReal v[4][4][3];
     const PetscInt *node = SbEdgeGapsMirrorMatrix(gaps, i, v);
@@ -625,7 +719,7 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
 /* Finds tensions of the gaps around edges from x, where a rank has pressures that the penalty does
    not bear. The owner of a cell knows all cells around its edges. Collective. */
 static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscReal even[],
-                                  PetscReal *change, PetscBool *differ)
+                                  SbGapsChange *change)
 {
   const SbJump j = s->jump;
   const SbFaceBatches faces = {j->nface, j->nbatch, j->face, j->n, j->node};
@@ -640,7 +734,7 @@ static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscRea
   if (needed && !j->gaps)
     PetscCall(SbEdgeGapsCreate(s, &faces, j->slides, &j->gaps));
   if (j->gaps)
-    PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change, differ));
+    PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &needed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (!needed)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -658,8 +752,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const SbJump j = s->jump;
   const PetscReal *x;
-  PetscReal change = 0.;
-  PetscBool gaps = PETSC_FALSE;
+  SbGapsChange change = {0};
   PetscBool any, first;
 
   PetscFunctionBeginUser;
@@ -676,17 +769,25 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
     PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE));
   if (!in_time)
-    PetscCall(follow_gaps(s, x, even, &change, &gaps));
-  any = (PetscBool)(follow(s, x, even, steps) || gaps);
+    PetscCall(follow_gaps(s, x, even, &change));
+  any = (PetscBool)(follow(s, x, even, steps) || change.differ);
   if (changed && in_time)
     PetscCallMPI(MPI_Allreduce(&any, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
 
-  /* the equilibrium at the end of a load step keeps its penalties if new ones would change
-     little */
+  /* the equilibrium at the end of a load step keeps its penalties if new ones would change little:
+     an even state has no jumps and their energy does not change, but it may be unstable */
   if (changed && !in_time) {
-    change += any ? change_of_energy(s, x) : 0.;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change, 1, MPIU_REAL, MPI_SUM, s->comm));
-    *changed = (PetscBool)(change > enough);
+    change.energy += any ? change_of_energy(s, x, &change.unborne) : 0.;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.energy, 1, MPIU_REAL, MPI_SUM, s->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.unborne, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+    *changed = (PetscBool)(change.energy > enough || change.unborne);
+    if (enough == SB_FAILED_SOLVE) {
+      PetscReal sum[3] = {change.even[0], change.even[1], (PetscReal)j->walls.n};
+
+      /* the states of other failed solves say nothing: tensions of bent bodies err by far more */
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPI_SUM, s->comm));
+      *changed = (PetscBool)(sum[2] > 0. && PetscAbsReal(sum[0]) > sum[1]);
+    }
     s->jump->renew = (PetscBool)(any && !*changed);
     any = (PetscBool)(any && *changed);
   }
@@ -713,6 +814,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscCall(PetscFree(j->r));
   PetscCall(PetscFree(j->tension));
   PetscCall(PetscFree(j->slides));
+  PetscCall(PetscFree(j->walls.wall));
   PetscCall(SbEdgeGapsDestroy(&j->gaps));
   PetscCall(PetscFree(*jump));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -767,6 +869,7 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
       }
     }
   }
+  SbWallsAdd(s, &j->walls, x, factor, f);
   if (j->gaps && factor == SB_JUMP_STIFFNESS)
     SbEdgeGapsAdd(s, j->gaps, x, f);
 }
@@ -793,6 +896,7 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
     if (body)
       body[j->body[b]] += energy - before;
   }
+  energy += SbWallsEnergy(s, &j->walls, x, factor, body);
   if (j->gaps && factor == SB_JUMP_STIFFNESS)
     energy += SbEdgeGapsMirrorEnergy(s, j->gaps, x, body);
   return energy;
