@@ -556,10 +556,12 @@ PetscErrorCode SbEdgeGapsFollow(SbSpace s, SbEdgeGaps g, const PetscReal x[],
 
     g->tension[e] = PetscMin(sum[5 * e + 3] / n, 0.);
     for (int c = 0; c < 3; c++) {
-      const PetscReal t = g->walls[e] & 1 << c ? 0. : sum[5 * e + c] / n;
-      const PetscReal more = g->tension[e] * t - g->q[3 * e + c];
+      const PetscBool across = (PetscBool)((g->walls[e] & 1 << c) != 0);
+      const PetscReal t = across ? 0. : sum[5 * e + c] / n;
+      PetscReal more;
 
-      g->next[3 * e + c] = g->tension[e] * t;
+      g->next[3 * e + c] = across ? 0. : g->tension[e] * sum[5 * e + c] / n;
+      more = g->next[3 * e + c] - g->q[3 * e + c];
       square += t * t;
       along += more * t;
       energy += more * area[3 * e + c];
