@@ -59,13 +59,13 @@
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
 #define NEEDLE 3.8 /* 1 for the narrowest face of a cube cut into six tets */
-#define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
-#define FLAT \
-  2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
-#define MANY 0.1 /* part of the tets of a body, likewise: few slivers do no harm */
+#define LONG 1.9   /* length over width of cells beyond which a run warns */
+#define FLAT 2.5   /* width over height, likewise: meshes of gmsh have tets of up to 2 */
+#define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
 #define UNBORNE \
   2. /* new penalty over the old one from which that is too small for the stress, by up to \
         SB_FOLLOW */
+#define EQUAL 1e-9 /* relative difference of aspects that are the same */
 #define SAME 1e-12 /* relative change that is rounding */
 
 struct _p_SbJump {
@@ -483,29 +483,95 @@ static FaceShape face_shape(SbSpace s, SbJump j, const SbFace *face)
   return shape;
 }
 
+/* Length over width, width over height of the cells of a box whose tets have such faces; by a fit
+   to boxes of 1 to 20, right to 3 %. */
+static void aspects_of(const FaceShape *shape, int side, PetscReal aspect[2])
+{
+  aspect[0] = PetscSqrtReal(PetscMax(PetscSqr(shape->length[side]) - 0.64, 0.) / 0.352);
+  aspect[1] = PetscSqrtReal(PetscMax(PetscSqr(shape->flatness[side]) - 0.5, 0.) / 0.335);
+}
+
+/* By how much bars or plates with two and four such cells across bend too little, percent;
+   measured, docs/reports/locking.md. The last row for all beyond. */
+static void cost_of(PetscReal aspect, PetscBool flat, PetscReal percent[2])
+{
+  static const PetscReal at[7] = {1., 1.5, 2., 3., 4., 6., 10.};
+  static const PetscReal of_long[7][2] = {{3., 2.},   {13., 5.},  {24., 9.}, {45., 19.},
+                                          {59., 30.}, {77., 49.}, {90., 74.}};
+  static const PetscReal of_flat[7][2] = {{3., 2.},   {10., 5.},  {18., 8.}, {34., 15.},
+                                          {48., 24.}, {67., 41.}, {84., 65.}};
+  int k = 0;
+
+  while (k < 5 && aspect > at[k + 1])
+    k++;
+  for (int n = 0; n < 2; n++) {
+    const PetscReal from = flat ? of_flat[k][n] : of_long[k][n];
+    const PetscReal to = flat ? of_flat[k + 1][n] : of_long[k + 1][n];
+
+    percent[n] =
+      from + (to - from) * PetscClipInterval((aspect - at[k]) / (at[k + 1] - at[k]), 0., 1.);
+  }
+}
+
+/* The tet that is farthest out of range, flat or long, of a body; of equal ones that with the
+   lowest number. */
+typedef struct {
+  PetscReal excess;    /* aspect over the largest one that is verified */
+  PetscReal aspect[2]; /* of length and width, of width and height */
+  PetscReal place[3];  /* its centroid, m */
+  PetscInt orig;
+} WorstShape;
+
+/* The worst of all ranks. */
+static PetscErrorCode reduce_worst(SbSpace s, WorstShape *worst)
+{
+  PetscReal most = worst->excess;
+  PetscInt orig;
+  PetscMPIInt has;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, s->comm));
+  orig = worst->excess > most * (1. - EQUAL) ? worst->orig : PETSC_MAX_INT;
+  has = orig == PETSC_MAX_INT ? -1 : s->rank;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &orig, 1, MPIU_INT, MPI_MIN, s->comm));
+  has = orig == worst->orig ? has : -1;
+  PetscCallMPI(MPI_Allreduce(&has, &rank, 1, MPI_INT, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Bcast(worst->aspect, 5, MPIU_REAL, rank, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceWarnShapes(SbSpace s)
 {
   const SbJump j = s->jump;
   const SbMesh mesh = s->mesh;
-  PetscReal *worst; /* [nbody][2] length and flatness */
-  PetscInt *count;  /* [nbody][2] tets out of range, tets */
-  uint8_t *out;     /* [ncell] */
+  WorstShape *worst; /* [nbody] */
+  PetscInt *count;   /* [nbody][2] tets out of range, tets */
+  uint8_t *out;      /* [ncell] */
 
   PetscFunctionBeginUser;
   if (!j)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc3(2 * mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
+  PetscCall(PetscCalloc3(mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const FaceShape shape = face_shape(s, j, &j->face[i]);
 
       for (int side = 0; side < (j->face[i].cell[1] == SB_SUPPORT ? 1 : 2); side++) {
-        PetscReal *most = worst + 2 * j->body[b];
+        const PetscInt cell = j->face[i].cell[side];
+        WorstShape *most = &worst[j->body[b]];
+        PetscReal aspect[2], excess;
 
-        most[0] = PetscMax(most[0], shape.length[side]);
-        most[1] = PetscMax(most[1], shape.flatness[side]);
-        if (shape.length[side] > LONG || shape.flatness[side] > FLAT)
-          out[j->face[i].cell[side]] = 1;
+        aspects_of(&shape, side, aspect);
+        excess = PetscMax(aspect[0] / LONG, aspect[1] / FLAT);
+        if (excess > 1.)
+          out[cell] = 1;
+        if (excess < most->excess * (1. - EQUAL) ||
+            (excess < most->excess * (1. + EQUAL) && mesh->cell_orig[cell] >= most->orig))
+          continue;
+        *most = (WorstShape){excess, {aspect[0], aspect[1]}, {0.}, mesh->cell_orig[cell]};
+        for (int k = 0; k < 12; k++)
+          most->place[k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
       }
     }
   }
@@ -513,20 +579,28 @@ PetscErrorCode SbSpaceWarnShapes(SbSpace s)
     count[2 * mesh->cell_body[c]] += out[c];
     count[2 * mesh->cell_body[c] + 1]++;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, (PetscMPIInt)(2 * mesh->nbody), MPIU_REAL,
-                             MPI_MAX, s->comm));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, s->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    if ((PetscReal)count[2 * b] > MANY * (PetscReal)count[2 * b + 1])
-      PetscCall(SbWarning(
-        s->comm,
-        "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
-        " tets are long or flat (up to %.2g times as long as wide, %.2g times as wide as high), "
-        "beyond what is verified: it may be far too stiff. Take p2, or tets of equal "
-        "edges (docs/reference/theory.md)",
-        mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
-        (double)worst[2 * b], (double)worst[2 * b + 1]));
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    PetscReal percent[2];
+    PetscBool flat;
+
+    if ((PetscReal)count[2 * b] <= MANY * (PetscReal)count[2 * b + 1])
+      continue;
+    PetscCall(reduce_worst(s, &worst[b]));
+    flat = (PetscBool)(worst[b].aspect[1] / FLAT > worst[b].aspect[0] / LONG);
+    cost_of(worst[b].aspect[flat], flat, percent);
+    PetscCall(SbWarning(
+      s->comm,
+      "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
+      " tets are long or flat, the worst one at (%.4g, %.4g, %.4g) m as in cells %.2g times as %s: "
+      "%s of such cells bend too little, by %.0f %% with two cells across and by %.0f %% with "
+      "four. Take p2, or rounder tets (docs/reports/locking.md)",
+      mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
+      (double)worst[b].place[0], (double)worst[b].place[1], (double)worst[b].place[2],
+      (double)worst[b].aspect[flat], flat ? "wide as high" : "long as wide",
+      flat ? "plates" : "bars", (double)percent[0], (double)percent[1]));
+  }
   PetscCall(PetscFree3(worst, count, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
