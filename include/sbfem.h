@@ -187,7 +187,9 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace space, Vec U, Vec step, PetscReal 
 /* Adapts the penalty on jumps of CR and DG to the state U, m (src/fem/jump.c). steps: load steps,
    with the energies of full jumps; time steps, where the energy of each face at U is kept within
    bounds; time steps without damping, where no penalty falls. changed (or NULL): some penalty did;
-   in load steps, the energy of jumps by more than `enough`, J, on all ranks, else penalties stay.
+   in load steps, the energy of jumps by more than `enough`, J, or a penalty or tension by more than
+   what the old one bears, on all ranks, else penalties stay; enough = SB_FAILED_SOLVE: tensions on
+   the mean by more than that, as where stress is even.
    Until the next call the face terms are constant; at first they are those of the rest state.
    even[nbody], Pa: pressure of loads that work on the volume of all cells, which balances as much
    of their stress; NULL: none. Collective. */
@@ -196,6 +198,7 @@ typedef enum {
   SB_STEPS_IN_TIME,
   SB_STEPS_UNDAMPED
 } SbStepsOf;
+#define SB_FAILED_SOLVE (-1.)
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, const PetscReal even[], SbStepsOf steps,
                                   PetscReal enough, PetscBool *changed);
 /* Warns of bodies of CR and DG with many tets of shapes for which the penalty on jumps is not
@@ -572,9 +575,10 @@ typedef struct _p_SbPlan {
   /* in each block of both parts, [6] N/m: vector v of v x, then the entries (y, z), (z, x), (x, y)
      of a symmetric matrix; or NULL */
   PetscReal *edge_term[2];
-  PetscInt nfix;       /* blocks that a prescribed unknown touches */
-  PetscInt *fix_block; /* [nfix] block index as in offset */
-  PetscInt *fix_row;   /* [nfix] local row node */
+  PetscReal *wall_term[2]; /* [3] in each block: its diagonal, N/m; NULL without smooth walls */
+  PetscInt nfix;           /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block;     /* [nfix] block index as in offset */
+  PetscInt *fix_row;       /* [nfix] local row node */
   uint8_t
     *fix_mask; /* [nfix] bits 0..2: rows, 3..5: columns of the block to clear; 6: diagonal block */
 } * SbPlan;

@@ -36,10 +36,8 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define LEAST 1e-2  /* det F below which a cell counts as degenerate: no pressure */
-#define SLANT 1e-10 /* square of the sine of the angle of a wall with an axis: rounding */
+#define LEAST 1e-2 /* det F below which a cell counts as degenerate: no pressure */
 #define OPEN (-1)
-#define NONE (-1)
 
 /* Two neighbours around an edge that ends at a support. */
 typedef struct {
@@ -87,35 +85,6 @@ struct _p_SbEdgeGaps {
 
 /* Number of the edge between two vertices of a tet in SbTetEdge. */
 static const int edge_between[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
-
-/* Whether all of a boundary face's displacement is prescribed; its node. */
-static PetscBool is_held(SbSpace s, PetscInt face, PetscInt *node)
-{
-  const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[face] >= 0);
-
-  *node = supported ? s->dirichlet_node[face] : s->cell_node[face];
-  return (PetscBool)((s->mesh->face_set[face] & SB_ON_BOUNDARY) && s->fixed[*node] == 7);
-}
-
-/* Axis of the smooth wall that a boundary face is on, or NONE; its node. */
-static PetscInt wall_axis(SbSpace s, PetscInt face, PetscInt *node)
-{
-  const PetscInt *v = s->mesh->cell + 4 * (face / 4);
-  const PetscReal *corner = s->mesh->x + 3 * v[SbFaceVertex[face % 4][0]];
-  PetscReal a[3], b[3], n[3];
-  PetscInt axis = 0;
-
-  if (is_held(s, face, node) || !(s->mesh->face_set[face] & SB_ON_BOUNDARY))
-    return NONE;
-  while (axis < 3 && s->fixed[*node] != 1 << axis)
-    axis++;
-  if (axis == 3)
-    return NONE;
-  SbSubtract(s->mesh->x + 3 * v[SbFaceVertex[face % 4][1]], corner, a);
-  SbSubtract(s->mesh->x + 3 * v[SbFaceVertex[face % 4][2]], corner, b);
-  SbCross(a, b, n);
-  return PetscSqr(n[axis]) > (1. - SLANT) * SbDot3(n, n) ? axis : NONE;
-}
 
 /* Numbers the edges of the cells with nodes at faces. */
 static PetscErrorCode number_edges(SbSpace s, SbEdgeGaps g)
@@ -179,16 +148,16 @@ static PetscErrorCode close_rings(SbSpace s, SbEdgeGaps g, PetscInt held[])
 
     if (mesh->neighbour[i] >= 0 || g->cell_edge[6 * (i / 4)] == OPEN)
       continue;
-    axis = wall_axis(s, i, &node);
+    axis = SbFaceWallAxis(s, i, &node);
     for (int k = 0; k < 3; k++) {
       const PetscInt e =
         g->cell_edge[6 * (i / 4) +
                      edge_between[SbFaceVertex[i % 4][k]][SbFaceVertex[i % 4][(k + 1) % 3]]];
 
-      if (axis != NONE) {
+      if (axis != SB_NO_WALL) {
         g->walls[e] |= (uint8_t)(1 << axis);
         sides[2 * e + 1]++;
-      } else if (is_held(s, i, &node) && sides[2 * e] < 2) {
+      } else if (SbFaceIsHeld(s, i, &node) && sides[2 * e] < 2) {
         held[2 * e + (held[2 * e] >= 0)] = node;
       }
       sides[2 * e]++;
@@ -263,11 +232,11 @@ static PetscErrorCode list_mirrors(SbSpace s, SbEdgeGaps g, const PetscInt held[
     if (mesh->neighbour[i] >= 0 || SbSpaceCellElement(s, cell)->nodes_per[0] ||
         g->slides[mesh->cell_body[cell]])
       continue;
-    axis = wall_axis(s, i, &wall);
+    axis = SbFaceWallAxis(s, i, &wall);
     owned = (PetscBool)(wall < s->nnode_owned);
     for (int a = 0; a < 4; a++)
       owned = (PetscBool)(owned || s->cell_node[4 * cell + a] < s->nnode_owned);
-    for (int k = 0; k < 3 && axis != NONE; k++) {
+    for (int k = 0; k < 3 && axis != SB_NO_WALL; k++) {
       const int from = (f + 1 + k) % 4;
       const int to = (f + 1 + (k + 1) % 3) % 4;
       const PetscInt e = g->cell_edge[6 * cell + edge_between[from][to]];
@@ -478,7 +447,7 @@ PetscErrorCode SbEdgeGapsFindSliding(SbSpace s, uint8_t slides[])
 
     if (SbSpaceCellElement(s, i / 4)->nodes_per[0] || !(s->mesh->face_set[i] & SB_ON_BOUNDARY))
       continue;
-    if (!is_held(s, i, &node) && s->fixed[node] && wall_axis(s, i, &node) == NONE)
+    if (!SbFaceIsHeld(s, i, &node) && s->fixed[node] && SbFaceWallAxis(s, i, &node) == SB_NO_WALL)
       slides[s->mesh->cell_body[i / 4]] = 1;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, slides, (PetscMPIInt)s->mesh->nbody, MPI_UINT8_T,
@@ -502,7 +471,8 @@ PetscBool SbEdgeGapsNeeded(SbSpace s, const uint8_t slides[], const PetscReal x[
   return PETSC_FALSE;
 }
 
-/* sum[nedge][4]: over the cells around each edge of its vector, m, and of their tension, Pa. */
+/* sum[nedge][5]: over the cells around each edge of its vector, m, of their tension, and of their
+   shear modulus, Pa. */
 static void sum_around(SbSpace s, const SbEdgeGaps g, const PetscReal x[], const PetscReal even[],
                        PetscReal sum[])
 {
@@ -528,8 +498,9 @@ static void sum_around(SbSpace s, const SbEdgeGaps g, const PetscReal x[], const
           continue;
         SbSubtract(s->mesh->x + 3 * PetscMax(from, to), s->mesh->x + 3 * PetscMin(from, to), t);
         for (int c = 0; c < 3; c++)
-          sum[4 * e + c] += SbDot3(f + 3 * c, t);
-        sum[4 * e + 3] += tension[l];
+          sum[5 * e + c] += SbDot3(f + 3 * c, t);
+        sum[5 * e + 3] += tension[l];
+        sum[5 * e + 4] += SbMaterialShearModulus(s->batch_region[b]->material);
       }
     }
   }
@@ -567,27 +538,40 @@ static void sum_areas(SbSpace s, const SbEdgeGaps g, const PetscReal x[], PetscR
 }
 
 PetscErrorCode SbEdgeGapsFollow(SbSpace s, SbEdgeGaps g, const PetscReal x[],
-                                const PetscReal even[], PetscReal *change, PetscBool *differ)
+                                const PetscReal even[], SbGapsChange *change)
 {
   PetscReal *sum, *area;
 
   PetscFunctionBeginUser;
-  *change = 0.;
-  *differ = PETSC_FALSE;
-  PetscCall(PetscCalloc2(4 * g->nedge, &sum, 3 * g->nedge, &area));
+  *change = (SbGapsChange){0};
+  PetscCall(PetscCalloc2(5 * g->nedge, &sum, 3 * g->nedge, &area));
   sum_around(s, g, x, even, sum);
   sum_areas(s, g, x, area);
   for (PetscInt e = 0; e < g->nedge; e++) {
     const PetscReal n = (PetscReal)g->around[e];
+    const PetscReal borne = sum[5 * e + 4] / (n * SB_FOLLOW);
     PetscReal energy = 0.;
+    PetscReal square = 0.; /* of the edge, m^2 */
+    PetscReal along = 0.;  /* change of the tension times that, N */
 
-    g->tension[e] = PetscMin(sum[4 * e + 3] / n, 0.);
+    g->tension[e] = PetscMin(sum[5 * e + 3] / n, 0.);
     for (int c = 0; c < 3; c++) {
-      g->next[3 * e + c] = g->walls[e] & 1 << c ? 0. : g->tension[e] * sum[4 * e + c] / n;
-      energy += (g->next[3 * e + c] - g->q[3 * e + c]) * area[3 * e + c];
-      *differ = (PetscBool)(*differ || g->next[3 * e + c] != g->q[3 * e + c]);
+      const PetscBool across = (PetscBool)((g->walls[e] & 1 << c) != 0);
+      const PetscReal t = across ? 0. : sum[5 * e + c] / n;
+      PetscReal more;
+
+      g->next[3 * e + c] = across ? 0. : g->tension[e] * sum[5 * e + c] / n;
+      more = g->next[3 * e + c] - g->q[3 * e + c];
+      square += t * t;
+      along += more * t;
+      energy += more * area[3 * e + c];
+      change->differ = (PetscBool)(change->differ || more != 0.);
     }
-    *change += g->share[e] * PetscAbsReal(energy);
+    change->energy += g->share[e] * PetscAbsReal(energy);
+    change->unborne =
+      (PetscBool)(change->unborne || (g->share[e] > 0. && PetscAbsReal(along) > borne * square));
+    change->even[0] += square > 0. ? g->share[e] * along / (borne * square) : 0.;
+    change->even[1] += g->share[e];
   }
   PetscCall(PetscFree2(sum, area));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -20,6 +20,8 @@ typedef enum {
 } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
+/* Adds the penalty at smooth walls, once supports are known. */
+PetscErrorCode SbJumpFindWalls(SbSpace space);
 /* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; complete on owned
    nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
@@ -39,6 +41,44 @@ typedef struct {
   PetscInt cell[2], face[2];
 } SbFace;
 #define SB_SUPPORT (-1)
+
+/*
+  wall.c: the penalty on jumps at smooth walls. Not collective.
+
+  SbFaceIsHeld   - whether all of a boundary face's displacement is prescribed; its node, on which
+                   supports act
+  SbFaceWallAxis - 0..2: the axis across the smooth wall that a boundary face is on, or SB_NO_WALL;
+                   its node
+  SbWallsFind    - lists the facets on walls of cells with an owned node, c1 = 0, after supports
+  SbWallJumps    - half the jumps J[3] across the wall at the corners, m or m/s; returns the sum of
+                   their squares
+  SbWallsAdd, SbWallsEnergy - as SbJumpAdd(), SbJumpEnergy()
+  SbWallMatrix   - K[i][j], N/m: the entry (axis, axis) of the block of nodes i and j of a wall
+*/
+#define SB_NO_WALL (-1)
+typedef struct {
+  SbFace face; /* the cell on both sides */
+  PetscInt axis;
+  PetscInt node[3];   /* of the cell, opposite the corners */
+  PetscInt vertex[3]; /* the corners */
+  PetscReal share;    /* 1: the cell is this rank's own; else 0 */
+  PetscReal c1;       /* as that of a face between two such cells, N/m */
+  PetscReal r[3];     /* offsets of J, m; as those of faces */
+} SbWall;
+typedef struct {
+  PetscInt n;
+  SbWall *wall; /* [n]; NULL: none */
+} SbWalls;
+PetscBool SbFaceIsHeld(SbSpace space, PetscInt face, PetscInt *node);
+PetscInt SbFaceWallAxis(SbSpace space, PetscInt face, PetscInt *node);
+PetscErrorCode SbWallsFind(SbSpace space, SbWalls *walls);
+PetscReal SbWallJumps(SbSpace space, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
+                      PetscReal J[3]);
+void SbWallsAdd(SbSpace space, const SbWalls *walls, const PetscReal x[], SbJumpFactor factor,
+                PetscReal f[]);
+PetscReal SbWallsEnergy(SbSpace space, const SbWalls *walls, const PetscReal x[],
+                        SbJumpFactor factor, PetscReal body[]);
+void SbWallMatrix(const SbWall *wall, PetscReal K[3][3]);
 
 /* Factor of the penalty on the negative stiffness that it balances in load steps;
    docs/reference/theory.md. */
@@ -68,10 +108,17 @@ PetscBool SbEdgeGapsNeeded(SbSpace space, const uint8_t slides[], const PetscRea
 /* slides[nbody]: bodies that have no gaps, as one or two components are prescribed at a facet that
    is not on a smooth wall across an axis. Collective. */
 PetscErrorCode SbEdgeGapsFindSliding(SbSpace space, uint8_t slides[]);
-/* Finds tensions and edges at x. change: by how much they change the energy of this rank's gaps, J,
-   edge by edge. differ: some do. */
+/* How new tensions and edges change the gaps. */
+typedef struct {
+  PetscReal energy;  /* of this rank's gaps, edge by edge, J */
+  PetscBool differ;  /* some do */
+  PetscBool unborne; /* some tension by more than the penalty bears */
+  PetscReal even[2]; /* sum over this rank's edges of the change over what the penalty bears; of
+                        ones */
+} SbGapsChange;
+/* Finds tensions and edges at x. */
 PetscErrorCode SbEdgeGapsFollow(SbSpace space, SbEdgeGaps gaps, const PetscReal x[],
-                                const PetscReal even[], PetscReal *change, PetscBool *differ);
+                                const PetscReal even[], SbGapsChange *change);
 /* Those found last become those of the energy. */
 void SbEdgeGapsRenew(SbEdgeGaps gaps);
 /* Mean of the tensions found last over the edges of an owned cell, Pa; 0 where an edge is left

@@ -32,13 +32,15 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
       if (!faces)
         continue;
 
-      /* the face terms are a multiple of the identity in each block */
+      /* the face terms are a multiple of the identity in each block, those at walls diagonal */
       ptr = q ? p->oi : p->di;
       for (PetscInt k = x->symmetric ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
         PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
 
         for (size_t c = 0; c < 3; c++)
           v[c * (rs + cs)] = factor * p->face_term[q][k];
+        for (size_t c = 0; p->wall_term[q] && c < 3; c++)
+          v[c * (rs + cs)] += factor * p->wall_term[q][3 * (size_t)k + c];
 
         /* those of edges are skew, those at walls symmetric */
         for (size_t c = 0; p->edge_term[q] && c < 3; c++) {

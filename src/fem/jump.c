@@ -59,10 +59,13 @@
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
 #define NEEDLE 3.8 /* 1 for the narrowest face of a cube cut into six tets */
-#define LONG 2.    /* length of a face beyond which a run warns: cells four times as long as wide */
-#define FLAT \
-  2. /* its shorter extent over the height of the cell, likewise: 3.5 times as wide as high */
+#define LONG 1.9   /* length over width of cells beyond which a run warns */
+#define FLAT 2.5   /* width over height, likewise: meshes of gmsh have tets of up to 2 */
 #define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
+#define UNBORNE \
+  2. /* new penalty over the old one from which that is too small for the stress, by up to \
+        SB_FOLLOW */
+#define EQUAL 1e-9 /* relative difference of aspects that are the same */
 #define SAME 1e-12 /* relative change that is rounding */
 
 struct _p_SbJump {
@@ -80,6 +83,7 @@ struct _p_SbJump {
   PetscInt *node;  /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
   SbPack *c0, *c1; /* [nbatch] factors above, N/m; zero in padding */
   SbPack *r; /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
+  SbWalls walls;   /* facets on smooth walls */
   PetscBool began; /* the run has made time steps, or its checkpoint has */
   PetscBool renew; /* penalties restored from a checkpoint differ from those of the rest state */
   SbPack *
@@ -214,6 +218,18 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbJumpFindWalls(SbSpace s)
+{
+  const SbJump j = s->jump;
+  PetscReal c0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbWallsFind(s, &j->walls));
+  for (PetscInt w = 0; w < j->walls.n; w++)
+    face_factors(s, j, &j->walls.wall[w].face, PETSC_TRUE, &c0, &j->walls.wall[w].c1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
    stiffness of twist modes under the pressure `even` of loads; keep: m may not decrease. Returns
    whether some m changed. */
@@ -339,8 +355,21 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-/* By how much new penalties change the energy of this rank's jumps at x, J, face by face. */
-static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
+/* The same of a wall. */
+static PetscReal held_part_of_wall(SbSpace s, const SbWall *wall, const PetscReal x[],
+                                   PetscReal J[3])
+{
+  const PetscReal square = SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  PetscReal along = 0.;
+
+  for (int i = 0; i < 3; i++)
+    along += (J[i] - wall->r[i]) * J[i];
+  return square > 0. ? PetscMax(along / square, 0.) : 1.;
+}
+
+/* By how much new penalties change the energy of this rank's jumps at x, J, face by face. unborne:
+   some are so much larger that the old ones do not bear the stress. */
+static PetscReal change_of_energy(SbSpace s, const PetscReal x[], PetscBool *unborne)
 {
   const SbJump j = s->jump;
   PetscReal change = 0.;
@@ -353,9 +382,26 @@ static PetscReal change_of_energy(SbSpace s, const PetscReal x[])
       gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
       face_factors(s, j, &j->face[i], PETSC_FALSE, &c0, &c1);
       change += 0.5 * j->share[b][l] * PetscAbsReal(c1 - j->c1[b][l]) * squares_of(J);
+      *unborne = (PetscBool)(*unborne || c1 > UNBORNE * j->c1[b][l]);
     }
   }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    const SbWall *wall = &j->walls.wall[w];
+    PetscReal J[3], c0, c1;
+
+    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &c1);
+    change +=
+      wall->share * PetscAbsReal(c1 - wall->c1) * SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  }
   return change;
+}
+
+/* Part of its jumps that a face keeps with a new penalty, so that it keeps its energy or, in the
+   first step, its force. part: kept before; kept: its old penalty over the new one; least: that at
+   rest over the new one. */
+static PetscReal new_part(PetscReal part, PetscReal kept, PetscReal least, PetscBool first)
+{
+  return PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), PetscSqr(least), 1.);
 }
 
 /* Updates the penalties. keep: the faces' energies at x are kept or, first, their forces; else r =
@@ -372,20 +418,31 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, Pets
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
       const PetscReal part = keep ? held_part(j, b, l, x, J) : 1.;
-      PetscReal c0, least, held, kept;
+      PetscReal c0, least, held;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
       if (!keep || j->c1[b][l] == 0.)
         continue;
 
-      /* scale the jumps so that the face keeps its energy or, in the first step, its force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
-      kept = before / j->c1[b][l];
-      held = PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)),
-                               PetscSqr(least / j->c1[b][l]), 1.);
+      held = new_part(part, before / j->c1[b][l], least / j->c1[b][l], first);
       for (int k = 0; k < 9; k++)
         j->r[9 * b + k][l] = (1. - held) * J[k];
     }
+  }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    SbWall *wall = &j->walls.wall[w];
+    const PetscReal before = wall->c1;
+    const PetscReal part = keep ? held_part_of_wall(s, wall, x, J) : 1.;
+    PetscReal c0, least, held;
+
+    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &wall->c1);
+    if (!keep)
+      continue;
+    face_factors(s, j, &wall->face, PETSC_TRUE, &c0, &least);
+    held = new_part(part, before / wall->c1, least / wall->c1, first);
+    for (int k = 0; k < 3; k++)
+      wall->r[k] = (1. - held) * J[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -426,29 +483,95 @@ static FaceShape face_shape(SbSpace s, SbJump j, const SbFace *face)
   return shape;
 }
 
+/* Length over width, width over height of the cells of a box whose tets have such faces; by a fit
+   to boxes of 1 to 20, right to 3 %. */
+static void aspects_of(const FaceShape *shape, int side, PetscReal aspect[2])
+{
+  aspect[0] = PetscSqrtReal(PetscMax(PetscSqr(shape->length[side]) - 0.64, 0.) / 0.352);
+  aspect[1] = PetscSqrtReal(PetscMax(PetscSqr(shape->flatness[side]) - 0.5, 0.) / 0.335);
+}
+
+/* By how much bars or plates with two and four such cells across bend too little, percent;
+   measured, docs/reports/locking.md. The last row for all beyond. */
+static void cost_of(PetscReal aspect, PetscBool flat, PetscReal percent[2])
+{
+  static const PetscReal at[7] = {1., 1.5, 2., 3., 4., 6., 10.};
+  static const PetscReal of_long[7][2] = {{3., 2.},   {13., 5.},  {24., 9.}, {45., 19.},
+                                          {59., 30.}, {77., 49.}, {90., 74.}};
+  static const PetscReal of_flat[7][2] = {{3., 2.},   {10., 5.},  {18., 8.}, {34., 15.},
+                                          {48., 24.}, {67., 41.}, {84., 65.}};
+  int k = 0;
+
+  while (k < 5 && aspect > at[k + 1])
+    k++;
+  for (int n = 0; n < 2; n++) {
+    const PetscReal from = flat ? of_flat[k][n] : of_long[k][n];
+    const PetscReal to = flat ? of_flat[k + 1][n] : of_long[k + 1][n];
+
+    percent[n] =
+      from + (to - from) * PetscClipInterval((aspect - at[k]) / (at[k + 1] - at[k]), 0., 1.);
+  }
+}
+
+/* The tet that is farthest out of range, flat or long, of a body; of equal ones that with the
+   lowest number. */
+typedef struct {
+  PetscReal excess;    /* aspect over the largest one that is verified */
+  PetscReal aspect[2]; /* of length and width, of width and height */
+  PetscReal place[3];  /* its centroid, m */
+  PetscInt orig;
+} WorstShape;
+
+/* The worst of all ranks. */
+static PetscErrorCode reduce_worst(SbSpace s, WorstShape *worst)
+{
+  PetscReal most = worst->excess;
+  PetscInt orig;
+  PetscMPIInt has;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, s->comm));
+  orig = worst->excess > most * (1. - EQUAL) ? worst->orig : PETSC_MAX_INT;
+  has = orig == PETSC_MAX_INT ? -1 : s->rank;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &orig, 1, MPIU_INT, MPI_MIN, s->comm));
+  has = orig == worst->orig ? has : -1;
+  PetscCallMPI(MPI_Allreduce(&has, &rank, 1, MPI_INT, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Bcast(worst->aspect, 5, MPIU_REAL, rank, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceWarnShapes(SbSpace s)
 {
   const SbJump j = s->jump;
   const SbMesh mesh = s->mesh;
-  PetscReal *worst; /* [nbody][2] length and flatness */
-  PetscInt *count;  /* [nbody][2] tets out of range, tets */
-  uint8_t *out;     /* [ncell] */
+  WorstShape *worst; /* [nbody] */
+  PetscInt *count;   /* [nbody][2] tets out of range, tets */
+  uint8_t *out;      /* [ncell] */
 
   PetscFunctionBeginUser;
   if (!j)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc3(2 * mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
+  PetscCall(PetscCalloc3(mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const FaceShape shape = face_shape(s, j, &j->face[i]);
 
       for (int side = 0; side < (j->face[i].cell[1] == SB_SUPPORT ? 1 : 2); side++) {
-        PetscReal *most = worst + 2 * j->body[b];
+        const PetscInt cell = j->face[i].cell[side];
+        WorstShape *most = &worst[j->body[b]];
+        PetscReal aspect[2], excess;
 
-        most[0] = PetscMax(most[0], shape.length[side]);
-        most[1] = PetscMax(most[1], shape.flatness[side]);
-        if (shape.length[side] > LONG || shape.flatness[side] > FLAT)
-          out[j->face[i].cell[side]] = 1;
+        aspects_of(&shape, side, aspect);
+        excess = PetscMax(aspect[0] / LONG, aspect[1] / FLAT);
+        if (excess > 1.)
+          out[cell] = 1;
+        if (excess < most->excess * (1. - EQUAL) ||
+            (excess < most->excess * (1. + EQUAL) && mesh->cell_orig[cell] >= most->orig))
+          continue;
+        *most = (WorstShape){excess, {aspect[0], aspect[1]}, {0.}, mesh->cell_orig[cell]};
+        for (int k = 0; k < 12; k++)
+          most->place[k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
       }
     }
   }
@@ -456,20 +579,28 @@ PetscErrorCode SbSpaceWarnShapes(SbSpace s)
     count[2 * mesh->cell_body[c]] += out[c];
     count[2 * mesh->cell_body[c] + 1]++;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, (PetscMPIInt)(2 * mesh->nbody), MPIU_REAL,
-                             MPI_MAX, s->comm));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, s->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    if ((PetscReal)count[2 * b] > MANY * (PetscReal)count[2 * b + 1])
-      PetscCall(SbWarning(
-        s->comm,
-        "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
-        " tets are long or flat (up to %.2g times as long as wide, %.2g times as wide as high), "
-        "beyond what is verified: it may be far too stiff. Take p2, or tets of equal "
-        "edges (docs/reference/theory.md)",
-        mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
-        (double)worst[2 * b], (double)worst[2 * b + 1]));
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    PetscReal percent[2];
+    PetscBool flat;
+
+    if ((PetscReal)count[2 * b] <= MANY * (PetscReal)count[2 * b + 1])
+      continue;
+    PetscCall(reduce_worst(s, &worst[b]));
+    flat = (PetscBool)(worst[b].aspect[1] / FLAT > worst[b].aspect[0] / LONG);
+    cost_of(worst[b].aspect[flat], flat, percent);
+    PetscCall(SbWarning(
+      s->comm,
+      "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
+      " tets are long or flat, the worst one at (%.4g, %.4g, %.4g) m as in cells %.2g times as %s: "
+      "%s of such cells bend too little, by %.0f %% with two cells across and by %.0f %% with "
+      "four. Take p2, or rounder tets (docs/reports/locking.md)",
+      mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
+      (double)worst[b].place[0], (double)worst[b].place[1], (double)worst[b].place[2],
+      (double)worst[b].aspect[flat], flat ? "wide as high" : "long as wide",
+      flat ? "plates" : "bars", (double)percent[0], (double)percent[1]));
+  }
   PetscCall(PetscFree3(worst, count, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -493,6 +624,13 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
           k[5 * cell + j->face[i].face[side]] = j->c1[b][l] * PetscSqr(held_part(j, b, l, x, J));
       }
     }
+  }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    const SbWall *wall = &j->walls.wall[w];
+
+    if (wall->share > 0.)
+      k[5 * wall->face.cell[0] + wall->face.face[0]] =
+        wall->c1 * PetscSqr(held_part_of_wall(s, wall, x, J));
   }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -521,6 +659,16 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
       if (PetscAbsReal(j->c1[b][l] - before) > SAME * before)
         j->renew = PETSC_TRUE;
     }
+  }
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    SbWall *wall = &j->walls.wall[w];
+    const PetscReal before = wall->c1;
+    const PetscReal saved = k[5 * wall->face.cell[0] + wall->face.face[0]];
+
+    /* 0: of a state whose walls had no penalty */
+    wall->c1 = saved > 0. ? saved : before;
+    if (PetscAbsReal(wall->c1 - before) > SAME * before)
+      j->renew = PETSC_TRUE;
   }
   for (PetscInt c = 0; c < s->mesh->ncell; c++)
     j->modulus[c] = k[5 * c + 4];
@@ -562,6 +710,7 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
 {
   const SbPlan p = s->plan;
   const SbEdgeGaps gaps = s->jump->gaps;
+  const SbWalls *walls = &s->jump->walls;
   const PetscInt *nodes;
   const PetscInt nbatch = SbJumpCliques(s, &nodes);
 
@@ -569,12 +718,17 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
   if (gaps && !p->edge_term[0])
     PetscCall(PetscMalloc2(6 * (size_t)p->di[s->nnode_owned], &p->edge_term[0],
                            6 * (size_t)p->oi[s->nnode_owned], &p->edge_term[1]));
+  if (walls->n && !p->wall_term[0])
+    PetscCall(PetscMalloc2(3 * (size_t)p->di[s->nnode_owned], &p->wall_term[0],
+                           3 * (size_t)p->oi[s->nnode_owned], &p->wall_term[1]));
   for (int q = 0; q < 2; q++) {
     const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
 
     PetscCall(PetscArrayzero(p->face_term[q], n));
     if (gaps)
       PetscCall(PetscArrayzero(p->edge_term[q], 6 * n));
+    if (walls->n)
+      PetscCall(PetscArrayzero(p->wall_term[q], 3 * n));
   }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
@@ -604,6 +758,20 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
       }
     }
   }
+  for (PetscInt w = 0; w < walls->n; w++) {
+    const SbWall *wall = &walls->wall[w];
+    PetscReal K[3][3];
+
+    SbWallMatrix(wall, K);
+    for (int k = 0; k < 9; k++) {
+      const PetscInt row = wall->node[k / 3];
+      const PetscInt column = wall->node[k % 3];
+      const int q = column >= s->nnode_owned;
+
+      if (row < s->nnode_owned)
+        p->wall_term[q][3 * block_of(p, q, row, column) + wall->axis] += K[k / 3][k % 3];
+    }
+  }
   for (PetscInt i = 0; gaps && i < SbEdgeGapsMirrors(gaps); i++) {
     PetscReal v[4][4][3];
     const PetscInt *node = SbEdgeGapsMirrorMatrix(gaps, i, v);
@@ -625,7 +793,7 @@ PetscErrorCode SbJumpSumTerms(SbSpace s)
 /* Finds tensions of the gaps around edges from x, where a rank has pressures that the penalty does
    not bear. The owner of a cell knows all cells around its edges. Collective. */
 static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscReal even[],
-                                  PetscReal *change, PetscBool *differ)
+                                  SbGapsChange *change)
 {
   const SbJump j = s->jump;
   const SbFaceBatches faces = {j->nface, j->nbatch, j->face, j->n, j->node};
@@ -640,7 +808,7 @@ static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscRea
   if (needed && !j->gaps)
     PetscCall(SbEdgeGapsCreate(s, &faces, j->slides, &j->gaps));
   if (j->gaps)
-    PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change, differ));
+    PetscCall(SbEdgeGapsFollow(s, j->gaps, x, even, change));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &needed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (!needed)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -658,8 +826,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const SbJump j = s->jump;
   const PetscReal *x;
-  PetscReal change = 0.;
-  PetscBool gaps = PETSC_FALSE;
+  SbGapsChange change = {0};
   PetscBool any, first;
 
   PetscFunctionBeginUser;
@@ -676,17 +843,25 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
   if (first && follow(s, x, even, SB_STEPS_OF_LOAD))
     PetscCall(renew(s, x, PETSC_FALSE, PETSC_FALSE));
   if (!in_time)
-    PetscCall(follow_gaps(s, x, even, &change, &gaps));
-  any = (PetscBool)(follow(s, x, even, steps) || gaps);
+    PetscCall(follow_gaps(s, x, even, &change));
+  any = (PetscBool)(follow(s, x, even, steps) || change.differ);
   if (changed && in_time)
     PetscCallMPI(MPI_Allreduce(&any, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
 
-  /* the equilibrium at the end of a load step keeps its penalties if new ones would change
-     little */
+  /* the equilibrium at the end of a load step keeps its penalties if new ones would change little:
+     an even state has no jumps and their energy does not change, but it may be unstable */
   if (changed && !in_time) {
-    change += any ? change_of_energy(s, x) : 0.;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change, 1, MPIU_REAL, MPI_SUM, s->comm));
-    *changed = (PetscBool)(change > enough);
+    change.energy += any ? change_of_energy(s, x, &change.unborne) : 0.;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.energy, 1, MPIU_REAL, MPI_SUM, s->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.unborne, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+    *changed = (PetscBool)(change.energy > enough || change.unborne);
+    if (enough == SB_FAILED_SOLVE) {
+      PetscReal sum[3] = {change.even[0], change.even[1], (PetscReal)j->walls.n};
+
+      /* the states of other failed solves say nothing: tensions of bent bodies err by far more */
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPI_SUM, s->comm));
+      *changed = (PetscBool)(sum[2] > 0. && PetscAbsReal(sum[0]) > sum[1]);
+    }
     s->jump->renew = (PetscBool)(any && !*changed);
     any = (PetscBool)(any && *changed);
   }
@@ -713,6 +888,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscCall(PetscFree(j->r));
   PetscCall(PetscFree(j->tension));
   PetscCall(PetscFree(j->slides));
+  PetscCall(PetscFree(j->walls.wall));
   PetscCall(SbEdgeGapsDestroy(&j->gaps));
   PetscCall(PetscFree(*jump));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -767,6 +943,7 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
       }
     }
   }
+  SbWallsAdd(s, &j->walls, x, factor, f);
   if (j->gaps && factor == SB_JUMP_STIFFNESS)
     SbEdgeGapsAdd(s, j->gaps, x, f);
 }
@@ -793,6 +970,7 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
     if (body)
       body[j->body[b]] += energy - before;
   }
+  energy += SbWallsEnergy(s, &j->walls, x, factor, body);
   if (j->gaps && factor == SB_JUMP_STIFFNESS)
     energy += SbEdgeGapsMirrorEnergy(s, j->gaps, x, body);
   return energy;

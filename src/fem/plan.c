@@ -244,6 +244,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscCall(PetscFree2(p->ui, p->upper));
   PetscCall(PetscFree2(p->face_term[0], p->face_term[1]));
   PetscCall(PetscFree2(p->edge_term[0], p->edge_term[1]));
+  PetscCall(PetscFree2(p->wall_term[0], p->wall_term[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   PetscCall(PetscFree(*plan));

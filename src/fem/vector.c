@@ -94,6 +94,8 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace s)
   for (PetscInt i = 0; i < s->nnode; i++)
     if (s->fixed[i])
       s->fixed_node[s->nfixed++] = i;
+  if (s->jump)
+    PetscCall(SbJumpFindWalls(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

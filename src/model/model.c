@@ -352,25 +352,14 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps,
-                                  PetscBool *changed)
+/* SbSpaceFollowJumps() with the pressures of loads at t. */
+static PetscErrorCode follow_jumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps, PetscReal enough,
+                                   PetscBool *changed)
 {
   PetscReal *even = NULL;
   PetscReal *all;
-  PetscReal enough = 0.;
 
   PetscFunctionBeginUser;
-  if (changed && m->space->jump && !m->space->linear && steps == SB_STEPS_OF_LOAD) {
-    const PetscReal *u;
-    PetscReal least, volume;
-    PetscInt inverted;
-
-    PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-    SbSpaceStrainEnergy(m->space, u, NULL, &enough, &least, &inverted, &volume);
-    PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &enough, 1, MPIU_REAL, MPI_SUM, m->comm));
-    enough *= SETTLED;
-  }
   if (m->nvolume_pressure && m->space->jump)
     PetscCall(PetscCalloc1(2 * m->nbody, &even));
   all = even ? even + m->nbody : NULL;
@@ -386,6 +375,34 @@ PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps
   }
   PetscCall(SbSpaceFollowJumps(m->space, U, all, steps, enough, changed));
   PetscCall(PetscFree(even));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps,
+                                  PetscBool *changed)
+{
+  PetscReal enough = 0.;
+
+  PetscFunctionBeginUser;
+  if (changed && m->space->jump && !m->space->linear && steps == SB_STEPS_OF_LOAD) {
+    const PetscReal *u;
+    PetscReal least, volume;
+    PetscInt inverted;
+
+    PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+    SbSpaceStrainEnergy(m->space, u, NULL, &enough, &least, &inverted, &volume);
+    PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &enough, 1, MPIU_REAL, MPI_SUM, m->comm));
+    enough *= SETTLED;
+  }
+  PetscCall(follow_jumps(m, t, U, steps, enough, changed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelBearStress(SbModel m, PetscReal t, Vec U, PetscBool *changed)
+{
+  PetscFunctionBeginUser;
+  PetscCall(follow_jumps(m, t, U, SB_STEPS_OF_LOAD, SB_FAILED_SOLVE, changed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

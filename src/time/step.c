@@ -86,6 +86,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
   PetscBool warm = PETSC_FALSE;
+  PetscBool borne = PETSC_FALSE; /* the penalty on jumps was adapted to a failed solve */
   PetscInt follows = 0;
   int asked = 0;
 
@@ -109,6 +110,18 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
       PetscCall(SbContactSetFallBack(&m->contacts, run->clock.stop_reason, &again));
     if (again)
       continue;
+
+    /* a penalty on jumps that was too small for the stress at the end makes cells wrinkle, so that
+       no equilibrium is found: once more with that of where the solve came to */
+    if (!*ok && !m->dynamic && reason == SNES_DIVERGED_LINE_SEARCH && !borne &&
+        !run->clock.stopped) {
+      borne = PETSC_TRUE;
+      PetscCall(SbModelBearStress(m, step->t + step->dt, step->U, &again));
+      if (again) {
+        run->solve.tangent_known = PETSC_FALSE;
+        continue;
+      }
+    }
 
     /* the penalty on jumps is that of an earlier state: repeat a load step with that of its end */
     if (*ok && !m->dynamic) {

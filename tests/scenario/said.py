@@ -63,7 +63,7 @@ for n, element, cells, said in (
     (1, "cr", "1,2,2", ("body b", "cr", "24 of 24 tets", "long")),
     (2, "dg", "2,2,20", ("body b", "dg", "480 of 480 tets", "flat")),
     (1, "cr", "5,2,2", ("body b", "long")),
-    (1, "cr", "10,2,2", ()),
+    (1, "cr", "14,2,2", ()),
     (1, "p2", "1,2,2", ()),
 ):
     case(f"{element} {cells}", ["-body_b_mesh", f"box:1,0.1,0.1:{cells}", "-body_b_element", element, "-time", "static", "-effects", "f",
