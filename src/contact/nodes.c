@@ -91,6 +91,7 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
       touch->spring.stiff = touch->spring.k;
     }
   }
+  PetscCall(SbNodeFacetsCreate(c, space, n, facet));
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
@@ -532,6 +533,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   PetscCall(warn_of_passing(c, space, stage->t, &pose, stage->u));
   PetscCall(warn_of_pull(c, space, stage->t));
+  PetscCall(SbNodeFacetsCheck(c, space, stage->t, &pose, stage->u));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);
@@ -567,6 +569,7 @@ static PetscErrorCode destroy_nodes(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbPartnerDestroy(&c->contact.partner));
+  PetscCall(SbNodeFacetsDestroy(c));
   PetscCall(PetscFree(c->node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
