@@ -19,7 +19,7 @@
 
   Penetration at the start of a step is resolved gradually: its depth falls to 1/e in
   `separation_steps` steps. With springs that is the depth beyond their deflection. A static run
-  resolves it at once.
+  resolves it in the first load step, by parts where that is cut.
 
   Nodes are tested at the ends of steps. One that passed through a thin obstacle in a step, or
   through one that jumped, is found afterwards, and a warning says so.
@@ -47,8 +47,7 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
-  if (!e->dynamic)
-    c->contact.overlap.recovery = 0;
+  c->contact.overlap.by_load = (PetscBool)!e->dynamic;
   PetscCall(SbEffectFacets(space, &e->on, &n, &facet));
   PetscCall(PetscMalloc1(6 * n, &c->node));
   PetscCall(PetscMalloc1(space->nnode, &slot));
@@ -142,7 +141,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
   c->first = PETSC_TRUE;
   c->contact.base.unsettled[0] = 0;
   c->impact = 1;
-  SbOverlapBegin(&c->contact.overlap, dt);
+  SbOverlapBegin(&c->contact.overlap, t, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     ContactNode *touch = &c->node[i];
     PetscReal x0[3], X0[3], x1[3], n[3], gap0, depth;
