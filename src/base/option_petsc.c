@@ -86,8 +86,8 @@ static PetscErrorCode check_package(const char *name, const char *value)
   }
   SbSuggestNames(value, n, here, sizeof(near), near);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
-          "-%s %s: this PETSc has no such package; it has %s%s%s%s", name, value, list,
-          near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "");
+          "-%s %s: this PETSc has no such package: choose one of %s, or leave it to -solver%s%s%s",
+          name, value, list, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "");
 }
 
 PetscErrorCode SbOptionsCheckPetsc(void)
