@@ -100,7 +100,7 @@ PetscErrorCode SbOptionsSetDefaults(const char *prefix, const char *options, Pet
 
 /* Examines the options of ours that nobody read (src/base/option_check.c): warns of one that is of
    no use in this run, with the reason; one that does not exist ends the run, with the nearest
-   names. Collective. */
+   names, as does a value of PETSc's that cannot be meant (src/base/option_petsc.c). Collective. */
 PetscErrorCode SbOptionsCheck(void);
 /* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line
    may override. After all rows are registered. Collective. */

@@ -178,6 +178,8 @@ typedef struct {
   char solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "": no linear
                                      systems */
   char solver_reason[256];
+  PetscReal rounding;    /* of residuals, N: default absolute tolerance */
+  PetscBool warned_idle; /* of an absolute tolerance that let the run begin without an iteration */
   struct _p_SbPotential *potential;  /* that Newton's method minimises; owned */
   struct _p_SbSolverList *fallbacks; /* solver_list.c; owned; NULL without linear systems */
   PetscBool saddle;                  /* some effect asks for multipliers as unknowns */

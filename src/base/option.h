@@ -62,3 +62,6 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* All names and values in the database at present. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
 PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);
+/* Error for a value of one of PETSc's options that PETSc takes and that cannot be meant, among
+   those that SbOptionsRemember() has. Not collective. */
+PetscErrorCode SbOptionsCheckPetsc(void);

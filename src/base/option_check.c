@@ -318,6 +318,7 @@ PetscErrorCode SbOptionsCheck(void)
   Verdict *verdict;
 
   PetscFunctionBeginUser;
+  PetscCall(SbOptionsCheckPetsc());
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
   PetscCall(PetscMalloc2(nleft, &verdict, nleft, &text));
   for (PetscInt i = 0; i < nleft; i++) {

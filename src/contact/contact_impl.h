@@ -51,18 +51,25 @@ typedef struct {
 } SbFriction;
 
 /* Gradual resolution of penetration: its depth falls to 1/e in `separation_steps` whole steps; a
-   shorter step resolves less of it, at the same speed. */
+   shorter step resolves less of it, at the same speed. A static run resolves it in the first load
+   step; where that is cut, in proportion to its parts. */
 typedef struct {
+  PetscBool by_load; /* in the first load step */
   PetscReal
     recovery; /* factor on the depth in a whole step, exp(-1/separation_steps); 0: resolved at once */
   PetscReal longest; /* step so far, s */
   PetscReal left;    /* factor on the depth in this step */
 } SbOverlap;
 
-static inline void SbOverlapBegin(SbOverlap *o, PetscReal dt)
+/* A step from t to t + dt, s or load factors. */
+static inline void SbOverlapBegin(SbOverlap *o, PetscReal t, PetscReal dt)
 {
   o->longest = PetscMax(o->longest, dt);
-  o->left = o->recovery > 0 ? PetscPowReal(o->recovery, dt / o->longest) : 0;
+  o->left = 0;
+  if (o->by_load && t + dt < o->longest)
+    o->left = (o->longest - t - dt) / (o->longest - t);
+  else if (!o->by_load && o->recovery > 0)
+    o->left = PetscPowReal(o->recovery, dt / o->longest);
 }
 
 /* Newton's law of restitution for the impact of a point (restitution.c). */

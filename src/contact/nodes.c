@@ -19,7 +19,7 @@
 
   Penetration at the start of a step is resolved gradually: its depth falls to 1/e in
   `separation_steps` steps. With springs that is the depth beyond their deflection. A static run
-  resolves it at once.
+  resolves it in the first load step, by parts where that is cut.
 
   Nodes are tested at the ends of steps. One that passed through a thin obstacle in a step, or
   through one that jumped, is found afterwards, and a warning says so.
@@ -47,8 +47,7 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
-  if (!e->dynamic)
-    c->contact.overlap.recovery = 0;
+  c->contact.overlap.by_load = (PetscBool)!e->dynamic;
   PetscCall(SbEffectFacets(space, &e->on, &n, &facet));
   PetscCall(PetscMalloc1(6 * n, &c->node));
   PetscCall(PetscMalloc1(space->nnode, &slot));
@@ -91,6 +90,7 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
       touch->spring.stiff = touch->spring.k;
     }
   }
+  PetscCall(SbNodeFacetsCreate(c, space, n, facet));
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
@@ -141,7 +141,7 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
   c->first = PETSC_TRUE;
   c->contact.base.unsettled[0] = 0;
   c->impact = 1;
-  SbOverlapBegin(&c->contact.overlap, dt);
+  SbOverlapBegin(&c->contact.overlap, t, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     ContactNode *touch = &c->node[i];
     PetscReal x0[3], X0[3], x1[3], n[3], gap0, depth;
@@ -532,6 +532,7 @@ static PetscErrorCode accept_nodes(SbEffect e, SbSpace space, const SbStage *sta
   PetscCall(SbPartnerPose(&c->contact.partner, stage->t, &pose));
   PetscCall(warn_of_passing(c, space, stage->t, &pose, stage->u));
   PetscCall(warn_of_pull(c, space, stage->t));
+  PetscCall(SbNodeFacetsCheck(c, space, stage->t, &pose, stage->u));
   if (c->contact.friction.updates > UPDATES && !c->contact.friction.said) { /* alike on all ranks */
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
     c->contact.friction.said = (PetscBool)(most > NODE_SETTLED);
@@ -567,6 +568,7 @@ static PetscErrorCode destroy_nodes(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbPartnerDestroy(&c->contact.partner));
+  PetscCall(SbNodeFacetsDestroy(c));
   PetscCall(PetscFree(c->node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -88,6 +88,11 @@ typedef struct {
   NodePlace wrong;     /* a node that the last update changed */
   NodePlace pulled;    /* the node that stays active against the largest pull */
   PetscBool said;      /* the warning of such a node was given */
+  struct {
+    int told;       /* what was said of the facets (node_facets.c) */
+    PetscInt n;     /* number of the facets of own cells; 0: nodes see all of the obstacle */
+    SbFacet *facet; /* [n] */
+  } between;        /* the nodes */
   PetscInt n;
   ContactNode *node; /* [n] */
 } Nodes;
@@ -140,6 +145,19 @@ PetscReal SbNodeGap(const Nodes *c, const SbPose *pose, const PetscReal x[3], Pe
 PetscReal SbNodeSearch(const Nodes *c, SbSpace space, const PetscReal x[3], ContactNode *node);
 void SbNodeMoveTo(PetscReal rest, ContactNode *node);
 void SbNodeEnter(const Nodes *c, ContactNode *node);
+
+/*
+  Facets between their nodes (node_facets.c).
+
+  Create - keeps those of own cells. Not collective.
+  Check  - in the accepted state at t, s or a load factor, with the obstacle in a pose: warns, once
+           for a contact, of an obstacle that is thinner than a facet near it, and of one that is in
+           a facet whose nodes do not feel it. Collective.
+*/
+PetscErrorCode SbNodeFacetsCreate(Nodes *c, SbSpace space, PetscInt n, const SbFacet facet[]);
+PetscErrorCode SbNodeFacetsCheck(Nodes *c, SbSpace space, PetscReal t, const SbPose *pose,
+                                 const PetscReal u[]);
+PetscErrorCode SbNodeFacetsDestroy(Nodes *c);
 
 /* Whether the active set was right for a node, largest: the largest contact force, N; changes it if
    not (response_exact.c, response_springs.c). */

@@ -306,7 +306,7 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   b->separation.announced = PETSC_TRUE;
 
   if (e->dynamic)
-    SbOverlapBegin(&b->contact.overlap, dt);
+    SbOverlapBegin(&b->contact.overlap, 0., dt);
   for (PetscInt i = 0; i < o->n; i++) {
     const SbPenetration *p = &o->point[i];
     const PetscInt one = m->part[p->v[0]];

@@ -1,15 +1,19 @@
 /*
   abaqus_generate.c - nodes and elements that an Abaqus input file describes by rules (Abaqus
-  Keywords Reference Guide): *NGEN (between two nodes, on a line), *NFILL (between two sets, at
+  Keywords Reference Guide): *NGEN (between two nodes, on a line, or with LINE=C at equal angles on
+  the shorter arc around a centre), *NFILL (between two sets, at
   equal distances), *NCOPY (shifted), *ELGEN and *ELCOPY.
 
-  Sets and nodes that a rule uses are defined before it. Errors: *NGEN on curves, *NFILL with bias,
+  Sets and nodes that a rule uses are defined before it. Errors: *NGEN on parabolas, and on arcs
+  of half a circle and more, *NFILL with bias,
   *NCOPY turned or reflected, *ELCOPY reflected: files of these write the nodes instead.
 */
 #include <stdlib.h>
 #include <strings.h>
 #include "abaqus.h"
 
+#define SAME_RADIUS 1e-3       /* largest difference of two radii over their sum: printed digits */
+#define STRAIGHT 1e-3          /* rad, below half a circle: the plane is lost in printed digits */
 #define GENERATED_MOST 4000000 /* nodes and elements that all rules of a file make, at most */
 
 /* Counts what a rule makes: a line of a damaged file may ask for any number. */
@@ -79,23 +83,57 @@ static PetscErrorCode find_node(SbAbaqus *a, int64_t label, PetscInt *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the nodes between u and v, in n steps, the number increasing by `step` each. */
+/* The angle between two points on a circle, rad, below pi. */
+static PetscErrorCode arc_angle(SbAbaqus *a, const PetscReal x[3], const PetscReal y[3],
+                                const PetscReal centre[3], PetscReal *angle)
+{
+  PetscReal p[3], q[3], n[3], r[2];
+
+  PetscFunctionBeginUser;
+  SbSubtract(x, centre, p);
+  SbSubtract(y, centre, q);
+  SbCross(p, q, n);
+  r[0] = PetscSqrtReal(SbDot3(p, p));
+  r[1] = PetscSqrtReal(SbDot3(q, q));
+  *angle = PetscAtan2Real(PetscSqrtReal(SbDot3(n, n)), SbDot3(p, q));
+  if (!(PetscAbsReal(r[0] - r[1]) <= SAME_RADIUS * (r[0] + r[1])))
+    SB_SCAN_ERROR(a->scan,
+                  "*NGEN on an arc with the radii %g and %g at its ends; expected the same",
+                  (double)r[0], (double)r[1]);
+  if (*angle > PETSC_PI - STRAIGHT)
+    SB_SCAN_ERROR(a->scan, "*NGEN on half a circle, whose plane is not known; generate two halves "
+                           "of it, or write its nodes instead");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the nodes between u and v, in n steps, the number increasing by `step` each; centre: of the
+   circle that they are on, NULL: a line. */
 static PetscErrorCode fill(SbAbaqus *a, PetscInt u, PetscInt v, int64_t n, int64_t step,
-                           PetscInt set)
+                           const PetscReal centre[3], PetscInt set)
 {
   SbImport *im = a->deck.im;
   const int64_t first = im->vert_number[u];
+  PetscReal angle = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(count(a, n));
+  if (centre)
+    PetscCall(arc_angle(a, im->x + 3 * u, im->x + 3 * v, centre, &angle));
   for (int64_t k = 1; k < n; k++) {
     const PetscReal s = (PetscReal)k / (PetscReal)n;
+    PetscReal part[2] = {1 - s, s};
     PetscReal *x;
+
+    // on an arc the two radii have other parts (spherical interpolation)
+    if (centre && angle > 0)
+      for (int i = 0; i < 2; i++)
+        part[i] = PetscSinReal((i ? s : 1 - s) * angle) / PetscSinReal(angle);
 
     PetscCall(check_label(a, first + k * step));
     PetscCall(SbDeckAddNode(&a->deck, first + k * step, &x));
     for (int i = 0; i < 3; i++)
-      x[i] = (1 - s) * im->x[3 * u + i] + s * im->x[3 * v + i];
+      x[i] = part[0] * im->x[3 * u + i] + part[1] * im->x[3 * v + i] +
+             (centre ? (1 - part[0] - part[1]) * centre[i] : 0);
     PetscCall(add_to(a, set, first + k * step));
   }
   PetscCall(add_to(a, set, first));
@@ -103,18 +141,51 @@ static PetscErrorCode fill(SbAbaqus *a, PetscInt u, PetscInt v, int64_t n, int64
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *NGEN: first node, last node, increment. */
+/* The centre of an arc: a node, or 0 and coordinates. */
+static PetscErrorCode read_centre(SbAbaqus *a, PetscReal centre[3])
+{
+  int64_t node = 0;
+  PetscReal value[6];
+  PetscInt v;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbAbaqusNumber(a, "centre of an arc", &node));
+  PetscCall(SbAbaqusReals(a, "coordinate or normal", 6, value));
+  if (value[3] != 0 || value[4] != 0 || value[5] != 0)
+    SB_SCAN_ERROR(a->scan,
+                  "*NGEN on an arc with a normal, of half a circle or more; generate parts "
+                  "of it, or write its nodes instead");
+  if (node) {
+    PetscCall(find_node(a, node, &v));
+    PetscCall(PetscArraycpy(centre, a->deck.im->x + 3 * v, 3));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  // coordinates are placed as those of nodes
+  for (int i = 0; i < 3; i++)
+    centre[i] = SbDot3(a->S[i], value) + a->o[i];
+  for (int i = 0; i < 3; i++)
+    value[i] = SbDot3(a->R[i], centre) + a->t[i];
+  PetscCall(PetscArraycpy(centre, value, 3));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* *NGEN: first node, last node, increment; on an arc: node in its centre, or 0 and its coordinates,
+   and for half a circle and more the normal. */
 static PetscErrorCode line_of_nodes(SbAbaqus *a)
 {
+  const char *line = SbAbaqusParameter(a, "LINE");
+  const PetscBool arc = (PetscBool)(line && !strcasecmp(line, "C"));
   PetscInt set, u, v;
 
   PetscFunctionBeginUser;
-  PetscCall(refuse(a, 2, (const char *const[]){"LINE", "SYSTEM"}));
+  PetscCall(refuse(a, 2, (const char *const[]){"SYSTEM", arc ? "SYSTEM" : "LINE"}));
   PetscCall(named_set(a, PETSC_TRUE, "NSET", &set));
   while (SbAbaqusDataLine(a)) {
     int64_t first = 0;
     int64_t last = 0;
     int64_t step = 1;
+    PetscReal centre[3];
 
     PetscCall(SbAbaqusNumber(a, "first node", &first));
     PetscCall(SbAbaqusNumber(a, "last node", &last));
@@ -124,7 +195,9 @@ static PetscErrorCode line_of_nodes(SbAbaqus *a)
                     (long long)first, (long long)last, (long long)step);
     PetscCall(find_node(a, first, &u));
     PetscCall(find_node(a, last, &v));
-    PetscCall(fill(a, u, v, (last - first) / step, step, set));
+    if (arc)
+      PetscCall(read_centre(a, centre));
+    PetscCall(fill(a, u, v, (last - first) / step, step, arc ? centre : NULL, set));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -180,7 +253,7 @@ static PetscErrorCode between_sets(SbAbaqus *a)
       ierr = members(a, PETSC_TRUE, name[k], &n[k], &label[k]);
     for (PetscInt i = 0; i < n[0] && n[0] == n[1] && !ierr; i++)
       ierr = fill(a, SbNumbersFind(&a->deck.im->nodes, label[0][i]),
-                  SbNumbersFind(&a->deck.im->nodes, label[1][i]), nstep, step, set);
+                  SbNumbersFind(&a->deck.im->nodes, label[1][i]), nstep, step, NULL, set);
     PetscCall(PetscFree(label[0]));
     PetscCall(PetscFree(label[1]));
     PetscCall(ierr);

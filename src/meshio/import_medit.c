@@ -4,11 +4,14 @@
 
   A keyword is followed by a count and that many lines of numbers, the last one a reference: N gives
   the group volume_N, surface_N or curve_N, 0 none except for tets. A # begins a comment. Other
-  keywords (Corners, Ridges, Normals, Required...) are skipped with their numbers. Errors: binary
+  keywords (Corners, Ridges, Normals, Required...) are skipped with their numbers. Elements may come
+  before their vertices. Errors: binary
   files (.meshb), volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
+
+#define MOST_EARLY 32 /* sections of elements before the vertices */
 
 /* Keywords of elements, and gmsh's element types. */
 static const struct {
@@ -28,7 +31,7 @@ static PetscErrorCode read_elements(SbImport *im, int type)
 
   PetscFunctionBeginUser;
   if (!im->x)
-    SB_SCAN_ERROR(s, "elements before the section Vertices");
+    SB_SCAN_ERROR(s, "elements, and no section Vertices");
   PetscCall(SbScanCount(s, SbGmshTypes[type].name, 2 * nnode, 2 * nnode, &n));
   for (int64_t i = 0; i < n; i++) {
     PetscInt tags = 0;
@@ -58,6 +61,11 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   char word[32];
   int64_t n, dimension;
   PetscReal reference;
+  struct {
+    const char *at;
+    int type;
+  } early[MOST_EARLY]; /* sections of elements before the vertices */
+  int nearly = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -108,13 +116,20 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     }
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements) && !known; i++) {
       known = (PetscBool)!strcmp(word, elements[i].word);
-      if (known)
+      if (known && !im->x && nearly < MOST_EARLY) {
+        early[nearly].at = s->at;
+        early[nearly++].type = elements[i].type;
+      } else if (known)
         PetscCall(read_elements(im, elements[i].type));
     }
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solids) && !known; i++)
       if (!strncmp(word, solids[i], strlen(solids[i])))
         SB_SCAN_ERROR(s, "section %s; supple reads Tetrahedra, and TetrahedraP2 in Medit's order",
                       word);
+  }
+  for (int i = 0; i < nearly; i++) {
+    s->at = s->token = early[i].at;
+    PetscCall(read_elements(im, early[i].type));
   }
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -185,10 +185,8 @@ static PetscErrorCode read_sets(SbDeck *d, SbNumbers *local)
 
     while (s->at > s->data && s->at[-1] != '\n')
       s->at--; /* back to the beginning of the line */
-    if (!is_mark(s) && !nset)
-      SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     if (!is_mark(s)) {
-      SbScanEndOfLine(s); /* text between data sets */
+      SbScanEndOfLine(s); /* text before and between data sets */
       continue;
     }
     nset++;
@@ -246,6 +244,9 @@ static PetscErrorCode read_sets(SbDeck *d, SbNumbers *local)
     }
     SbScanEndOfLine(s);
   }
+  s->token = s->data;
+  if (!nset)
+    SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

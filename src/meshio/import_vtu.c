@@ -8,16 +8,24 @@
   separately.
 
   Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c.
-  Errors: several pieces, other compressors, volume cells other than 4- and 10-node tets.
+  Several pieces are one grid, cut by the program that wrote it: points of different pieces at the
+  same position are one, and arrays are kept that all pieces have. Errors: ghost cells, which are in
+  two pieces; other compressors, volume cells other than 4- and 10-node tets.
 */
 #include <ctype.h>
 #include <stdlib.h>
 #include <zlib.h>
 #include "meshio_impl.h"
+#include "sbgeometry.h"
 
 enum {
   ZLIB_RATIO = 1032
 }; /* largest compression ratio of zlib */
+
+/* A tag, from its < to behind its >. */
+typedef struct {
+  const char *open, *close;
+} Tag;
 
 typedef struct {
   SbScan *scan;
@@ -26,16 +34,12 @@ typedef struct {
   PetscBool big_endian, zlib;
   int header;              /* bytes of a length field: 4 or 8 */
   const char *xml_end;     /* end of the XML part */
+  Tag piece;               /* the piece that is read, from its < to that of the next one */
   const char *appended;    /* first byte after the mark _, or NULL */
   PetscBool appended_text; /* the appended data is base64 */
   const char *cells_at;    /* position of the cells, for messages */
   unsigned char *raw;      /* decoded bytes of the last array */
 } Vtu;
-
-/* A tag, from its < to behind its >. */
-typedef struct {
-  const char *open, *close;
-} Tag;
 
 /* Finds the next element of this name between `from` and `end`; false if there is none. */
 static PetscBool find_element(const char *from, const char *end, const char *name, Tag *tag)
@@ -289,9 +293,9 @@ static PetscErrorCode content(Vtu *v, const char *name, const char **from, const
 
   PetscFunctionBeginUser;
   (void)snprintf(closing, sizeof(closing), "/%s", name);
-  v->scan->token = v->scan->data;
-  if (!find_element(v->scan->data, v->xml_end, name, &begin) ||
-      !find_element(begin.close, v->xml_end, closing, &after))
+  v->scan->token = v->piece.open;
+  if (!find_element(v->piece.open, v->piece.close, name, &begin) ||
+      !find_element(begin.close, v->piece.close, closing, &after))
     SB_SCAN_ERROR(
       v->scan, "there is no element %s, or it has no end; the file is truncated or damaged", name);
   *from = begin.close;
@@ -320,19 +324,206 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Appends n numbers to an array of `have` ones, of indices (or ends) that `base` comes before. */
+static PetscErrorCode append(Vtu *v, int64_t have, int64_t n, const double from[], double base,
+                             double **to)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportScratch(v->im, (size_t)(have + n) * sizeof(**to), to));
+  for (int64_t i = 0; i < n; i++)
+    (*to)[have + i] = from[i] + base;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The array that goes on as the one of this name in the grid; -1: there is none. */
+static int find_array(const SbVtkGrid *grid, const char *name)
+{
+  for (int a = 0; a < grid->narray; a++)
+    if (!strcmp(grid->array[a].name, name))
+      return a;
+  return -1;
+}
+
+/* Reads the piece v->piece into a grid of its own, with its points. */
+static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, double **x)
+{
+  SbScan *s = v->scan;
+  const Tag piece = v->piece;
+  Tag tag;
+  const char *from, *end;
+  int64_t ncell;
+  int64_t ncomponent = 3;
+  double last;
+  char value[64], found[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(attribute_number(v, piece, "NumberOfPoints", npoint));
+  PetscCall(attribute_number(v, piece, "NumberOfCells", &ncell));
+  if (*npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
+    SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number",
+                  (long long)*npoint, (long long)ncell);
+
+  // the only array of the element Points
+  PetscCall(content(v, "Points", &from, &end));
+  s->token = from;
+  if (!find_element(from, end, "DataArray", &tag))
+    SB_SCAN_ERROR(s, "the element Points has no array");
+  PetscCall(attribute_number(v, tag, "NumberOfComponents", &ncomponent));
+  if (ncomponent != 3)
+    SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  PetscCall(read_array(v, tag, 3 * *npoint, x));
+
+  // cell types, end offsets of cells, then the connectivity
+  grid->ncell = (PetscInt)ncell;
+  PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
+  PetscCall(read_cell_array(v, "types", ncell, &grid->type));
+  last = ncell ? grid->end[ncell - 1] : 0;
+  s->token = v->cells_at;
+  if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
+    SB_SCAN_ERROR(s, "the last of the offsets is %g; expected the number of points of all cells",
+                  last);
+  grid->nconnect = (int64_t)last;
+  PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
+
+  // cell data with one number per cell; other arrays are skipped
+  if (find_element(piece.open, piece.close, "CellData", &tag) && tag.close[-2] != '/') {
+    PetscCall(content(v, "CellData", &from, &end));
+    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS;
+         from = tag.close) {
+      const int a = grid->narray;
+
+      attribute(tag, "NumberOfComponents", sizeof(value), value);
+      if (value[0] && strcmp(value, "1") != 0)
+        continue;
+      attribute(tag, "type", sizeof(value), value);
+      if (!strcmp(value, "String") || !strcmp(value, "Bit")) {
+        attribute(tag, "Name", sizeof(found), found);
+        PetscCall(SbImportSkip(v->im, "array %.32s of type %.8s", found, value));
+        continue;
+      }
+      grid->narray++;
+      attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
+      PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points of different pieces at the same position become one: x[n][3], and the indices in
+   `connect`. */
+static PetscErrorCode join_points(Vtu *v, int64_t *n, double x[])
+{
+  PetscInt *map, *at;
+  PetscReal *y;
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc3(*n, &map, *n, &at, 3 * *n, &y));
+  for (int64_t i = 0; i < 3 * *n; i++)
+    y[i] = x[i];
+  PetscCall(SbWeld((PetscInt)*n, y, 0., PETSC_TRUE, map));
+  for (PetscInt i = 0; i < *n; i++) {
+    if (map[i] == i) {
+      for (int k = 0; k < 3; k++)
+        x[3 * kept + k] = x[3 * i + k];
+      at[i] = kept++;
+    } else
+      at[i] = at[map[i]];
+  }
+  for (int64_t i = 0; i < v->grid.nconnect; i++) {
+    const double point = v->grid.connect[i];
+
+    if (point >= 0 && point < (double)*n && point == PetscFloorReal(point))
+      v->grid.connect[i] = (double)at[(PetscInt)point];
+  }
+  *n = kept;
+  PetscCall(PetscFree3(map, at, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads all pieces as one grid. */
+static PetscErrorCode read_pieces(Vtu *v, int64_t *npoint, double **x)
+{
+  SbScan *s = v->scan;
+  SbVtkGrid *grid = &v->grid;
+  PetscInt npiece = 0;
+  Tag tag, next;
+
+  PetscFunctionBeginUser;
+  if (!find_element(s->data, v->xml_end, "Piece", &tag))
+    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
+  for (;; tag = next) {
+    SbVtkGrid one = {.ncell = 0};
+    const PetscBool more = find_element(tag.close, v->xml_end, "Piece", &next);
+    int64_t n;
+    double *y = NULL;
+
+    v->piece = (Tag){tag.open, more ? next.open : v->xml_end};
+    s->token = tag.close;
+    PetscCall(read_piece(v, &one, &n, &y));
+    if (!npiece++ && !more) {
+      *grid = one;
+      *npoint = n;
+      *x = y;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+
+    // a copy of a cell of another piece is marked by a number
+    for (int a = 0; a < one.narray; a++)
+      for (PetscInt c = 0; c < one.ncell && !strncmp(one.array[a].name, "vtkGhost", 8); c++)
+        if (one.array[a].value[c] != 0) {
+          s->token = tag.open;
+          SB_SCAN_ERROR(s,
+                        "piece %lld has ghost cells, which are in another piece, too; save the "
+                        "grid without them (ParaView: Merge Blocks, Clean to Grid)",
+                        (long long)npiece);
+        }
+
+    // appended to those before: indices go on behind their points, arrays only where all have them
+    if (*npoint + n > PETSC_MAX_INT / 8 || grid->ncell + one.ncell > PETSC_MAX_INT / 8)
+      SB_SCAN_ERROR(s, "%lld points are more than this build can number", (long long)(*npoint + n));
+    PetscCall(append(v, 3 * *npoint, 3 * n, y, 0., x));
+    PetscCall(
+      append(v, grid->nconnect, one.nconnect, one.connect, (double)*npoint, &grid->connect));
+    PetscCall(append(v, grid->ncell, one.ncell, one.end, (double)grid->nconnect, &grid->end));
+    PetscCall(append(v, grid->ncell, one.ncell, one.type, 0., &grid->type));
+    for (int a = 0; a < (npiece == 1 ? one.narray : grid->narray); a++) {
+      const int from = npiece == 1 ? a : find_array(&one, grid->array[a].name);
+
+      if (npiece == 1) {
+        grid->array[a] = one.array[a];
+        grid->narray = a + 1;
+      } else if (from >= 0)
+        PetscCall(
+          append(v, grid->ncell, one.ncell, one.array[from].value, 0., &grid->array[a].value));
+      else {
+        PetscCall(
+          SbImportSkip(v->im, "array %.32s, which not all pieces have", grid->array[a].name));
+        grid->array[a--] = grid->array[--grid->narray];
+      }
+    }
+    *npoint += n;
+    grid->ncell += one.ncell;
+    grid->nconnect += one.nconnect;
+    if (!more)
+      break;
+  }
+
+  PetscCall(join_points(v, npoint, *x));
+  SbImportRemark(v->im, "%lld pieces, joined where their points are at the same positions",
+                 (long long)npiece);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   Vtu vtu = {.scan = s, .im = im};
   Vtu *v = &vtu;
-  Tag tag, second;
-  const char *from, *end;
-  int64_t npoint, ncell;
-  int64_t ncomponent = 3;
+  Tag tag;
+  int64_t npoint = 0;
   double *x = NULL;
-  double last;
-  SbVtkGrid *grid = &v->grid;
-  char value[64], found[64];
+  char value[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -369,62 +560,8 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
       "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
       "Save Data, Compressor Type)",
       value);
-  if (!find_element(s->data, v->xml_end, "Piece", &tag))
-    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
-  s->token = tag.close;
-  if (find_element(tag.close, v->xml_end, "Piece", &second))
-    SB_SCAN_ERROR(
-      s, "the grid is in several pieces; save it in one (ParaView: Merge Blocks, Clean to Grid)");
-  PetscCall(attribute_number(v, tag, "NumberOfPoints", &npoint));
-  PetscCall(attribute_number(v, tag, "NumberOfCells", &ncell));
-  if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
-    SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number",
-                  (long long)npoint, (long long)ncell);
-
-  // the only array of the element Points
-  PetscCall(content(v, "Points", &from, &end));
-  s->token = from;
-  if (!find_element(from, end, "DataArray", &tag))
-    SB_SCAN_ERROR(s, "the element Points has no array");
-  PetscCall(attribute_number(v, tag, "NumberOfComponents", &ncomponent));
-  if (ncomponent != 3)
-    SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
-  PetscCall(read_array(v, tag, 3 * npoint, &x));
+  PetscCall(read_pieces(v, &npoint, &x));
   PetscCall(SbVtkSetPoints((PetscInt)npoint, x, im));
-
-  // cell types, end offsets of cells, then the connectivity
-  grid->ncell = (PetscInt)ncell;
-  PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
-  PetscCall(read_cell_array(v, "types", ncell, &grid->type));
-  last = ncell ? grid->end[ncell - 1] : 0;
-  s->token = v->cells_at;
-  if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
-    SB_SCAN_ERROR(s, "the last of the offsets is %g; expected the number of points of all cells",
-                  last);
-  grid->nconnect = (int64_t)last;
-  PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
-
-  // cell data with one number per cell; other arrays are skipped
-  if (find_element(s->data, v->xml_end, "CellData", &tag) && tag.close[-2] != '/') {
-    PetscCall(content(v, "CellData", &from, &end));
-    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS;
-         from = tag.close) {
-      const int a = grid->narray;
-
-      attribute(tag, "NumberOfComponents", sizeof(value), value);
-      if (value[0] && strcmp(value, "1") != 0)
-        continue;
-      attribute(tag, "type", sizeof(value), value);
-      if (!strcmp(value, "String") || !strcmp(value, "Bit")) {
-        attribute(tag, "Name", sizeof(found), found);
-        PetscCall(SbImportSkip(im, "array %.32s of type %.8s", found, value));
-        continue;
-      }
-      grid->narray++;
-      attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
-      PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));
-    }
-  }
   s->token = v->cells_at;
   PetscCall(SbVtkGridFill(&v->grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -443,13 +443,22 @@ static herr_t add_frame(hid_t top, const char *name, const H5L_info_t *info, voi
   return 0;
 }
 
-/* A file that cannot be continued stays, under another name. Collective. */
+/* A file that cannot be continued stays, under another name; one that is not there, though the
+   checkpoint is, is said to be lost. Collective. */
 static PetscErrorCode keep_aside(SbRun run, SbOutput out, const char *path)
 {
-  char other[SB_OTHER_MAX];
+  const char *slash = strrchr(out->restart, '/');
+  char other[SB_OTHER_MAX], checkpoint[PETSC_MAX_PATH_LEN];
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
+  SbOutputPath(out, slash ? slash + 1 : out->restart, checkpoint);
+  if (!out->rank && run->clock.step0 && access(path, F_OK) &&
+      (!strcmp(out->restart, "latest") || !access(checkpoint, F_OK)))
+    PetscCall(SbWarning(PETSC_COMM_SELF,
+                        "there is no %s with the frames up to step %" PetscInt_FMT
+                        ", where the run goes on: frames go on in a new file",
+                        path, run->clock.step0));
   if (!out->rank && !access(path, F_OK)) {
     SbFileKeep(path, run->clock.step0, other, message);
     if (!message[0])

@@ -172,5 +172,10 @@ PetscErrorCode SbSolverPresetOfUser(const char *choice, const SbSolverPreset **p
     *preset = SbSolverPresetFind(type);
   if (*preset && !(*preset)->direct)
     *preset = NULL;
+  PetscCheck(
+    !given || *preset || base, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "%s %s is none of the packages that -solver %s chooses from, which are cholmod, umfpack "
+    "and mumps: add -pc_type lu, or cholesky where it has that",
+    *option, type, choice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

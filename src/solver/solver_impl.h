@@ -46,7 +46,8 @@ void SbSolverPresetValue(const SbSolverPreset *preset, const char *option, char 
 
   Not collective. Input: choice, the value of -solver. Output: preset, NULL if the user gives no
   such option; option, its name. Options read: -pc_type; -pc_factor_mat_solver_type where `choice`
-  is auto, direct or a factorisation.
+  is auto, direct or a factorisation. Errors: PETSC_ERR_USER for a package that is in no row, where
+  nothing else says that it factors.
 */
 PetscErrorCode SbSolverPresetOfUser(const char *choice, const SbSolverPreset **preset,
                                     const char **option);

@@ -96,8 +96,11 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     } else
       SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
   }
-  if (open)
+  if (open && !f->t->ntri)
     SB_SCAN_ENDS(s, "'%s'", "endsolid");
+  if (open)
+    PetscCall(SbWarning(PETSC_COMM_SELF,
+                        "%s: the last solid has no endsolid; the file may be truncated", f->where));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

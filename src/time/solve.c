@@ -81,6 +81,27 @@ static PetscErrorCode find_tolerances(SbRun run, const SbAttempt *attempt, Toler
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbRunWarnIdle(SbRun run, const char *option, PetscReal norm, const char *what)
+{
+  PetscReal atol;
+  PetscBool given;
+
+  PetscFunctionBeginUser;
+  if (run->solve.warned_idle || run->counters.linear + run->counters.linear_step ||
+      norm <= run->solve.rounding)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsGetReal(NULL, NULL, option, &atol, &given));
+  if (!given || norm > atol)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  run->solve.warned_idle = PETSC_TRUE;
+  PetscCall(SbWarning(run->model->comm,
+                      "%s %g N lets the run begin without an iteration, as %s of %.3g N is "
+                      "below: loads and motions have no effect until it is above. Give less, at "
+                      "least %.1g N, or leave it out",
+                      option, (double)atol, what, (double)norm, (double)run->solve.rounding));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the displacement in U. */
 static PetscErrorCode solve(SbRun run, Vec U, SNESConvergedReason *reason)
 {
@@ -93,6 +114,12 @@ static PetscErrorCode solve(SbRun run, Vec U, SNESConvergedReason *reason)
   PetscCall(SNESGetLinearSolveIterations(run->solve.snes, &linear));
   run->counters.newton_step += newton;
   run->counters.linear_step += linear;
+  if (!newton && *reason == SNES_CONVERGED_FNORM_ABS) {
+    PetscReal norm;
+
+    PetscCall(SNESGetFunctionNorm(run->solve.snes, &norm));
+    PetscCall(SbRunWarnIdle(run, "-snes_atol", norm, "the first residual"));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,6 +230,30 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConverged
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Error for a -snes_type that cannot solve the equations here: others ask for bounds, for functions
+   of a part of the mesh, or for smoothers of their own, or stop after a number of sweeps. */
+static PetscErrorCode check_type(MPI_Comm comm)
+{
+  static const char *const works[] = {
+    SB_SNES_NEWTON, SNESNEWTONLS, SNESNEWTONTR, "newtontrdc", SNESKSPONLY, SNESQN, SNESNCG,
+  };
+  char type[SB_NAME_MAX] = SB_SNES_NEWTON;
+  char list[256] = "";
+  PetscBool is = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-snes_type", type, sizeof(type), NULL));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(works); i++) {
+    is = (PetscBool)(is || !strcmp(works[i], type));
+    SbAppend(sizeof(list), list, "%s%s", list[0] ? ", " : "", works[i]);
+  }
+  PetscCheck(is, comm, PETSC_ERR_USER,
+             "-snes_type %s does not solve the equations here: choose one of %s, "
+             "or leave it out",
+             type, list);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Type and tolerances of the SNES, before the user's options. */
 static PetscErrorCode choose_snes(SbRun run)
 {
@@ -230,8 +281,9 @@ static PetscErrorCode choose_snes(SbRun run)
     force += (SbMaterialYoungModulus(law) + 0.01 * PetscAbsReal(SbMaterialVolumetricModulus(law))) *
              PetscPowReal(m->body[b].volume, 2. / 3.);
   }
+  run->solve.rounding = RESIDUAL * force;
   PetscCall(SNESSetDivergenceTolerance(snes, SB_UNLIMITED_REAL));
-  PetscCall(SNESSetTolerances(snes, RESIDUAL * force, m->dynamic ? 1e-6 : 1e-8, 0.,
+  PetscCall(SNESSetTolerances(snes, run->solve.rounding, m->dynamic ? 1e-6 : 1e-8, 0.,
                               SB_NEWTON_ITERATIONS, SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(snes, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -245,6 +297,7 @@ PetscErrorCode SbRunSetUpSolver(SbRun run)
   PetscBool asked, newton, rtol;
 
   PetscFunctionBeginUser;
+  PetscCall(check_type(m->comm));
   PetscCall(choose_snes(run));
   PetscCall(SbSolverSetUp(snes, m->space, run->solve.solver_used));
 

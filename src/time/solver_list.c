@@ -258,6 +258,10 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   if (ksp->reason > 0) {
     if (!l->again)
       l->failures[0] = 0;
+    if (ksp->reason == KSP_CONVERGED_ATOL && !ksp->its && !run->solve.warned_idle) {
+      PetscCall(VecNorm(b, NORM_2, &size));
+      PetscCall(SbRunWarnIdle(run, "-ksp_atol", size, "the first right-hand side"));
+    }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (factored) {

@@ -161,7 +161,7 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool tried, PetscBo
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
-  PetscBool far;
+  PetscBool far, factored;
   PetscBool other = PETSC_FALSE;
   PetscBool found = PETSC_FALSE;
   const char *unsettled = SbContactSetUnsettled(&l->run->model->contacts);
@@ -171,7 +171,9 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   if (reason > 0 && !far)
     PetscCall(jumped(l, &other));
   *ok = (PetscBool)(reason > 0 && !far && !other && !unsettled[0]);
-  if (other)
+  if (other) /* a body that nothing holds may be anywhere */
+    PetscCall(find_free_body(l, PETSC_TRUE, PETSC_FALSE, &found));
+  if (other && !found)
     PetscCall(SbRunFail(l->run,
                         "load factor %g: contact was found at another equilibrium, with more "
                         "strain energy than the loads have done work; use more -static_steps",
@@ -197,8 +199,11 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     }
   }
 
-  /* with balanced loads a singular system has solutions, up to any rigid motion */
-  if (*ok && !l->run->counters.steps && !l->contact && l->run->counters.newton_step) {
+  /* with balanced loads a singular system has solutions, up to any rigid motion: one of a
+     factorisation is far along it, also in contact */
+  factored = SbConstraintsFactored(l->run->model->space);
+  if (*ok && (factored || (!l->run->counters.steps && !l->contact)) &&
+      l->run->counters.newton_step) {
     PetscCall(find_free_body(l, PETSC_TRUE, PETSC_TRUE, &found));
     *ok = (PetscBool)!found;
   }

@@ -135,6 +135,34 @@ error 1 "-snes_type" bar.opts -output_dir opts_bad -snes_type fas
 error 2 "-snes_lag_jacobian 0" bar.opts -output_dir opts_bad -snes_lag_jacobian 0
 error 1 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -ksp_type fcg -ksp_fcg_mmax 0
 error 2 "-ksp_type fcg|-ksp_fcg_mmax 0|signal 8" bar.opts -output_dir opts_bad -ksp_type fcg -ksp_fcg_mmax 0
+# tolerances that any iterate meets, or none; no iteration; packages and methods that are not there; with any prefix
+error 2 "-snes_rtol 2|[0, 1)" bar.opts -snes_rtol 2
+error 1 "-snes_rtol nan|[0, 1)" bar.opts -snes_rtol nan
+error 1 "-snes_stol -1e-3|[0, 1)" bar.opts -snes_stol -1e-3
+error 1 "-snes_atol inf|[0, inf)" bar.opts -snes_atol inf
+error 1 "-snes_max_it 0|[1, inf)" bar.opts -snes_max_it 0
+error 1 "-ksp_rtol 3|[0, 1)" bar.opts -ksp_rtol 3
+error 1 "-ksp_atol -1|[0, inf)" bar.opts -ksp_atol -1
+error 1 "-ksp_max_it 0|[1, inf)" bar.opts -ksp_max_it 0
+error 1 "-ksp_divtol 0.1|(1, inf]" bar.opts -ksp_divtol 0.1
+error 2 "-mg_levels_ksp_rtol 1|[0, 1)" bar.opts -mg_levels_ksp_rtol 1
+error 1 "-ts_rtol 1.5|[0, 1)" bar.opts -ts_rtol 1.5
+error 1 "-pc_factor_mat_solver_type mumsp|did you mean mumps?" bar.opts -pc_factor_mat_solver_type mumsp
+error 1 "-sub_pc_factor_mat_solver_type nosuch|petsc" bar.opts -sub_pc_factor_mat_solver_type nosuch
+error 1 "-pc_factor_mat_solver_type petsc|-pc_type" bar.opts -pc_factor_mat_solver_type petsc
+for type in vinewtonrsls ms nosuch; do error 2 "-snes_type $type|newtonls|ksponly" bar.opts -snes_type $type; done
+# an absolute tolerance above all loads is one thing that only a run can tell; at rest it says nothing
+for atol in "-snes_atol 1e9" "-snes_type ksponly -ksp_atol 1e9" "-body_bar_material linear -ksp_atol 1e9"; do
+  for n in 1 2; do
+    # shellcheck disable=SC2086
+    "${mpi[@]}" $n "$supple" bar.opts -quiet -output_dir idle $atol >out.txt 2>err.txt
+    check "$atol on $n: exit code $?" test $? = 0
+    check "$atol on $n: $(cat err.txt)" test "$(grep -cE "^supple: warning: .*-[a-z]*_atol .*without an iteration" err.txt) $(wc -l <err.txt)" = "1 1"
+  done
+done
+"$supple" bar.opts -quiet -output_dir idle -effects hold -snes_atol 1e9 >out.txt 2>err.txt
+check "nothing to solve: $(cat err.txt)" test "$(grep -c atol err.txt)" = 0
+
 # as does what begins or ends like one of ours
 error 1 "-solver_type|-solver?" bar.opts -solver_type mumps
 error 1 "-solver hypre|did you mean cg_hypre" bar.opts -solver hypre

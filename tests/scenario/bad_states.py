@@ -1,4 +1,5 @@
-"""States for -body_X_state that are damaged or went astray: an error that names the option and the file, on any number of ranks.
+"""States for -body_X_state that are damaged or went astray: an error that names the option and the file, on any number of ranks. Frames that are
+gone before a restart.
 
 @ranks 1 3
 @cpu 60
@@ -65,5 +66,16 @@ if result.returncode:
 result = run("frame", f"-body_block_mesh {OUT / 'far' / 'fields.h5'} -body_block_mesh_step -1")
 if result.returncode == 0 or "1e+15 m" not in result.stderr:
     found.append(f"frame: code {result.returncode}: {result.stderr}")
-print("\n".join(found) or f"{len(CASES) + 2} passed, 0 failed")
+
+# frames that are gone where a run goes on are said; they go on in a new file. In another folder there were none
+first = run("gone", "-checkpoint_every_steps 1")
+shutil.copytree(OUT / "gone", OUT / "kept")
+(OUT / "gone" / "fields.h5").unlink()
+more = "-ts_max_time 0.02 -restart "
+for name, options, said in (("gone", more + "latest", 1), ("kept", more + "latest", 0), ("other", more + str(OUT / "kept" / "checkpoint_000001.h5"), 0)):
+    result = run(name, options)
+    good = result.returncode == 0 and result.stderr.count("warning") == said and (OUT / name / "fields.h5").is_file()
+    if not good or (said and str(OUT / "gone" / "fields.h5") not in result.stderr):
+        found.append(f"{name}: code {result.returncode}: {first.stderr} {result.stderr}")
+print("\n".join(found) or f"{len(CASES) + 5} passed, 0 failed")
 sys.exit(bool(found))

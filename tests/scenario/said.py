@@ -79,9 +79,26 @@ for n, box, solver in ((1, "0.12,0.12,0.12:3", "cholmod"), (2, "0.25,0.25,0.02:2
     failed += linear > 1000
     print(f"stiff {solver}: {linear} linear iterations")
 
+# an obstacle between the nodes of a facet, which do not feel it; one that is thinner than a facet near it; and those
+# that nodes feel, or that are far
+def poke(obstacle, said=(), ranks=1, element="p1", response="projected", more=()):
+    case(f"{obstacle} {element}", [*BOX, "-body_b_element", element, "-effects", "f,poke", "-effect_f_type", "fixed", "-effect_f_on", "zmin", "-effect_poke_type", "contact",
+                                   "-effect_poke_on", "zmax", "-effect_poke_obstacle", obstacle, "-effect_poke_response", response, *more], ranks=ranks, said=said)
+
+
+for n, element, response in ((1, "p1", "projected"), (2, "p1", "penalty"), (3, "cr", "multiplier"), (1, "dg", "projected"), (2, "p2", "augmented")):
+    poke("sphere:0.03,0.035,0.103,0.005", ("warning", "poke", "0.01 m wide", "0.002 m inside", "of b", "barrier"), n, element, response)
+poke("box:0.028,0.033,0.098,0.032,0.037,0.2", ("0.004 m wide", "inside"))
+poke("sphere:0.03,0.035,0.148,0.05", ("0.1 m wide", "inside"))  # large, but no node is there yet
+poke("capsule:0.03,0.035,0.15,0.03,0.035,0.104,0.003", ("0.006 m wide", "near it", "0.05 to"), 2)
+poke("capsule:0.03,0.035,0.25,0.03,0.035,0.2,0.003")
+poke("sphere:0.05,0.05,0.148,0.05")
+poke("box:0,0.03,0.098,0.1,0.2,0.2")
+poke("plane:0,0,-1,-0.098")
+
 (OUT / "crossed.msh").write_text(MESH)
 SUPPORT = ["-body_b_scale", "0.1", "-effects", "f", "-effect_f_type", "fixed", "-effect_f_on", "Spitze_Körper", "-ts_dt", "0.001", "-ts_max_time", "0.001"]
 case("p1", ["-body_b_mesh", "crossed.msh", *SUPPORT], said=("warning", "crossed.msh", ": 4 ", "0) m"))
 case("cr", ["-body_b_mesh", "crossed.msh", "-body_b_element", "cr", *SUPPORT], said=("error", "crossed.msh", "2 parts", ": 4 "), error=True)
-print(f"{16 - failed} passed, {failed} failed")
+print(f"{28 - failed} passed, {failed} failed")
 sys.exit(failed > 0)

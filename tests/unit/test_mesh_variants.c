@@ -33,6 +33,20 @@ static char folder[512];
   " 5 1 1 11\n .5 0. 0.\n 6 1 1 11\n .5 .5 0.\n 7 1 1 11\n 0. .5 0.\n" \
   " 8 1 1 11\n 0. 0. .5\n 9 1 1 11\n .5 0. .5\n 10 1 1 11\n 0. .5 .5\n"
 
+/* Two tets that share a facet, in two pieces; the second one has its points in another order. */
+#define REGION_ARRAY(n) \
+  "<DataArray type=\"Int32\" Name=\"region\" format=\"ascii\">" n "</DataArray>"
+#define PIECES(more)                                                                            \
+  XML "<CellData>" REGION_ARRAY(                                                                \
+    "7") "</CellData></Piece><Piece NumberOfPoints=\"4\" "                                      \
+         "NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "    \
+         "format=\"ascii\">1 1 1 0 0 1 1 0 0 0 1 0</DataArray></Points><Cells><DataArray "      \
+         "type=\"Int64\" Name=\"connectivity\" format=\"ascii\">2 3 1 0</DataArray><DataArray " \
+         "type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray><DataArray "            \
+         "type=\"Int64\" "                                                                      \
+         "Name=\"types\" format=\"ascii\">10</DataArray></Cells><CellData>" more REGION_ARRAY(  \
+           "8") "</CellData>" XML_END
+
 /* One tet of volume 1/6. */
 static const struct {
   const char *name, *text;
@@ -86,6 +100,11 @@ static const struct {
    "MeshVersionFormatted 1\rDimension 3\rVertices\r4\r0 0 0 0\r1 0 0 0\r0 1 0 0\r0 0 1 0\r"
    "Tetrahedra\r1\r1 2 3 4 7\rEnd\r",
    3, "volume_7", ""},
+  {"a.mesh",
+   "MeshVersionFormatted 1\nDimension 3\nTriangles 1\n1 2 3 9\nTetrahedra 1\n1 2 3 4 7\n"
+   "Vertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nEnd\n",
+   3, "volume_7", ""},
+  {"a.unv", "SDRC export of a part\n\n" UNODE UEND UTET UEND, 3, "volume_2", ""},
   {"a.unv", UNODE UEND "made by hand\n\n" UTET UEND "and of no use\n", 3, "volume_2", ""},
   {"a.unv",
    "    -1\n   164\n 5mm (milli-newton)  2\n 1.0D+03 1. 1.\n 273.\n" UEND UNODE UEND UTET UEND, 3,
@@ -127,6 +146,10 @@ static const struct {
    "solid s\n" FACET("0 0 0", "0 1 0", "1 0 0") FACET("0 0 0", "1 0 0", "0 0 1")
      FACET("1 0 0", "0 1 0", "0 0 1") FACET("0 0 0", "0 0 1", "0 1 0") "endsolid\n",
    "s"},
+  {"b.stl",
+   "solid s\n" FACET("0 0 0", "0 1 0", "1 0 0") FACET("0 0 0", "1 0 0", "0 0 1")
+     FACET("1 0 0", "0 1 0", "0 0 1") FACET("0 0 0", "0 0 1", "0 1 0"),
+   "s"},
   // contents beat the ending
   {"b.obj",
    "solid s\n" FACET("0 0 0", "0 1 0", "1 0 0") FACET("0 0 0", "1 0 0", "0 0 1")
@@ -151,6 +174,12 @@ static const char *const bad[][3] = {
    "    -1\n  2420\n 1\npart\n 5 1 0\nCS5\n 1. 0. 0.\n 0. 1. 0.\n 0. 0. 1.\n 0. 0. 0.\n" UEND
    "    -1\n  2411\n 1 5 1 11\n 0. 0. 0.\n" UEND,
    "line 14|node 1|coordinate system 5"},
+  {"c.unv", "a letter\n  -1 of it\n", "line 1|-1"},
+  {"c.mesh", "MeshVersionFormatted 1\nDimension 3\nTetrahedra 1\n1 2 3 4 7\nEnd\n",
+   "line 3|Vertices"},
+  {"c.vtu",
+   PIECES("<DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">1</DataArray>"),
+   "line 3|piece 2|ghost"},
   {"c.mesh",
    "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
    "TetrahedraP2Ordering\n1\n1 2 3 4\nEnd\n",
@@ -178,6 +207,23 @@ int main(int argc, char **argv)
              "mesh %d has no group %s", (int)k, meshes[k].group);
     SB_CHECK(meshes[k].note[0] ? strstr(im.note, meshes[k].note) != NULL : !im.note[0],
              "mesh %d: note '%s'", (int)k, im.note);
+    PetscCall(SbImportDestroy(&im));
+  }
+  {
+    PetscReal volume = 0;
+    SbImport im;
+
+    (void)snprintf(path, sizeof(path), "%s/pieces.vtu", folder);
+    PetscCall(test_file_put(
+      path, PIECES("<DataArray type=\"Int32\" Name=\"g\" format=\"ascii\">1</DataArray>")));
+    PetscCall(test_import(path, &im));
+    for (PetscInt i = 0; i < im.item[3].n; i++)
+      volume += PetscAbsReal(SbTetDeterminant(im.x, im.item[3].vert + 4 * i));
+    SB_CHECK(im.nvert == 5 && im.item[3].n == 2 && PetscAbsReal(volume - 3) < 1e-6,
+             "pieces: %d vertices, %d tets, volume %g", (int)im.nvert, (int)im.item[3].n, volume);
+    SB_CHECK(test_count(&im, 3, "volume_7") == 1 && test_count(&im, 3, "volume_8") == 1,
+             "pieces lost their regions");
+    SB_CHECK(strstr(im.note, "2 pieces") != NULL, "pieces: note '%s'", im.note);
     PetscCall(SbImportDestroy(&im));
   }
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(surfaces); k++) {
