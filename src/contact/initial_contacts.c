@@ -221,6 +221,7 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
   SbInitialContacts touches = {0};
   uint8_t *none, *held;
   PetscReal *way;
+  PetscInt potential = -1; /* the first one that has some */
   PetscBool directed = PETSC_TRUE;
 
   /* overlaps and touches */
@@ -237,7 +238,7 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
       PetscCall(gather_touches(s, &mine, &touches));
     }
     PetscCall(PetscFree(mine.touch));
-    *k = *k < 0 && all->n + touches.n > n + ntouch ? i : *k;
+    potential = potential < 0 && all->n + touches.n > n + ntouch ? i : potential;
   }
 
   /* those of bodies that are held; touches where nothing overlaps */
@@ -248,6 +249,7 @@ static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, Pets
   if (directed && all->n == before)
     PetscCall(add_touches(fixed, &touches, all));
   PetscCall(PetscFree(touches.touch));
+  *k = *k < 0 && all->n > before ? potential : *k;
   if (all->n > before)
     qsort(all->touch + before, (size_t)(all->n - before), sizeof(*all->touch), by_value);
   for (PetscInt i = before; i < all->n; i++) {
