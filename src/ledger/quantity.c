@@ -28,7 +28,6 @@
 #include "sbkernel.h"
 
 #define ADJOINT 1e-2 /* relative tolerance of the dual solve */
-#define FEWEST 4     /* tets of a rank, below which there is no finer run */
 #define MIX 1e-3     /* s above: size of s z over that of u, in the energy norm */
 
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l)
@@ -350,12 +349,7 @@ static const char *why_not_finer(SbLedger l, PetscReal ncell)
 {
   const SbRun run = l->run;
   const SbModel m = run->model;
-  PetscInt fewest = m->mesh->ncell_owned; /* of all ranks */
 
-  // a second set-up was seen to wait forever beside ranks with a tet or none
-  (void)MPI_Allreduce(MPI_IN_PLACE, &fewest, 1, MPIU_INT, MPI_MIN, m->comm);
-  if (fewest < FEWEST)
-    return "some rank has fewer than 4 tets: take fewer ranks";
   if (run->clock.stop_reason[0] || run->clock.t < 1. - 1e-9)
     return "this run did not reach its whole load";
   if (run->clock.arc.on)
