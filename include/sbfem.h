@@ -509,7 +509,8 @@ struct _p_SbRecovery {
     *weight; /* [ncell][4] weight of a cell's stress in the value of a corner; 0: not owned */
   PetscReal *value; /* [nvert nlayer][9] recovered values */
 
-  /* for P2; NULL without a P2 body */
+  /* for P2; NULL without a P2 body, or without vertices here */
+  PetscBool quadratic; /* some body is P2: alike on all ranks, as arrays are not */
   PetscReal (
     *factor)[2][SB_FIT_MONOMIALS * SB_FIT_MONOMIALS]; /* [nvert_owned nlayer] Cholesky factors */
   struct SbFit {
@@ -521,7 +522,7 @@ struct _p_SbRecovery {
 /* Patches, once. Collective. */
 PetscErrorCode SbRecoveryCreate(SbSpace space, SbRecovery *recovery);
 PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery); /* sets NULL; NULL is accepted */
-/* Fits the stresses of owned cells, P[ncell][9] and of P2 point[ncell] (NULL without), Pa; those of
+/* Fits the stresses of owned cells, P[ncell][9] and of P2 point[ncell], Pa; those of
    ghosts are filled in. Collective. */
 PetscErrorCode SbRecoveryFit(SbRecovery recovery, PetscReal P[], SbPointStress point[]);
 /* The recovered stress at a corner of a cell, linear elements, [9] Pa. Not collective. */

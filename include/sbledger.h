@@ -32,6 +32,19 @@ PetscErrorCode SbLedgerAttach(SbLedger ledger);
 /* `to`, attached, continues the sums of errors and work of `from`, on a re-meshed model. Not
    collective. */
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
+/*
+  SbLedgerWantsFiner - whether the error of the quantity by the mesh of a static run that has ended
+  is to be found by a second, finer run; if it cannot be, the report says why. Collective; ledger
+  NULL: it is not.
+
+  Output: refine - how often the second run divides each tet into eight; all its bodies are P2.
+
+  SbLedgerSetFiner() takes the quantity from that run, after SbRunSolve(), with want_energies and
+  want_residual of its monitors; seconds: of the phases of that run, on this rank. Collective.
+*/
+PetscErrorCode SbLedgerWantsFiner(SbLedger ledger, PetscInt *refine, PetscBool *wanted);
+PetscErrorCode SbLedgerSetFiner(SbLedger ledger, SbRun finer,
+                                const PetscReal seconds[SB_PHASE_COUNT]);
 /* Writes the table as `file`, and prints it unless quiet. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerReport(SbLedger ledger, const char *file, PetscBool quiet);
 PetscErrorCode SbLedgerDestroy(SbLedger *ledger);

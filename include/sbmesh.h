@@ -76,6 +76,7 @@ typedef struct {
   PetscReal rotate[4];       /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];    /* m, third */
   SbTetOptions tet;          /* for a mesh that is a surface; m */
+  PetscInt refine;           /* how often each tet is divided into eight after reading */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
   PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
   PetscBool

@@ -22,4 +22,10 @@ PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);
   Collective.
 */
 PetscErrorCode SbRemeshSolve(SbRemesh remesh, SbModel *model, SbRun *run, SbLedger *ledger);
+/*
+  SbFinerRun - where the ledger asks for it (SbLedgerWantsFiner()), the same scene once more with P2
+  on the same or finer tets, for the error of the ledger's quantity by the mesh. After the static
+  run, before SbLedgerReport(). Neither output nor state of the run change. Collective.
+*/
+PetscErrorCode SbFinerRun(SbRun run, SbLedger ledger);
 PetscErrorCode SbRemeshDestroy(SbRemesh *remesh);

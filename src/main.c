@@ -54,6 +54,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbReportSummary(s->run));
   if (!overlap)
     PetscCall(SbSceneWarnOverlap(s->run, "at the end", &overlap));
+  PetscCall(SbFinerRun(s->run, s->ledger));
   SbOutputFile(s->run, "ledger.csv", file, &quiet);
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);

@@ -294,7 +294,6 @@ PetscReal SbRecoveryNode(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
 
 PetscErrorCode SbRecoveryCreate(SbSpace space, SbRecovery *recovery)
 {
-  PetscBool quadratic = PETSC_FALSE;
   SbRecovery r;
 
   PetscFunctionBeginUser;
@@ -302,10 +301,10 @@ PetscErrorCode SbRecoveryCreate(SbSpace space, SbRecovery *recovery)
   r->mesh = space->mesh;
   r->element = space->element;
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
-    quadratic = (PetscBool)(quadratic || r->element[b]->nodes_per[1]);
+    r->quadratic = (PetscBool)(r->quadratic || r->element[b]->nodes_per[1]);
   PetscCall(create_slots(r));
   PetscCall(create_weights(r));
-  if (quadratic)
+  if (r->quadratic)
     PetscCall(create_quadratic(r));
   *recovery = r;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -316,7 +315,7 @@ PetscErrorCode SbRecoveryFit(SbRecovery r, PetscReal P[], SbPointStress point[])
   const SbMesh mesh = r->mesh;
 
   PetscFunctionBeginUser;
-  if (point)
+  if (r->quadratic)
     PetscCall(fit_quadratic(r, point));
   PetscCall(SbForestBroadcast(mesh->cell_sf, 9, MPIU_REAL, P, P));
   PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));

@@ -35,6 +35,11 @@ const SbOption SbLedgerRows[] = {
    "ledger_quantity displacement and reaction: direction; its length does not matter"},
   {"ledger_on", SB_OPTION_STRING, 1, "", "", "",
    "ledger_quantity reaction: set of its prescribed nodes"},
+  {"ledger_finer_most", SB_OPTION_INT, 1, "", "500000", "[0, inf)",
+   "static runs with ledger_quantity: the scene is solved once more with p2, on the same tets if "
+   "all "
+   "bodies are p1, else on tets of half the edges, unless that takes more tets than this; the "
+   "difference is the error by the mesh. Else it is estimated by duality; 0: always"},
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
    "target relative error in the energy norm, of time steps with ledger_quantity displacement "
    "that of it over its range: chooses time steps, tolerances and the width of "
@@ -67,6 +72,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   l->accuracy = accuracy;
   l->budget = budget;
   PetscCall(SbOptionInt(&SbRunScope, "ledger_every", &l->every));
+  PetscCall(SbOptionInt(&SbRunScope, "ledger_finer_most", &l->finer_most));
   PetscCall(SbQuantitySetFromOptions(l));
   PetscCall(SbAdaptiveToleranceSetFromOptions(l));
   *ledger = l;

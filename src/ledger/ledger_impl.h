@@ -70,10 +70,9 @@ typedef struct {
   SbQuantityKind kind;
   PetscReal at[3], direction[3];
   char on[SB_NAME_MAX];
-  PetscInt node;  /* displacement: the nearest owned node, -1: on another rank */
-  PetscReal x[3]; /* rest position of that node, on all ranks, m */
+  PetscReal x[3]; /* displacement: rest position of its vertex or node, on all ranks, m */
   uint64_t set;   /* reaction: bit of the set */
-  Vec weight;     /* reaction: direction of the force, at the prescribed unknowns of the set */
+  Vec weight; /* the quantity is its product with displacements, or (reaction) with the residual */
   PetscReal value, least, most; /* current value; extremes over the run */
   PetscInt nlast;               /* dynamic: number of last values known, at most 4 */
   PetscReal last[4], last_t[4]; /* these, newest first, and their times, s */
@@ -92,6 +91,13 @@ struct _p_SbLedger {
   SbSpaceEstimate space;
   PetscReal *space_error; /* [nbody] last estimate, J */
   SbQuantity quantity;
+  PetscInt finer_most; /* tets of a finer run, above which there is none */
+  struct {
+    PetscReal value;                 /* of the quantity, SI */
+    PetscInt ncell;                  /* its tets; 0: no finer run */
+    char why[256];                   /* why there is none; "": not asked for */
+    PetscReal phase[SB_PHASE_COUNT]; /* its seconds, which are not those of the run */
+  } finer;
 
   PetscInt order; /* order of the integrator; error constant, lag of velocities (SbRunLocalError) */
   PetscReal c, ahead;
@@ -176,6 +182,9 @@ PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step);
 
 /* quantity.c */
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l);
+/* Makes x, set and weight (owned) of a quantity for a run. Collective. Error
+   (PETSC_ERR_USER_INPUT): no unknown of the set is prescribed. */
+PetscErrorCode SbQuantityLocate(SbQuantity *q, SbRun run);
 PetscErrorCode SbQuantityAttach(SbLedger l);
 /* After re-meshing: warns if the node of the quantity has changed. Collective. */
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);

@@ -13,6 +13,11 @@
 #define WIDTH 79
 #define LOCKED 49.7 /* bulk over shear modulus, nu = 0.49 */
 
+/* relative differences from the finer run below and, with CR, DG and P2, above which that may err
+   as much (docs/reports/error_estimates.md) */
+#define SMALL 1e-3
+#define LARGE 0.05
+
 #define ROOM 2048 /* length of the advice text */
 
 /* Seconds by source of error, and other seconds; on the slowest rank. */
@@ -41,6 +46,8 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
 
   PetscFunctionBeginUser;
   PetscCall(SbLogSeconds(phase));
+  for (int i = 0; i < SB_PHASE_COUNT; i++)
+    phase[i] -= l->finer.phase[i];
   t[ASSEMBLY] = phase[SB_PHASE_RESIDUAL] + phase[SB_PHASE_TANGENT] - l->residuals;
   t[SOLVE] = phase[SB_PHASE_SOLVE] - l->solving;
   t[CONTACT] = phase[SB_PHASE_CONTACT];
@@ -168,6 +175,49 @@ static void say_locked(SbLedger l, char w[ROOM])
            "may be many times as large; -body_%s_element %s does not lock. ",
            m->body[b].name, m->body[b].name,
            m->contacts.nactive_set || m->contacts.npotential ? "cr" : "p2 (or cr)");
+}
+
+/* The quantity here and by the finer run, or how far its error by duality may be off. */
+static void say_quantity(SbLedger l, char w[ROOM])
+{
+  static const char *const units[] = {"", "m", "N", "m^3"};
+  const SbModel m = l->run->model;
+  const SbQuantity *q = &l->quantity;
+  const PetscReal size = PetscAbsReal(q->value);
+  PetscBool other = PETSC_FALSE; /* some body is not P1 */
+
+  if (!q->kind || m->dynamic)
+    return;
+  if (l->finer.ncell) {
+    SbAppend(ROOM, w,
+             "The %s is %.6g %s here, and %.6g %s by p2 with %" PetscInt_FMT
+             " tets: the difference is its error by the mesh, within a factor of two",
+             q->kind == SB_QUANTITY_DISPLACEMENT ? "displacement"
+             : q->kind == SB_QUANTITY_REACTION   ? "reaction"
+                                                 : "volume",
+             (double)q->value, units[q->kind], (double)l->finer.value, units[q->kind],
+             l->finer.ncell);
+    if (q->error[SB_ERROR_SPACE] < SMALL * size)
+      SbAppend(ROOM, w, ", but it is so small that p2 may be no better");
+    else if (q->error[SB_ERROR_SPACE] > LARGE * size && l->finer.ncell > m->mesh->Ncell)
+      SbAppend(ROOM, w,
+               ", but it is so large that stresses may be infinite somewhere, as at the edge of a "
+               "support, where p2 is no better: it is a bound only");
+    SbAppend(ROOM, w, ". ");
+    return;
+  }
+  for (PetscInt b = 0; b < m->nbody; b++)
+    other = (PetscBool)(other || !m->element[b]->nodes_per[0] || m->element[b]->nodes_per[1]);
+  if (l->finer.why[0])
+    SbAppend(ROOM, w, "There is no finer run for the error of the quantity by the mesh: %s. ",
+             l->finer.why);
+  if (q->kind == SB_QUANTITY_VOLUME)
+    SbAppend(ROOM, w, "It is an order of magnitude only. ");
+  else if (other)
+    SbAppend(
+      ROOM, w,
+      "The error of the quantity by duality is UNRELIABLE with p2, cr and dg: up to 30 times "
+      "the true one. ");
 }
 
 /* Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the
@@ -418,6 +468,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCall(print_line(l, &s, "estimates", -1., NULL, s.estimates, "of this table"));
   PetscCall(print_line(l, &s, "together", together(l), NULL, s.total, ""));
   say_locked(l, words);
+  say_quantity(l, words);
   say_largest(l, &s, words);
   say_wasted(l, &s, words);
   report_accuracy(l, words);

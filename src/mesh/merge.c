@@ -24,6 +24,8 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
     PetscCall(SbImportMemoryMesh(&body[b], im));
   else
     PetscCall(SbImportReadCopy(&body[b], b ? &body[b - 1] : NULL, shared, im));
+  for (PetscInt i = 0; i < body[b].refine; i++)
+    PetscCall(SbMeshFileRefine(im));
   PetscCall(SbImportCheck(im, &part->faces));
   PetscCall(SbImportQuality(im, &part->faces, &body[b]));
   if (!body[b].in_memory && strncmp(body[b].mesh, "box:", 4) != 0)

@@ -677,7 +677,7 @@ void SbImportSlabs(const SbBody *body, PetscInt *ncell)
   char why[PETSC_MAX_PATH_LEN + 256];
 
   *ncell = 0;
-  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
+  if (body->in_memory || body->mesh_step || body->refine || !dot || strcasecmp(dot, ".h5"))
     return;
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   file = SbH5IsOwn(body->mesh, sizeof(why), why) ? H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT)

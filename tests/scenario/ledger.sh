@@ -46,6 +46,15 @@ for n in 1 2 3; do
   check "$n ranks: space differs" near "$(column led$n/ledger.csv space 4)" "$(column led1/ledger.csv space 4)" 1e-6
   check "$n ranks: of the quantity" near "$(column led$n/ledger.csv space 5)" "$(column led1/ledger.csv space 5)" 1e-3
 done
+check "the quantity by a finer run" grep -q 'The displacement is .* here, and .* by p2 with 648 tets' <<<"$(tr '\n' ' ' <out1.txt)"
+for n in 1 3; do
+  "${mpi[@]}" $n "$supple" bar.opts -body_bar_element cr -ledger yes -ledger_quantity displacement -ledger_at 0.4,0,0 -output_dir "cr$n" >"cr$n.txt" 2>&1
+  check "cr, $n ranks: exit code $?" test $? = 0
+  check "cr, $n ranks: no finer run" grep -q 'by p2 with 5184 tets' <<<"$(tr '\n' ' ' <"cr$n.txt")"
+  check "cr, $n ranks: of the quantity" near "$(column cr$n/ledger.csv space 5)" "$(column cr1/ledger.csv space 5)" 1e-3
+done
+"$supple" bar.opts -body_bar_element cr -ledger yes -ledger_quantity displacement -ledger_at 0.4,0,0 -ledger_finer_most 1000 -output_dir dual >dual.txt 2>&1
+check "no word of a finer run that is too large" grep -q 'takes more than -ledger_finer_most tets.*UNRELIABLE' <<<"$(tr '\n' ' ' <dual.txt)"
 check "the error of the mesh, $(column led1/ledger.csv space 4)" near "$(column led1/ledger.csv space 4)" 0.45 0.3
 check "columns of the history" grep -q 'error_space,error_time,error_nonlinear,error_linear,error_contact,error_rounding$' <<<"$(head -n 1 led1/history.csv)"
 for n in 1 3; do

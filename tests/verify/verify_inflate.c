@@ -29,6 +29,10 @@
     iterations are bounded, with CHOLMOD, which fails if the tangent is indefinite, and with MUMPS,
                which only counts negative pivots
     order      the error of a perturbed solution is squared by one iteration of Newton's method
+
+  Beyond the largest pressure of the closed form there is no equilibrium on the path, but there are
+  others: the inner wall may go through the centre. A run to 1.3 times that pressure, in one load
+  step and in several, ends at the limit with an error, and what it has reached is inflated.
 */
 #include "verify.h"
 
@@ -301,10 +305,66 @@ static PetscErrorCode check_body(PetscInt k, PetscBool classical, const char *mo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A run to 1.3 times the largest pressure. nu: of P1, which locks, where its own limit is below
+   that. */
+static PetscErrorCode check_beyond(const char *element, PetscReal nu, PetscInt steps)
+{
+  PetscReal limit = 0.;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscReal *x;
+  char mesh[512];
+  TestScene t;
+  SbMesh m;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 1; i < 300; i++)
+    limit = PetscMax(limit, closed_form(3, PETSC_TRUE, 1. + 0.01 * (PetscReal)i));
+  PetscCall(write_sphere(2, 2, mesh));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %.17g "
+    "-body_a_poisson %.17g -body_a_density 1 -sets x0,y0,z0,inside " WALLS
+    "-set_inside_at sphere:0,0,0,1.001 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+    "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
+    "-effect_push_on inside -effect_push_value %.17g -time static -static_steps %d",
+    mesh, element, 2. * (1. + nu), nu, 1.3 * limit, (int)steps));
+  PetscCall(SbRunSolve(t.run));
+  m = t.model->mesh;
+  PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &x));
+  PetscCall(SbSpaceVertexPositions(t.model->space, t.run->state.U, x));
+  for (PetscInt v = 0; v < m->nvert_owned; v++)
+    if (SbDot3(m->x + 3 * v, m->x + 3 * v) < 1.001)
+      least = PetscMin(least, SbDot3(m->x + 3 * v, x + 3 * v));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, m->comm));
+  PetscCall(PetscFree(x));
+  test_print("  1.3 times the limit, %s, %d load steps: %.4f of it in %d steps, softening %.0f, "
+             "inner radius %.3f\n    %s\n",
+             element, (int)steps, 1.3 * t.run->clock.t, (int)t.run->counters.steps,
+             t.run->solve.softening, least, t.run->clock.stop_reason);
+  SB_CHECK(t.run->clock.stop_reason[0] && t.run->clock.t < 1.,
+           "%s, %d load steps: the load factor %g was reached", element, (int)steps,
+           t.run->clock.t);
+  SB_CHECK(t.run->clock.t > 0.65 && t.run->clock.t < 0.95, "%s: ended at %g of the load", element,
+           t.run->clock.t);
+  SB_CHECK(t.run->solve.softening > 5., "%s: softening %g", element, t.run->solve.softening);
+  SB_CHECK(least > 1.4, "%s, %d load steps: the inner wall is at radius %g", element, (int)steps,
+           least);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   check_quadrature();
+  for (PetscInt steps = 1; steps < 6; steps += 4) {
+    PetscCall(check_beyond("p2", NU, steps));
+    if (test_size > 1)
+      continue; /* many short steps of small systems */
+    PetscCall(check_beyond("cr", NU, steps));
+    PetscCall(check_beyond("p1", 0.3, steps));
+  }
   for (int classical = 0; classical < 2; classical++) {
     PetscCall(check_body(3, (PetscBool)classical,
                          "-sets x0,y0,z0,inside " WALLS

@@ -2,10 +2,11 @@
 /*
   Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of
   time steps on an oscillating bar, for every integrator and with damping; of linear and Newton
-  solves with loose tolerances; of contact springs and barrier gaps. And: the ledger changes no
-  result, its estimates are the same on any number of ranks, and -accuracy is reached, also if
-  contact is the largest error. The true error of the time step is relative to the same run with 32
-  times shorter steps by Newmark's method, that of a solve relative to a solution up to rounding.
+  solves with loose tolerances; of quantities of static runs, by the mesh; of contact springs and
+  barrier gaps. And: the ledger changes no result, its estimates are the same on any number of
+  ranks, and -accuracy is reached, also if contact is the largest error. The true error of the time
+  step is relative to the same run with 32 times shorter steps by Newmark's method, that of a solve
+  relative to a solution up to rounding.
 */
 #include "../../src/ledger/ledger_impl.h"
 #include "verify.h"
@@ -253,21 +254,13 @@ static PetscErrorCode tip_accuracy(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Errors of quantities: of the tip of a swinging bar by the time step, and of Cook's membrane by
-   the mesh, against P2 with edges of a quarter of the length. */
+/* Errors of the tip of a swinging bar by the time step. */
 static PetscErrorCode quantities(void)
 {
   static const char p1[] = "-body_bar_material linear";
   static const char p2[] =
     "-body_bar_material linear -body_bar_mesh box:0.4,0.1,0.1:1 -body_bar_element p2";
   static const char turned[] = "-body_bar_material corotated -snes_rtol 1e-9";
-  static const struct {
-    const char *element;
-    PetscReal nu, exact, low, high;
-  } cook[] = {{"p1", 0.3, 21.94401, 0.5, 2.},
-              {"p2", 0.45, 19.58106, 0.5, 2.},
-              {"p2", 0.4999, 18.50922, 0.5, 2.}};
-
   PetscFunctionBeginUser;
   PetscCall(tip_in_time(p1, "newmark", 20));
   if (test_size == 1) {
@@ -278,32 +271,96 @@ static PetscErrorCode quantities(void)
     PetscCall(tip_in_time(turned, "newmark", 20));
     PetscCall(tip_in_time(turned, "euler_implicit", 40));
   }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cook); i++) {
-    TestScene t;
-    SbQuantity *q;
-    PetscReal error;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(test_open(
-      &t,
-      "-bodies a -body_a_mesh meshes/cook.msh -body_a_material linear -body_a_young 1 "
-      "-body_a_poisson %g -body_a_element %s -body_a_density 1 -effects hold,plane,pull "
-      "-effect_hold_type fixed -effect_hold_on left -effect_plane_type fixed -effect_plane_on all "
-      "-effect_plane_components z -effect_pull_type traction -effect_pull_on right "
-      "-effect_pull_vector 0;1/16;0 -time static -solver direct -ledger yes -ledger_quantity "
-      "displacement -ledger_at 48,52,0 -ledger_direction 0,1,0",
-      (double)cook[i].nu, cook[i].element));
-    PetscCall(verify_solve(&t, "cook"));
-    q = &((SbLedger)t.run->monitors.post_solve.ctx)->quantity;
-    error = PetscAbsReal(q->value - cook[i].exact);
-    test_print("  | Cook, %s, nu %g | space | %.2e | %.2e | %.2f |\n", cook[i].element,
-               (double)cook[i].nu, error, q->error[SB_ERROR_SPACE],
-               q->error[SB_ERROR_SPACE] / error);
-    SB_CHECK(q->error[SB_ERROR_SPACE] > cook[i].low * error &&
-               q->error[SB_ERROR_SPACE] < cook[i].high * error,
-             "Cook, %s, nu %g: estimate / error %g", cook[i].element, (double)cook[i].nu,
-             q->error[SB_ERROR_SPACE] / error);
-    PetscCall(test_scene_close(&t));
+/* Solves a static scene, then what the ledger needs for the error of its quantity; the error by the
+   mesh has to be within a factor of two. exact: of a much finer mesh. */
+static PetscErrorCode quantity(const char *what, const char *element, PetscReal nu, PetscReal exact,
+                               const char *options)
+{
+  TestScene t;
+  const SbQuantity *q;
+  PetscReal error, ratio;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_open(&t,
+                      "%s -body_a_poisson %g -body_a_element %s -time static -ledger yes "
+                      "-snes_rtol 1e-8 -ksp_rtol 1e-9",
+                      options, (double)nu, element));
+  PetscCall(verify_solve(&t, what));
+  PetscCall(SbFinerRun(t.run, t.ledger));
+  q = &t.ledger->quantity;
+  error = PetscAbsReal(q->value - exact);
+  ratio = q->error[SB_ERROR_SPACE] / error;
+  test_print("  | %s, %s, nu %g | space | %.2e | %.2e | %.2f |\n", what, element, (double)nu, error,
+             q->error[SB_ERROR_SPACE], ratio);
+  SB_CHECK(t.ledger->finer.ncell > 0, "%s, %s, nu %g: no finer run: %s", what, element, (double)nu,
+           t.ledger->finer.why);
+  SB_CHECK(ratio > 0.5 && ratio < 2., "%s, %s, nu %g: estimate / error %g", what, element,
+           (double)nu, ratio);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Errors of quantities of static runs by the mesh, of all elements. References: P2 on the same
+   tets, divided twice, and extrapolated. */
+static PetscErrorCode quantities_in_space(void)
+{
+  static const char cook[] =
+    "-bodies a -body_a_mesh meshes/cook.msh -body_a_material linear -body_a_young 1 "
+    "-body_a_density 1 -effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
+    "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type "
+    "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -ledger_quantity displacement "
+    "-ledger_at 48,52,0 -ledger_direction 0,1,0";
+  static const char bar[] =
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_density 1000 -effects g,h -effect_g_type "
+    "gravity -effect_g_vector 0,0,-9.81 -effect_h_type fixed -effect_h_on xmin -body_a_young "
+    "1.5e5 -static_steps 4 -ledger_quantity displacement -ledger_at 0.4,0.05,0.05 ";
+  static const char press[] =
+    "-bodies a -body_a_mesh box:1,1,1:2 -body_a_density 1 -body_a_material linear -body_a_young 1 "
+    "-sets part -set_part_at box:0,0,1,0.5,0.5,1 -effects low,top -effect_low_type fixed "
+    "-effect_low_on zmin -effect_top_type prescribed_displacement -effect_top_on part "
+    "-effect_top_displacement 0;0;-0.01 -ledger_quantity reaction -ledger_on part";
+  static const char *const elements[] = {"p1", "p2", "cr", "dg"};
+  static const struct {
+    PetscReal nu, cook, bar, press;
+  } of[] = {{0.3, 21.94363, -0.21310, -0.005059}, {0.4999, 18.5042, -0.20940, -0.005571}};
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    for (size_t e = 0; e < PETSC_STATIC_ARRAY_LENGTH(elements); e++) {
+      char scene[VERIFY_TEXT];
+
+      PetscCall(quantity("Cook", elements[e], of[i].nu, of[i].cook, cook));
+      if (test_size > 1)
+        continue;
+      PetscCall(quantity("block", elements[e], of[i].nu, of[i].press, press));
+      PetscCall(PetscSNPrintf(scene, sizeof(scene), "%s -body_a_material stable_neohookean", bar));
+      PetscCall(quantity("bent bar", elements[e], of[i].nu, of[i].bar, scene));
+    }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where no finer run is possible or asked for the ledger says so, and takes duality. */
+static PetscErrorCode no_finer(const char *options, const char *why)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_open(&t,
+                      BAR "-body_bar_material linear -time static -ledger yes -ledger_quantity "
+                          "displacement -ledger_at 0.4,0.05,0.05 %s",
+                      options));
+  PetscCall(verify_solve(&t, options));
+  PetscCall(SbFinerRun(t.run, t.ledger));
+  SB_CHECK(!t.ledger->finer.ncell && !strncmp(t.ledger->finer.why, why, strlen(why)) &&
+             !t.ledger->finer.why[0] == !why[0],
+           "%s: %d tets of a finer run, '%s'", options, (int)t.ledger->finer.ncell,
+           t.ledger->finer.why);
+  SB_CHECK(t.ledger->quantity.error[SB_ERROR_SPACE] > 0., "%s: no error by duality", options);
+  PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -493,9 +550,14 @@ int main(int argc, char **argv)
   PetscInt few, many;
 
   SB_TEST_BEGIN(argc, argv);
+  PetscCall(PetscLogDefaultBegin()); /* seconds of phases, as main() has them */
+  PetscCall(quantities_in_space());
   PetscCall(steps());
   PetscCall(solves());
   PetscCall(quantities());
+  PetscCall(no_finer("-ledger_finer_most 0", ""));
+  PetscCall(no_finer("-ledger_finer_most 191", "it takes more than -ledger_finer_most"));
+  PetscCall(no_finer("-static_control arc_length", "arc length"));
   PetscCall(springs());
 
   /* a factorisation on several ranks sums in the order in which messages arrive */
