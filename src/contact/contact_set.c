@@ -122,6 +122,20 @@ PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal SbContactSetObstacleWay(const SbContactSet *contacts, PetscReal size)
+{
+  PetscReal most = 0.;
+
+  for (PetscInt k = 0; k < contacts->n; k++) {
+    const SbPartner *p = &((const Contact *)contacts->contact[k])->partner;
+    const PetscReal turn = PetscAbsReal(p->pose[1].angle - p->pose[0].angle);
+    PetscReal way = PetscSqrtReal(SbDistance2(p->pose[0].d, p->pose[1].d)) + turn * size;
+
+    most = PetscMax(most, p->obstacle ? way : 0.);
+  }
+  return most;
+}
+
 PetscErrorCode SbContactSetGradient(const SbContactSet *contacts, Vec U, PetscReal scale,
                                     PetscBool free_only, PetscReal *energy, Vec F)
 {

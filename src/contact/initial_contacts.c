@@ -392,6 +392,21 @@ PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSetSupported(const SbContactSet *contacts, PetscBool *all)
+{
+  const PetscInt nbody = contacts->space->mesh->nbody;
+  uint8_t *fixed;
+
+  PetscFunctionBeginUser;
+  *all = PETSC_TRUE;
+  PetscCall(PetscCalloc1(nbody + 1, &fixed));
+  PetscCall(find_supported(contacts->space, fixed));
+  for (PetscInt b = 0; b < nbody; b++)
+    *all = (PetscBool)(*all && fixed[b]);
+  PetscCall(PetscFree(fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSetFindPenetrated(const SbContactSet *contacts, PetscReal t, Vec U,
                                           SbContact *found)
 {

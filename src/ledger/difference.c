@@ -100,6 +100,8 @@ PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *
     /* Newton's method had nothing to do: no tangent was assembled */
     if (!run->solve.tangent_known) {
       PetscCall(SNESGetSolution(run->solve.snes, &U));
+      if (run->clock.arc.on) /* solves linear systems alone */
+        U = run->state.U;
       PetscCall(SNESComputeJacobian(run->solve.snes, U, run->solve.system, run->solve.J));
       PetscCall(KSPSetOperators(ksp, run->solve.system, run->solve.J));
     }

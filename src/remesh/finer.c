@@ -105,6 +105,8 @@ PetscErrorCode SbFinerRun(SbRun run, SbLedger ledger)
                                    STIFF * SbMaterialShearModulus(m->material[k]));
   if (!whole)
     finer->clock.t0 = 1. - 1. / (PetscReal)finer->clock.static_steps;
+  finer->clock.stop.listens = run->clock.stop.listens;
+  finer->clock.stop.grace = run->clock.stop.grace;
   PetscCall(SbModelSetUp(m));
   PetscCall(SbRunSetUp(finer));
   if (!whole)

@@ -444,6 +444,50 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbRunLostBody(SbRun run, Vec X, const char **name, PetscReal *way)
+{
+  const SbModel m = run->model;
+  const SbSpace s = m->space;
+  const PetscInt nbody = m->nbody;
+  const PetscScalar *x, *u;
+  PetscReal *sum; /* of each body: displacements, nodes, prescribed ones */
+  PetscReal *most;
+  PetscReal carried = 0.;
+
+  PetscFunctionBeginUser;
+  *name = NULL;
+  *way = 0.;
+  PetscCall(PetscCalloc2(5 * nbody, &sum, nbody, &most));
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetArrayRead(run->state.U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscInt b = s->node_body[i];
+
+    for (int k = 0; k < 3; k++)
+      sum[5 * b + k] += PetscRealPart(x[3 * i + k] - u[3 * i + k]);
+    sum[5 * b + 3] += 1.;
+    sum[5 * b + 4] += s->fixed[i] != 0;
+    most[b] = PetscMax(most[b], PetscSqrtReal(SbDistance2(x + 3 * i, u + 3 * i)));
+  }
+  PetscCall(VecRestoreArrayRead(run->state.U, &u));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(5 * nbody), MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, (PetscMPIInt)nbody, MPIU_REAL, MPI_MAX, s->comm));
+  for (PetscInt b = 0; b < nbody; b++)
+    if (sum[5 * b + 4] > 0.)
+      carried = PetscMax(carried, most[b]);
+  for (PetscInt b = 0; b < nbody && !*name; b++) {
+    const PetscReal size = PetscSqrtReal(SbDistance2(m->body[b].bbox, m->body[b].bbox + 3));
+
+    *way = PetscSqrtReal(SbDot3(sum + 5 * b, sum + 5 * b)) / sum[5 * b + 3];
+    if (sum[5 * b + 4] == 0. && *way > size + carried + SbContactSetObstacleWay(&m->contacts, size))
+      *name = m->body[b].name;
+  }
+  PetscCall(PetscFree2(sum, most));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far)
 {
   const SbModel m = run->model;

@@ -165,9 +165,23 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscBool other = PETSC_FALSE;
   PetscBool found = PETSC_FALSE;
   const char *unsettled = SbContactSetUnsettled(&l->run->model->contacts);
+  const char *lost = NULL;
+  PetscReal way;
 
   PetscFunctionBeginUser;
   PetscCall(SbRunTooFar(l->run, l->X, &far));
+  if (reason > 0 && !far && l->contact)
+    PetscCall(SbRunLostBody(l->run, l->X, &lost, &way));
+  if (lost) {
+    *ok = PETSC_FALSE;
+    l->run->solve.free_body = PETSC_TRUE;
+    PetscCall(SbRunFail(l->run,
+                        "load factor %g: the body %s slips away, by %.3g m in this load step, as "
+                        "nothing holds it; hold it by a support or by friction, or let it come to "
+                        "rest in a dynamic run",
+                        (double)l->factor, lost, (double)way));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (reason > 0 && !far)
     PetscCall(jumped(l, &other));
   *ok = (PetscBool)(reason > 0 && !far && !other && !unsettled[0]);
