@@ -226,8 +226,6 @@ PetscErrorCode SbContactSetFindPenetrated(const SbContactSet *contacts, PetscRea
 /* The longest way of a point within `size`, m, of an obstacle's axis in this step, m, over all
    obstacles. Not collective. */
 PetscReal SbContactSetObstacleWay(const SbContactSet *contacts, PetscReal size);
-/* Whether every body has some support: others need their loads to stay in contact. Collective. */
-PetscErrorCode SbContactSetSupported(const SbContactSet *contacts, PetscBool *all);
 /* Not collective. */
 void SbContactGive(SbContact c, SbSpace space, PetscReal energy, PetscReal counted);
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts);

@@ -120,9 +120,9 @@ static PetscBool find_ways(PetscInt n, const SbInitialContact touch[], PetscInt 
   return (PetscBool)(longest > MISSED * most);
 }
 
-/* held[nbody + 1]: fixed[], and the components in which a body without supports is between
-   supported ones, which would push it together: contacts lead to them on both of its sides, maybe
-   by way of others. */
+/* held[nbody + 1]: fixed[], and the components in which a body is between supported ones, which
+   would push it together: contacts lead to them on both of its sides, maybe by way of others. A
+   body without supports that is so in one component has friction, or its shape, in the others. */
 static PetscErrorCode find_held(PetscInt n, const SbInitialContact touch[], PetscInt nbody,
                                 const uint8_t fixed[], uint8_t held[])
 {
@@ -148,8 +148,11 @@ static PetscErrorCode find_held(PetscInt n, const SbInitialContact touch[], Pets
       again = PETSC_TRUE;
     }
   }
-  for (PetscInt b = 0; b <= nbody; b++)
+  for (PetscInt b = 0; b <= nbody; b++) {
     held[b] = fixed[b] | (side[0][b] & side[1][b]);
+    if (!fixed[b] && held[b])
+      held[b] = 7;
+  }
   PetscCall(PetscFree2(side[0], side[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -208,58 +211,52 @@ static PetscErrorCode add_touches(const uint8_t fixed[], SbInitialContacts *touc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves held bodies that touch or overlap apart from where they are, u, which was moved by
-   shift[nbody + 1][3] so far; *k: the first potential that has some, -1: none; *apart: none do any
-   more. all: contacts that were found so far, from the first positions. */
+/* Moves bodies that overlap, or else supported ones that touch, apart from where they are, u, which
+   was moved by shift[nbody + 1][3] so far; *k: the first potential that has some, -1: none; *apart:
+   none do any more. all: contacts that were found so far, from the first positions; touches: those
+   of this round. */
 static PetscErrorCode shift_once(const SbContactSet *contacts, PetscReal t, PetscReal dt,
                                  const uint8_t fixed[], PetscReal u[], PetscReal shift[],
-                                 SbInitialContacts *all, PetscInt *k, PetscBool *apart)
+                                 SbInitialContacts *all, SbInitialContacts *touches, PetscInt *k,
+                                 PetscBool *apart)
 {
   const SbSpace s = contacts->space;
   const PetscInt nbody = s->mesh->nbody;
   const PetscInt before = all->n;
-  SbInitialContacts touches = {0};
-  uint8_t *none, *held;
+  uint8_t *none;
   PetscReal *way;
   PetscInt potential = -1; /* the first one that has some */
   PetscBool directed = PETSC_TRUE;
 
   /* overlaps and touches */
   PetscFunctionBeginUser;
+  touches->n = 0;
   for (PetscInt i = 0; i < contacts->npotential; i++) {
     const PetscInt n = all->n;
-    const PetscInt ntouch = touches.n;
+    const PetscInt ntouch = touches->n;
     SbInitialContacts mine = {0};
     PetscBool first = PETSC_FALSE;
 
     PHASE_CALL(contacts->potential[i], initial_contacts, s, t, dt, u, &first, &mine);
     if (first) {
       PHASE_CALL(contacts->potential[i], overlaps, s, &directed, all);
-      PetscCall(gather_touches(s, &mine, &touches));
+      PetscCall(gather_touches(s, &mine, touches));
     }
     PetscCall(PetscFree(mine.touch));
-    potential = potential < 0 && all->n + touches.n > n + ntouch ? i : potential;
+    potential = potential < 0 && all->n + touches->n > n + ntouch ? i : potential;
   }
 
-  /* those of bodies that are held; touches where nothing overlaps */
-  PetscCall(PetscMalloc1(nbody + 1, &held));
-  PetscCall(SbReserve(all->n + touches.n, sizeof(*all->touch), &all->size, &all->touch));
-  PetscCall(PetscArraycpy(all->touch + all->n, touches.touch, touches.n));
-  PetscCall(find_held(all->n + touches.n, all->touch, nbody, fixed, held));
   if (directed && all->n == before)
-    PetscCall(add_touches(fixed, &touches, all));
-  PetscCall(PetscFree(touches.touch));
+    PetscCall(add_touches(fixed, touches, all));
   *k = *k < 0 && all->n > before ? potential : *k;
   if (all->n > before)
     qsort(all->touch + before, (size_t)(all->n - before), sizeof(*all->touch), by_value);
   for (PetscInt i = before; i < all->n; i++) {
     SbInitialContact *touch = &all->touch[i];
 
-    directed = (PetscBool)(directed && is_pushed(touch, held));
     for (int c = 0; c < 3; c++)
       touch->gap -= touch->n[c] * (shift[3 * touch->body[0] + c] - shift[3 * touch->body[1] + c]);
   }
-  PetscCall(PetscFree(held));
   *apart = (PetscBool)(directed && all->n == before);
   if (*apart || !directed) {
     all->n = before;
@@ -298,23 +295,32 @@ PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, Pets
   const SbSpace s = contacts->space;
   PetscInt k = -1;
   SbInitialContacts list = {0};
+  SbInitialContacts touches = {0};
   PetscReal *u, *shift;
   PetscScalar *way;
-  uint8_t *fixed;
+  uint8_t *fixed, *held;
   PetscBool apart = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(3 * (s->mesh->nbody + 1), &shift, s->mesh->nbody + 1, &fixed));
+  PetscCall(PetscCalloc3(3 * (s->mesh->nbody + 1), &shift, s->mesh->nbody + 1, &fixed,
+                         s->mesh->nbody + 1, &held));
   PetscCall(find_supported(s, fixed));
   PetscCall(SbSpaceGetLocalWrite(s, U, &u));
   PetscCall(SbSpaceUpdateGhosts(s, u));
   for (int round = 0; round < ROUNDS && !apart; round++) {
     const PetscInt n = list.n;
 
-    PetscCall(shift_once(contacts, t, dt, fixed, u, shift, &list, &k, &apart));
+    PetscCall(shift_once(contacts, t, dt, fixed, u, shift, &list, &touches, &k, &apart));
     if (!apart && list.n == n)
       break;
   }
+
+  /* supports have to push all of them together again */
+  PetscCall(SbReserve(list.n + touches.n, sizeof(*list.touch), &list.size, &list.touch));
+  PetscCall(PetscArraycpy(list.touch + list.n, touches.touch, touches.n));
+  PetscCall(find_held(list.n + touches.n, list.touch, s->mesh->nbody, fixed, held));
+  for (PetscInt i = 0; i < list.n; i++)
+    apart = (PetscBool)(apart && is_pushed(&list.touch[i], held));
 
   /* where some stay in each other all stay, and springs have to part them */
   if (!apart)
@@ -327,8 +333,9 @@ PetscErrorCode SbContactSetShift(const SbContactSet *contacts, PetscReal t, Pets
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     way[i] = k < 0 ? 0. : shift[3 * s->node_body[i / 3] + i % 3];
   PetscCall(VecRestoreArray(S, &way));
+  PetscCall(PetscFree(touches.touch));
   PetscCall(PetscFree(list.touch));
-  PetscCall(PetscFree2(shift, fixed));
+  PetscCall(PetscFree3(shift, fixed, held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,21 +396,6 @@ PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscR
   PetscCall(SbSpaceUpdateGhosts(s, u));
   PHASE_CALL(contacts->potential[k], part, s, t, u, moved);
   PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactSetSupported(const SbContactSet *contacts, PetscBool *all)
-{
-  const PetscInt nbody = contacts->space->mesh->nbody;
-  uint8_t *fixed;
-
-  PetscFunctionBeginUser;
-  *all = PETSC_TRUE;
-  PetscCall(PetscCalloc1(nbody + 1, &fixed));
-  PetscCall(find_supported(contacts->space, fixed));
-  for (PetscInt b = 0; b < nbody; b++)
-    *all = (PetscBool)(*all && fixed[b]);
-  PetscCall(PetscFree(fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

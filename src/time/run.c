@@ -292,7 +292,7 @@ static PetscErrorCode start_contacts(SbRun run)
   const SbModel m = run->model;
   const PetscReal t = run->clock.t0;
   SbContact first = NULL; /* that has something to resolve */
-  PetscBool shifted, supported;
+  PetscBool shifted;
   SbEnergies energies = {0};
   PetscReal start, now;
   Vec shift;
@@ -320,8 +320,7 @@ static PetscErrorCode start_contacts(SbRun run)
   }
   if (!first && !m->dynamic && t == 0.)
     PetscCall(SbContactSetFindPenetrated(&m->contacts, t, run->state.U, &first));
-  PetscCall(SbContactSetSupported(&m->contacts, &supported));
-  if (!m->dynamic && first && (shifted || supported))
+  if (!m->dynamic && first)
     PetscCall(SbStaticPush(run, shifted ? shift : NULL, first, start));
   PetscCall(VecDestroy(&shift));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -77,6 +77,26 @@ for response, ranks in (("barrier", 1), ("barrier", 3), ("projected", 1), ("mult
     if not good:
         print(f"FAILED: a free body, {response}, {ranks} ranks: exit code {done.returncode}: {done.stderr[-300:]} {rows}; {slips.returncode}: {slips.stderr[-300:]}")
 
+# It overlaps one of them and touches the other, or nearly; and in a cup of five of them.
+SIDES = {"a": "-1,0,0 xmin", "b": "1,0,0 xmax", "d": "0,-1,0 ymin", "e": "0,1,0 ymax", "f": "0,0,-1 zmin"}
+CUP = "-bodies a,b,c,d,e,f -body_c_mesh box:0.1,0.1,0.1:2 -effect_meet_friction 0.3 -effects meet,left,right,hd,he,hf"
+for side, text in SIDES.items():
+    way, face = text.split()
+    at = ",".join(f"{float(x) * (SIZE - DEEP):.17g}" for x in way.split(","))
+    CUP += f" -body_{side}_mesh box:0.1,0.1,0.1:1 -body_{side}_translate {at}"
+    CUP += f" -effect_h{side}_type fixed -effect_h{side}_on {side}.{face}" if side > "c" else ""
+_, pushed = run("touchpushed", 0.0, -DEEP - 2 * GAP, "3 2", 1, FREE.format(SIZE + GAP, 2 * (SIZE + GAP), "barrier", 0.3))
+for name, extra, strain in (("touch", FREE.format(SIZE - DEEP, 2 * SIZE - DEEP, "barrier", 0.3), pushed[-1]["strain"]),
+                            ("touchprojected", FREE.format(SIZE - DEEP, 2 * SIZE - DEEP, "projected", 0.3), pushed[-1]["strain"]),
+                            ("gap", FREE.format(SIZE - DEEP, 2 * SIZE - 0.1 * DEEP, "barrier", 0.3), 0.0), ("cup", CUP, 0.0)):
+    done, rows = run(name, 0.0, 0.0, "3 2", 1, extra)
+    good = done.returncode == 0 and not rows[-1]["meet_unguarded"] and rows[-1]["max_displacement"] < 2 * DEEP
+    good = good and abs(rows[-1]["strain"] - rows[-1]["meet_work"]) < 1e-3 * rows[-1]["strain"]
+    good = good and (not strain or abs(rows[-1]["strain"] / strain - 1) < 0.05)  # gaps of 2 % of each way
+    passed, failed = passed + good, failed + (not good)
+    if not good:
+        print(f"FAILED: a free body, {name}: exit code {done.returncode}: {done.stderr[-300:]} {rows}")
+
 done, _ = run("base", 0.1 * SIZE, 0.0, "2 1", 1, BASE)
 good = done.returncode == 1 and "effect meet" in done.stderr and "-body_NAME_translate" in done.stderr
 passed, failed = passed + good, failed + (not good)
