@@ -43,11 +43,14 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   };
   const SbRun run = l->run;
   PetscReal phase[SB_PHASE_COUNT], t[COUNT], beyond;
+  PetscReal finer = 0.; /* of the estimates, those of the finer run, after this one */
 
   PetscFunctionBeginUser;
   PetscCall(SbLogSeconds(phase));
-  for (int i = 0; i < SB_PHASE_COUNT; i++)
+  for (int i = 0; i < SB_PHASE_COUNT; i++) {
     phase[i] -= l->finer.phase[i];
+    finer += l->finer.phase[i];
+  }
   t[ASSEMBLY] = phase[SB_PHASE_RESIDUAL] + phase[SB_PHASE_TANGENT] - l->residuals;
   t[SOLVE] = phase[SB_PHASE_SOLVE] - l->solving;
   t[CONTACT] = phase[SB_PHASE_CONTACT];
@@ -55,7 +58,7 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   t[SETUP] = phase[SB_PHASE_MESH] + phase[SB_PHASE_SETUP];
   t[OUTPUT] = phase[SB_PHASE_OUTPUT];
   t[ESTIMATES] = l->seconds;
-  t[TOTAL] = run->counters.seconds_solve;
+  t[TOTAL] = run->counters.seconds_solve + finer;
   for (int i = 0; i < COUNT; i++)
     t[i] = PetscMax(t[i], 0.);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, t, COUNT, MPIU_REAL, MPI_MAX, run->model->comm));
@@ -65,13 +68,15 @@ static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
   *s = (Seconds){.setup = t[SETUP],
                  .output = t[OUTPUT],
                  .estimates = t[ESTIMATES],
-                 .total = t[TOTAL] + t[SETUP]};
+                 .total = t[SETUP] + t[OUTPUT] + t[ESTIMATES]};
   s->source[SB_ERROR_SPACE] = (1. - beyond) * t[ASSEMBLY];
   s->source[SB_ERROR_LINEAR] = (1. - beyond) * t[SOLVE];
   s->source[SB_ERROR_NONLINEAR] = beyond * (t[ASSEMBLY] + t[SOLVE]);
   s->source[SB_ERROR_CONTACT] = t[CONTACT] + t[SEARCH];
   s->source[SB_ERROR_TIME] = PetscMax(0., t[TOTAL] - t[ASSEMBLY] - t[SOLVE] - t[CONTACT] -
                                             t[SEARCH] - t[OUTPUT] - t[ESTIMATES]);
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    s->total += s->source[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,11 +127,17 @@ static PetscReal growth(SbRun run)
   return strstr(name, "gamg") || strstr(name, "pressure") || strstr(name, "two_level") ? 1. : 2.;
 }
 
+/* Seconds of the run without its estimates, but not 0. */
+static PetscReal seconds_of_run(const Seconds *s)
+{
+  return PetscMax(s->total - s->estimates, 1e-9);
+}
+
 /* Cost of halving the error of a source, as a factor on the time of the run. */
 static PetscReal cost(SbLedger l, const Seconds *s, int source)
 {
   const SbRun run = l->run;
-  const PetscReal total = PetscMax(s->total, 1e-9);
+  const PetscReal total = seconds_of_run(s);
   const PetscReal solving = s->source[SB_ERROR_LINEAR] / total;
   const PetscReal digits = PetscLog2Real(1. / PetscMax(l->rtol > 0. ? l->rtol : 1e-5, 1e-14));
 
@@ -314,7 +325,7 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
     return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = SbLedgerError(l, of[i].source);
-    const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * PetscMax(s->total, 1e-9));
+    const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * seconds_of_run(s));
     const PetscBool factorised =
       (PetscBool)(l->run->counters.linear <= l->run->counters.newton); /* no tolerance */
 
