@@ -447,3 +447,18 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpacePrescribeDone(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    s->nfixed += s->fixed[i] != 0;
+  PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
+  s->nfixed = 0;
+  for (PetscInt i = 0; i < s->nnode; i++)
+    if (s->fixed[i])
+      s->fixed_node[s->nfixed++] = i;
+  if (s->jump)
+    PetscCall(SbJumpFindWalls(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

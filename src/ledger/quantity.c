@@ -396,7 +396,8 @@ PetscErrorCode SbLedgerSetFiner(SbLedger l, SbRun finer, const PetscReal seconds
     l->seconds += seconds[i];
   }
   if (finer->clock.stop_reason[0]) {
-    PetscCall(PetscSNPrintf(l->finer.why, sizeof(l->finer.why), "it found no equilibrium: %s",
+    PetscCall(PetscSNPrintf(l->finer.why, sizeof(l->finer.why), "it %s: %s",
+                            finer->clock.stopped ? "was stopped" : "found no equilibrium",
                             finer->clock.stop_reason));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

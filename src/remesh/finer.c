@@ -106,7 +106,7 @@ PetscErrorCode SbFinerRun(SbRun run, SbLedger ledger)
   if (!whole)
     finer->clock.t0 = 1. - 1. / (PetscReal)finer->clock.static_steps;
   finer->clock.stop.listens = run->clock.stop.listens;
-  finer->clock.stop.grace = run->clock.stop.grace;
+  finer->clock.stop.grace = 0.; /* its step is nothing to wait for */
   PetscCall(SbModelSetUp(m));
   PetscCall(SbRunSetUp(finer));
   if (!whole)
