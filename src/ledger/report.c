@@ -202,7 +202,7 @@ static void say_quantity(SbLedger l, char w[ROOM])
   if (l->finer.ncell) {
     SbAppend(ROOM, w,
              "The %s is %.6g %s here, and %.6g %s by p2 with %" PetscInt_FMT
-             " tets: the difference is its error by the mesh, within a factor of two",
+             " tets: the difference is its error by the mesh, mostly within a factor of two",
              q->kind == SB_QUANTITY_DISPLACEMENT ? "displacement"
              : q->kind == SB_QUANTITY_REACTION   ? "reaction"
                                                  : "volume",
