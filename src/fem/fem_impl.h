@@ -43,6 +43,32 @@ typedef struct {
 #define SB_SUPPORT (-1)
 
 /*
+  face_shape.c: faces of long and flat cells.
+
+  SbFaceSlopes - of a face whose cells have the mean volume `volume`, m^3: what the penalty spares
+                 the slopes of the jump; rest is left at 0. Not collective.
+  SbFacesWarn  - warns of bodies with cells beyond those that are verified; face[n] of this rank,
+                 V[ncell] volumes, m^3. Collective.
+*/
+typedef struct {
+  PetscReal rest;         /* c1 at rest, N/m */
+  PetscReal bears;        /* part of the stress that the penalty at rest bears, of round cells' */
+  PetscReal spared[2][3]; /* of the penalty at rest, and of what stress adds to it: parts of c1 on
+                             |J_i - J_(i + 1)|^2, 0 to 1/3 in the mean */
+} SbSlopes;
+SbSlopes SbFaceSlopes(SbSpace space, const SbFace *face, PetscReal volume);
+PetscErrorCode SbFacesWarn(SbSpace space, PetscInt n, const SbFace face[], const PetscReal V[]);
+
+/* less[3], N/m, of c1: what slopes are spared in all. */
+static inline void SbSlopesLess(const SbSlopes *slopes, PetscReal c1, PetscReal less[3])
+{
+  const PetscReal rest = PetscMin(c1, slopes->rest);
+
+  for (int i = 0; i < 3; i++)
+    less[i] = rest * slopes->spared[0][i] + (c1 - rest) * slopes->spared[1][i];
+}
+
+/*
   wall.c: the penalty on jumps at smooth walls. Not collective.
 
   SbFaceIsHeld   - whether all of a boundary face's displacement is prescribed; its node, on which
@@ -50,9 +76,9 @@ typedef struct {
   SbFaceWallAxis - 0..2: the axis across the smooth wall that a boundary face is on, or SB_NO_WALL;
                    its node
   SbWallsFind    - lists the facets on walls of cells with an owned node, c1 = 0, after supports
-  SbWallJumps    - half the jumps J[3] across the wall at the corners, m or m/s; returns the sum of
-                   their squares
+  SbWallJumps    - half the jumps J[3] across the wall at the corners, m or m/s
   SbWallsAdd, SbWallsEnergy - as SbJumpAdd(), SbJumpEnergy()
+  SbWallPenalty  - the energy of half jumps J[3] with a penalty c1, less
   SbWallMatrix   - K[i][j], N/m: the entry (axis, axis) of the block of nodes i and j of a wall
 */
 #define SB_NO_WALL (-1)
@@ -63,7 +89,9 @@ typedef struct {
   PetscInt vertex[3]; /* the corners */
   PetscReal share;    /* 1: the cell is this rank's own; else 0 */
   PetscReal c1;       /* as that of a face between two such cells, N/m */
-  PetscReal r[3];     /* offsets of J, m; as those of faces */
+  SbSlopes slopes;
+  PetscReal less[3]; /* of the slopes, N/m */
+  PetscReal r[3];    /* offsets of J, m; as those of faces */
 } SbWall;
 typedef struct {
   PetscInt n;
@@ -72,12 +100,13 @@ typedef struct {
 PetscBool SbFaceIsHeld(SbSpace space, PetscInt face, PetscInt *node);
 PetscInt SbFaceWallAxis(SbSpace space, PetscInt face, PetscInt *node);
 PetscErrorCode SbWallsFind(SbSpace space, SbWalls *walls);
-PetscReal SbWallJumps(SbSpace space, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
-                      PetscReal J[3]);
+void SbWallJumps(SbSpace space, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
+                 PetscReal J[3]);
 void SbWallsAdd(SbSpace space, const SbWalls *walls, const PetscReal x[], SbJumpFactor factor,
                 PetscReal f[]);
 PetscReal SbWallsEnergy(SbSpace space, const SbWalls *walls, const PetscReal x[],
                         SbJumpFactor factor, PetscReal body[]);
+PetscReal SbWallPenalty(PetscReal c1, const PetscReal less[3], const PetscReal J[3]);
 void SbWallMatrix(const SbWall *wall, PetscReal K[3][3]);
 
 /* Factor of the penalty on the negative stiffness that it balances in load steps;

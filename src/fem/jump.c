@@ -15,7 +15,9 @@
   v. So the jump at the three vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and
   since J is linear there
 
-    int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
+    int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3,
+
+  less the sum of less_i |J_i - J_(i + 1)|^2 between long or flat cells (face_shape.c).
 
   dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to
   the eight nodes by the transpose of this map. For CR both sides share the face's node, whose parts
@@ -39,6 +41,12 @@
   part p of itself, -p dV: that part of the load has the second variation which the stress -p cof F
   lacks, and P_i is taken of P + p cof F.
 
+  Between long or flat cells smooth bending has large slopes of the jump: of these the penalty keeps
+  a part only (face_shape.c), another one of what it is at rest than of what stress adds to it. It
+  bears the part `bears` of the stress then, and
+
+    m = mu + max(0, SB_FOLLOW max_ij -(P_i + P_j) / (s_i + s_j) - bears mu).
+
   In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that
   keeps the energy of a face when kappa1 changes at the start of a step. With r = 0 every change of
   kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r
@@ -58,30 +66,28 @@
   2. /* further one in time steps: the secant of a growing penalty is about half its tangent */
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
-#define NEEDLE 3.8 /* 1 for the narrowest face of a cube cut into six tets */
-#define LONG 1.9   /* length over width of cells beyond which a run warns */
-#define FLAT 2.5   /* width over height, likewise: meshes of gmsh have tets of up to 2 */
-#define MANY 0.1   /* part of the tets of a body, likewise: few slivers do no harm */
 #define UNBORNE \
   2. /* new penalty over the old one from which that is too small for the stress, by up to \
         SB_FOLLOW */
-#define EQUAL 1e-9 /* relative difference of aspects that are the same */
 #define SAME 1e-12 /* relative change that is rounding */
 
 struct _p_SbJump {
   SbFace *face;       /* those with an owned node, in the order of batches and lanes */
   PetscReal *V;       /* [ncell] rest volume, m^3 */
-  PetscReal *modulus; /* [ncell] modulus m above, Pa */
+  PetscReal *modulus; /* [ncell] SB_FOLLOW max_ij -(P_i + P_j) / (s_i + s_j), >= 0, Pa */
   PetscInt nface;
   uint8_t *slides;    /* [nbody] those without gaps around edges; NULL until a load step asks */
   SbEdgeGaps gaps;    /* NULL until a load step has a pressure that the penalty does not bear */
   PetscReal *tension; /* [ncell] mean of the gaps' tension at the cell's edges, Pa; NULL: no gaps on
                          any rank */
   PetscInt nbatch;
-  PetscInt *body;  /* [nbatch] */
-  PetscInt *n;     /* [nbatch] number of faces in the batch */
-  PetscInt *node;  /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
-  SbPack *c0, *c1; /* [nbatch] factors above, N/m; zero in padding */
+  PetscInt *body;   /* [nbatch] */
+  PetscInt *n;      /* [nbatch] number of faces in the batch */
+  PetscInt *node;   /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
+  SbPack *c0, *c1;  /* [nbatch] factors above, N/m; zero in padding */
+  SbPack *less;     /* [nbatch][3] of the slopes, N/m */
+  SbSlopes *slopes; /* [nface] */
+  PetscReal bears;  /* the smallest one of this rank's faces */
   SbPack *r; /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
   SbWalls walls;   /* facets on smooth walls */
   PetscBool began; /* the run has made time steps, or its checkpoint has */
@@ -120,9 +126,14 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
   return a + b > 0. ? 2. * a * b / (a + b) : 0.;
 }
 
-/* c0 and c1 of a face; `rest`: with m = mu. */
-static void face_factors(SbSpace s, SbJump j, const SbFace *face, PetscBool rest, PetscReal *c0,
-                         PetscReal *c1)
+/* What a face's energy is made of: 1/2 of c1 (sum |J_i|^2 + |sum J_i|^2) - sum less_i |J_i - J_(i +
+   1)|^2, and c0 |sum J_i|^2; N/m. */
+typedef struct {
+  PetscReal c0, c1, less[3];
+} FaceTerms;
+
+/* Those of a face that stress demands now. */
+static FaceTerms face_terms(SbSpace s, SbJump j, const SbFace *face, const SbSlopes *slopes)
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
   const PetscInt f = face->face[0];
@@ -130,6 +141,7 @@ static void face_factors(SbSpace s, SbJump j, const SbFace *face, PetscBool rest
   const PetscReal *corner = x + 3 * v[(f + 1) % 4];
   const SbElement e = SbSpaceCellElement(s, face->cell[0]);
   PetscReal k0[2], k1[2], p[3], q[3], n[3], area;
+  FaceTerms t = {0};
 
   SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
   SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
@@ -138,17 +150,45 @@ static void face_factors(SbSpace s, SbJump j, const SbFace *face, PetscBool rest
   for (int side = 0; side < (face->cell[1] == SB_SUPPORT ? 1 : 2); side++) {
     const PetscInt cell = face->cell[side];
     const SbMaterial law = s->material[s->mesh->cell_material[cell]];
+    const PetscReal mu = SbMaterialShearModulus(law);
+    const PetscReal m = mu + PetscMax(0., j->modulus[cell] - slopes->bears * mu);
 
-    k1[side] = 2. * (rest ? SbMaterialShearModulus(law) : j->modulus[cell]) * area / j->V[cell];
+    k1[side] = 2. * m * area / j->V[cell];
     k0[side] = SbMaterialWaveModulus(law) * area / j->V[cell];
   }
   if (face->cell[1] == SB_SUPPORT) {
-    *c1 = 0.;
-    *c0 = e->gamma0 * 2. * k0[0] * area / 9.;
-  } else {
-    *c1 = e->gamma1 * harmonic(k1[0], k1[1]) * area / 12.;
-    *c0 = e->gamma0 * harmonic(k0[0], k0[1]) * area / 9.;
+    t.c0 = e->gamma0 * 2. * k0[0] * area / 9.;
+    return t;
   }
+  t.c1 = e->gamma1 * harmonic(k1[0], k1[1]) * area / 12.;
+  t.c0 = e->gamma0 * harmonic(k0[0], k0[1]) * area / 9.;
+  SbSlopesLess(slopes, t.c1, t.less);
+  return t;
+}
+
+/* Those in lane l of batch b. */
+static FaceTerms get_terms(SbJump j, PetscInt b, PetscInt l)
+{
+  return (FaceTerms){
+    j->c0[b][l], j->c1[b][l], {j->less[3 * b][l], j->less[3 * b + 1][l], j->less[3 * b + 2][l]}};
+}
+
+static void put_terms(SbJump j, PetscInt b, PetscInt l, const FaceTerms *t)
+{
+  j->c0[b][l] = t->c0;
+  j->c1[b][l] = t->c1;
+  for (int i = 0; i < 3; i++)
+    j->less[3 * b + i][l] = t->less[i];
+}
+
+/* At rest, before stress has moduli. */
+static void find_slopes(SbSpace s, SbJump j, const SbFace *face, SbSlopes *slopes)
+{
+  const int n = face->cell[1] == SB_SUPPORT ? 0 : 1;
+
+  *slopes = SbFaceSlopes(s, face, (j->V[face->cell[0]] + j->V[face->cell[n]]) / 2.);
+  slopes->rest = face_terms(s, j, face, slopes).c1;
+  j->bears = PetscMin(j->bears, slopes->bears);
 }
 
 PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
@@ -165,7 +205,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     for (PetscInt l = 0; l < s->batch_n[k]; l++)
       j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
   for (PetscInt c = 0; c < mesh->ncell; c++)
-    j->modulus[c] = SbMaterialShearModulus(s->material[mesh->cell_material[c]]);
+    j->modulus[c] = 0.;
 
   /* list the faces with an owned node, sorted by body */
   for (PetscInt body = 0; body < mesh->nbody; body++) {
@@ -193,10 +233,13 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscCall(
     PetscMalloc3(j->nbatch, &j->body, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
+  PetscCall(PetscCalloc2(3 * j->nbatch, &j->less, nface, &j->slopes));
+  j->bears = 1.;
   for (PetscInt i = 0; i < nface; i++) {
     const SbFace *face = &j->face[i];
     const PetscInt body = mesh->cell_body[face->cell[0]];
     PetscInt node[8], l;
+    FaceTerms t;
 
     if (i == 0 || j->n[b] == SB_BATCH || body != j->body[b]) {
       j->body[++b] = body;
@@ -207,7 +250,9 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     for (int k = 0; k < 8; k++)
       for (PetscInt lane = l; lane < (l ? l + 1 : SB_BATCH); lane++)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
-    face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
+    find_slopes(s, j, face, &j->slopes[i]);
+    t = face_terms(s, j, face, &j->slopes[i]);
+    put_terms(j, b, l, &t);
     for (int side = 0; side < 2; side++)
       j->share[b][l] +=
         face->cell[face->cell[1] == SB_SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
@@ -221,36 +266,34 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 PetscErrorCode SbJumpFindWalls(SbSpace s)
 {
   const SbJump j = s->jump;
-  PetscReal c0;
 
   PetscFunctionBeginUser;
   PetscCall(SbWallsFind(s, &j->walls));
-  for (PetscInt w = 0; w < j->walls.n; w++)
-    face_factors(s, j, &j->walls.wall[w].face, PETSC_TRUE, &c0, &j->walls.wall[w].c1);
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    SbWall *wall = &j->walls.wall[w];
+
+    find_slopes(s, j, &wall->face, &wall->slopes);
+    wall->c1 = wall->slopes.rest;
+    SbSlopesLess(&wall->slopes, wall->c1, wall->less);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the modulus m of each cell of a batch from x: at least `factor` times the negative
-   stiffness of twist modes under the pressure `even` of loads; keep: m may not decrease. Returns
-   whether some m changed. */
-static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal even,
-                              PetscReal factor, PetscBool keep)
+/* Updates the modulus of each cell of a batch from x: `factor` times the negative stiffness of
+   twist modes under the pressure `even` of loads; keep: it may not decrease. */
+static void follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal even,
+                         PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = s->batch_region[b]->material;
   const PetscReal *tension = s->jump->tension;
-  const PetscReal mu = SbMaterialShearModulus(m);
+  const PetscReal borne = s->jump->bears * SbMaterialShearModulus(m) / factor;
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b];
-  PetscReal before[SB_BATCH];
   PetscReal largest = 0.;
-  PetscBool changed = PETSC_FALSE;
   SbPack u[30], F[9], P[9], U[9], stretch[3], V[9];
 
-  for (PetscInt l = 0; l < n; l++) {
-    before[l] = modulus[l];
-    if (!keep)
-      modulus[l] = mu;
-  }
+  for (PetscInt l = 0; l < n && !keep; l++)
+    modulus[l] = 0.;
   sb_gather_strain(s, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, 1., F);
   m->ops.stress(m, (const SbPack *)F, P);
@@ -272,9 +315,10 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
       square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(mu / factor))
-    SbStretches((const SbPack *)F, U, stretch, V);
-  for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(mu / factor); l++) {
+  if (largest < 0.5 * PetscSqr(borne))
+    return;
+  SbStretches((const SbPack *)F, U, stretch, V);
+  for (PetscInt l = 0; l < n; l++) {
     PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
 
     for (int k = 0; k < 27; k++)
@@ -286,9 +330,6 @@ static PetscBool follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscR
       modulus[l] = PetscMax(modulus[l], -factor * twist);
     }
   }
-  for (PetscInt l = 0; l < n; l++)
-    changed = (PetscBool)(changed || modulus[l] != before[l]);
-  return changed;
 }
 
 /* The offsets r of a batch; zero for damping, which acts on velocities. */
@@ -315,16 +356,19 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* |J|^2 + |sum J|^2 of J less r. */
-static PetscReal squares_of(const PetscReal J[9])
+/* Twice the energy of jumps J, but for c0, J. */
+static PetscReal penalty_of(const FaceTerms *t, const PetscReal J[9])
 {
-  PetscReal squares = 0.;
+  PetscReal square = 0.;
+  PetscReal spared = 0.;
 
-  for (int k = 0; k < 9; k++)
-    squares += J[k] * J[k];
+  for (int k = 0; k < 9; k++) {
+    square += J[k] * J[k];
+    spared += t->less[k / 3] * PetscSqr(J[k] - J[(k + 3) % 9]);
+  }
   for (int k = 0; k < 3; k++)
-    squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
-  return squares;
+    square += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
+  return t->c1 * square - spared;
 }
 
 /* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J =
@@ -359,12 +403,21 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
 static PetscReal held_part_of_wall(SbSpace s, const SbWall *wall, const PetscReal x[],
                                    PetscReal J[3])
 {
-  const PetscReal square = SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  PetscReal square = 0.;
   PetscReal along = 0.;
 
-  for (int i = 0; i < 3; i++)
+  SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+  for (int i = 0; i < 3; i++) {
+    square += J[i] * J[i];
     along += (J[i] - wall->r[i]) * J[i];
+  }
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
+}
+
+/* The stress that a penalty bears, as a penalty between round cells. */
+static PetscReal borne_by(const SbSlopes *slopes, PetscReal c1)
+{
+  return c1 - (1. - slopes->bears) * PetscMin(c1, slopes->rest);
 }
 
 /* By how much new penalties change the energy of this rank's jumps at x, J, face by face. unborne:
@@ -377,30 +430,37 @@ static PetscReal change_of_energy(SbSpace s, const PetscReal x[], PetscBool *unb
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       static const SbPack zero[9];
-      PetscReal J[9], sum[3], c0, c1;
+      const FaceTerms old = get_terms(j, b, l);
+      const FaceTerms new = face_terms(s, j, &j->face[i], &j->slopes[i]);
+      PetscReal J[9], sum[3];
 
       gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
-      face_factors(s, j, &j->face[i], PETSC_FALSE, &c0, &c1);
-      change += 0.5 * j->share[b][l] * PetscAbsReal(c1 - j->c1[b][l]) * squares_of(J);
-      *unborne = (PetscBool)(*unborne || c1 > UNBORNE * j->c1[b][l]);
+      change += 0.5 * j->share[b][l] * PetscAbsReal(penalty_of(&new, J) - penalty_of(&old, J));
+      if (borne_by(&j->slopes[i], new.c1) > UNBORNE * borne_by(&j->slopes[i], old.c1))
+        *unborne = PETSC_TRUE;
     }
   }
   for (PetscInt w = 0; w < j->walls.n; w++) {
     const SbWall *wall = &j->walls.wall[w];
-    PetscReal J[3], c0, c1;
+    const FaceTerms new = face_terms(s, j, &wall->face, &wall->slopes);
+    PetscReal J[3];
 
-    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &c1);
-    change +=
-      wall->share * PetscAbsReal(c1 - wall->c1) * SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+    SbWallJumps(s, wall, x, SB_JUMP_STIFFNESS, J);
+    change += wall->share * PetscAbsReal(SbWallPenalty(new.c1, new.less, J) -
+                                         SbWallPenalty(wall->c1, wall->less, J));
   }
   return change;
 }
 
 /* Part of its jumps that a face keeps with a new penalty, so that it keeps its energy or, in the
-   first step, its force. part: kept before; kept: its old penalty over the new one; least: that at
-   rest over the new one. */
-static PetscReal new_part(PetscReal part, PetscReal kept, PetscReal least, PetscBool first)
+   first step, its force. part: kept before; the energies of the jumps with the old penalty, the new
+   one and that at rest. */
+static PetscReal new_part(PetscReal part, PetscReal old, PetscReal new, PetscReal rest,
+                          PetscBool first)
 {
+  const PetscReal kept = new > 0. ? old / new : 1.;
+  const PetscReal least = new > 0. ? rest / new : 1.;
+
   return PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), PetscSqr(least), 1.);
 }
 
@@ -416,192 +476,66 @@ static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool keep, Pets
     PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const PetscReal before = j->c1[b][l];
-      const PetscReal part = keep ? held_part(j, b, l, x, J) : 1.;
-      PetscReal c0, least, held;
+      const SbSlopes *slopes = &j->slopes[i];
+      const FaceTerms old = get_terms(j, b, l);
+      const FaceTerms new = face_terms(s, j, &j->face[i], slopes);
+      FaceTerms rest = {.c1 = slopes->rest};
+      PetscReal part, held;
 
-      face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
-      if (!keep || j->c1[b][l] == 0.)
+      put_terms(j, b, l, &new);
+      if (!keep || new.c1 == 0.)
         continue;
-
-      face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
-      held = new_part(part, before / j->c1[b][l], least / j->c1[b][l], first);
+      part = held_part(j, b, l, x, J);
+      SbSlopesLess(slopes, rest.c1, rest.less);
+      held = new_part(part, penalty_of(&old, J), penalty_of(&new, J), penalty_of(&rest, J), first);
       for (int k = 0; k < 9; k++)
         j->r[9 * b + k][l] = (1. - held) * J[k];
     }
   }
   for (PetscInt w = 0; w < j->walls.n; w++) {
     SbWall *wall = &j->walls.wall[w];
-    const PetscReal before = wall->c1;
-    const PetscReal part = keep ? held_part_of_wall(s, wall, x, J) : 1.;
-    PetscReal c0, least, held;
+    const FaceTerms new = face_terms(s, j, &wall->face, &wall->slopes);
+    const PetscReal part = held_part_of_wall(s, wall, x, J);
+    const PetscReal old = SbWallPenalty(wall->c1, wall->less, J);
+    PetscReal less[3], held;
 
-    face_factors(s, j, &wall->face, PETSC_FALSE, &c0, &wall->c1);
+    wall->c1 = new.c1;
+    PetscCall(PetscArraycpy(wall->less, new.less, 3));
     if (!keep)
       continue;
-    face_factors(s, j, &wall->face, PETSC_TRUE, &c0, &least);
-    held = new_part(part, before / wall->c1, least / wall->c1, first);
+    SbSlopesLess(&wall->slopes, wall->slopes.rest, less);
+    held = new_part(part, old, SbWallPenalty(new.c1, new.less, J),
+                    SbWallPenalty(wall->slopes.rest, less, J), first);
     for (int k = 0; k < 3; k++)
       wall->r[k] = (1. - held) * J[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A face as its sides see it. */
-typedef struct {
-  PetscReal area;        /* m^2 */
-  PetscReal length[2];   /* of the face over its width or the height of the cell */
-  PetscReal flatness[2]; /* the shorter extent of the face over the height of the cell */
-} FaceShape;
-
-static FaceShape face_shape(SbSpace s, SbJump j, const SbFace *face)
+/* Whether stress demands other penalties than this rank's faces have. */
+static PetscBool differ(SbSpace s)
 {
-  const PetscInt *v = s->mesh->cell + 4 * face->cell[0];
-  const PetscInt f = face->face[0];
-  const PetscReal *x = s->mesh->x;
-  const PetscReal *corner = x + 3 * v[(f + 1) % 4];
-  PetscReal p[3], q[3], r[3], n[3], trace, largest;
-  FaceShape shape;
+  const SbJump j = s->jump;
+  PetscBool any = PETSC_FALSE;
 
-  SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
-  SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
-  SbSubtract(p, q, r);
-  SbCross(p, q, n);
-  shape.area = 0.5 * PetscSqrtReal(SbDot3(n, n));
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++)
+    for (PetscInt l = 0; l < j->n[b]; l++, i++)
+      if (face_terms(s, j, &j->face[i], &j->slopes[i]).c1 != j->c1[b][l])
+        any = PETSC_TRUE;
+  for (PetscInt w = 0; w < j->walls.n; w++) {
+    const SbWall *wall = &j->walls.wall[w];
 
-  /* eigenvalues of the mean of (x - centroid) (x - centroid)^T: their product is area^2 / 108 */
-  trace = (SbDot3(p, p) + SbDot3(q, q) + SbDot3(r, r)) / 36.;
-  largest =
-    trace / 2. + PetscSqrtReal(PetscMax(0., PetscSqr(trace / 2.) - PetscSqr(shape.area) / 108.));
-  for (int side = 0; side < (face->cell[1] == SB_SUPPORT ? 1 : 2); side++) {
-    const PetscReal h = 3. * j->V[face->cell[side]] / shape.area;
-    const PetscReal square = PetscMax(NEEDLE * (trace - largest), PetscSqr(h) / 12.) / largest;
-
-    shape.length[side] = 1. / PetscSqrtReal(square);
-    shape.flatness[side] = PetscSqrtReal(12. * (trace - largest)) / h;
+    if (face_terms(s, j, &wall->face, &wall->slopes).c1 != wall->c1)
+      any = PETSC_TRUE;
   }
-  return shape;
-}
-
-/* Length over width, width over height of the cells of a box whose tets have such faces; by a fit
-   to boxes of 1 to 20, right to 3 %. */
-static void aspects_of(const FaceShape *shape, int side, PetscReal aspect[2])
-{
-  aspect[0] = PetscSqrtReal(PetscMax(PetscSqr(shape->length[side]) - 0.64, 0.) / 0.352);
-  aspect[1] = PetscSqrtReal(PetscMax(PetscSqr(shape->flatness[side]) - 0.5, 0.) / 0.335);
-}
-
-/* By how much bars or plates with two and four such cells across bend too little, percent;
-   measured, docs/reports/locking.md. The last row for all beyond. */
-static void cost_of(PetscReal aspect, PetscBool flat, PetscReal percent[2])
-{
-  static const PetscReal at[7] = {1., 1.5, 2., 3., 4., 6., 10.};
-  static const PetscReal of_long[7][2] = {{3., 2.},   {13., 5.},  {24., 9.}, {45., 19.},
-                                          {59., 30.}, {77., 49.}, {90., 74.}};
-  static const PetscReal of_flat[7][2] = {{3., 2.},   {10., 5.},  {18., 8.}, {34., 15.},
-                                          {48., 24.}, {67., 41.}, {84., 65.}};
-  int k = 0;
-
-  while (k < 5 && aspect > at[k + 1])
-    k++;
-  for (int n = 0; n < 2; n++) {
-    const PetscReal from = flat ? of_flat[k][n] : of_long[k][n];
-    const PetscReal to = flat ? of_flat[k + 1][n] : of_long[k + 1][n];
-
-    percent[n] =
-      from + (to - from) * PetscClipInterval((aspect - at[k]) / (at[k + 1] - at[k]), 0., 1.);
-  }
-}
-
-/* The tet that is farthest out of range, flat or long, of a body; of equal ones that with the
-   lowest number. */
-typedef struct {
-  PetscReal excess;    /* aspect over the largest one that is verified */
-  PetscReal aspect[2]; /* of length and width, of width and height */
-  PetscReal place[3];  /* its centroid, m */
-  PetscInt orig;
-} WorstShape;
-
-/* The worst of all ranks. */
-static PetscErrorCode reduce_worst(SbSpace s, WorstShape *worst)
-{
-  PetscReal most = worst->excess;
-  PetscInt orig;
-  PetscMPIInt has;
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, s->comm));
-  orig = worst->excess > most * (1. - EQUAL) ? worst->orig : PETSC_MAX_INT;
-  has = orig == PETSC_MAX_INT ? -1 : s->rank;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &orig, 1, MPIU_INT, MPI_MIN, s->comm));
-  has = orig == worst->orig ? has : -1;
-  PetscCallMPI(MPI_Allreduce(&has, &rank, 1, MPI_INT, MPI_MAX, s->comm));
-  PetscCallMPI(MPI_Bcast(worst->aspect, 5, MPIU_REAL, rank, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return any;
 }
 
 PetscErrorCode SbSpaceWarnShapes(SbSpace s)
 {
-  const SbJump j = s->jump;
-  const SbMesh mesh = s->mesh;
-  WorstShape *worst; /* [nbody] */
-  PetscInt *count;   /* [nbody][2] tets out of range, tets */
-  uint8_t *out;      /* [ncell] */
-
   PetscFunctionBeginUser;
-  if (!j)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc3(mesh->nbody, &worst, 2 * mesh->nbody, &count, mesh->ncell, &out));
-  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
-    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const FaceShape shape = face_shape(s, j, &j->face[i]);
-
-      for (int side = 0; side < (j->face[i].cell[1] == SB_SUPPORT ? 1 : 2); side++) {
-        const PetscInt cell = j->face[i].cell[side];
-        WorstShape *most = &worst[j->body[b]];
-        PetscReal aspect[2], excess;
-
-        aspects_of(&shape, side, aspect);
-        excess = PetscMax(aspect[0] / LONG, aspect[1] / FLAT);
-        if (excess > 1.)
-          out[cell] = 1;
-        if (excess < most->excess * (1. - EQUAL) ||
-            (excess < most->excess * (1. + EQUAL) && mesh->cell_orig[cell] >= most->orig))
-          continue;
-        *most = (WorstShape){excess, {aspect[0], aspect[1]}, {0.}, mesh->cell_orig[cell]};
-        for (int k = 0; k < 12; k++)
-          most->place[k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
-      }
-    }
-  }
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    count[2 * mesh->cell_body[c]] += out[c];
-    count[2 * mesh->cell_body[c] + 1]++;
-  }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, s->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    PetscReal percent[2];
-    PetscBool flat;
-
-    if ((PetscReal)count[2 * b] <= MANY * (PetscReal)count[2 * b + 1])
-      continue;
-    PetscCall(reduce_worst(s, &worst[b]));
-    flat = (PetscBool)(worst[b].aspect[1] / FLAT > worst[b].aspect[0] / LONG);
-    cost_of(worst[b].aspect[flat], flat, percent);
-    PetscCall(SbWarning(
-      s->comm,
-      "body %s, element %s: %" PetscInt_FMT " of %" PetscInt_FMT
-      " tets are long or flat, the worst one at (%.4g, %.4g, %.4g) m as in cells %.2g times as %s: "
-      "%s of such cells bend too little, by %.0f %% with two cells across and by %.0f %% with "
-      "four. Take p2, or rounder tets (docs/reports/locking.md)",
-      mesh->body[b].name, s->element[b]->name, count[2 * b], count[2 * b + 1],
-      (double)worst[b].place[0], (double)worst[b].place[1], (double)worst[b].place[2],
-      (double)worst[b].aspect[flat], flat ? "wide as high" : "long as wide",
-      flat ? "plates" : "bars", (double)percent[0], (double)percent[1]));
-  }
-  PetscCall(PetscFree3(worst, count, out));
+  if (s->jump)
+    PetscCall(SbFacesWarn(s, s->jump->nface, s->jump->face, s->jump->V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -649,14 +583,16 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const SbFace *face = &j->face[i];
       const PetscReal before = j->c1[b][l];
+      FaceTerms t = {.c0 = j->c0[b][l]};
 
       if (face->cell[1] == SB_SUPPORT)
         continue;
 
       /* the owner of a cell may not have each of its faces */
-      j->c1[b][l] =
-        PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
-      if (PetscAbsReal(j->c1[b][l] - before) > SAME * before)
+      t.c1 = PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
+      SbSlopesLess(&j->slopes[i], t.c1, t.less);
+      put_terms(j, b, l, &t);
+      if (PetscAbsReal(t.c1 - before) > SAME * before)
         j->renew = PETSC_TRUE;
     }
   }
@@ -667,6 +603,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
 
     /* 0: of a state whose walls had no penalty */
     wall->c1 = saved > 0. ? saved : before;
+    SbSlopesLess(&wall->slopes, wall->c1, wall->less);
     if (PetscAbsReal(wall->c1 - before) > SAME * before)
       j->renew = PETSC_TRUE;
   }
@@ -677,22 +614,21 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets
-   r. */
+/* Updates the moduli of the penalty from x. Returns whether that changes a penalty, or faces have
+   offsets r. */
 static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? SB_FOLLOW : RATE * SB_FOLLOW;
-  PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
+  const PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
 
   s->jump->renew = PETSC_FALSE;
   for (PetscInt b = 0; b < s->nbatch; b++) {
     if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear)
       continue;
-    if (follow_batch(s, b, x, even ? even[s->batch_region[b]->body] : 0., factor,
-                     (PetscBool)(steps == SB_STEPS_UNDAMPED)))
-      any = PETSC_TRUE;
+    follow_batch(s, b, x, even ? even[s->batch_region[b]->body] : 0., factor,
+                 (PetscBool)(steps == SB_STEPS_UNDAMPED));
   }
-  return any;
+  return (PetscBool)(any || differ(s));
 }
 
 /* Index of the block of a row and a column in the part q of the plan. */
@@ -885,6 +821,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscCall(PetscFree3(j->V, j->modulus, j->face));
   PetscCall(PetscFree3(j->body, j->n, j->node));
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
+  PetscCall(PetscFree2(j->less, j->slopes));
   PetscCall(PetscFree(j->r));
   PetscCall(PetscFree(j->tension));
   PetscCall(PetscFree(j->slides));
@@ -897,7 +834,8 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
 /* t[4][3] of each lane: forces on the nodes of the first side, from jumps minus r. */
 SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
                                   const PetscReal c0[restrict SB_BATCH],
-                                  const PetscReal c1[restrict SB_BATCH], const SbPack r[restrict 9],
+                                  const PetscReal c1[restrict SB_BATCH],
+                                  const SbPack less[restrict 3], const SbPack r[restrict 9],
                                   const PetscReal x[restrict], SbPack t[restrict 12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
@@ -906,9 +844,12 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
     gather_jumps(node, x, r, l, J, sum);
     for (int c = 0; c < 3; c++) {
       const PetscReal common = c1[l] * (J[c] + J[3 + c] + J[6 + c]) + c0[l] * sum[c];
-      const PetscReal t0 = c1[l] * J[c] + common;
-      const PetscReal t1 = c1[l] * J[3 + c] + common;
-      const PetscReal t2 = c1[l] * J[6 + c] + common;
+      const PetscReal d0 = less[0][l] * (J[c] - J[3 + c]);
+      const PetscReal d1 = less[1][l] * (J[3 + c] - J[6 + c]);
+      const PetscReal d2 = less[2][l] * (J[6 + c] - J[c]);
+      const PetscReal t0 = c1[l] * J[c] + common - (d0 - d2);
+      const PetscReal t1 = c1[l] * J[3 + c] + common - (d1 - d0);
+      const PetscReal t2 = c1[l] * J[6 + c] + common - (d2 - d1);
       const PetscReal all = t0 + t1 + t2;
 
       t[c][l] = all;
@@ -930,7 +871,8 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
 
     if (scale == 0.)
       continue;
-    jump_forces(node, j->c0[b], j->c1[b], left_out(j, b, factor), x, t);
+    jump_forces(node, j->c0[b], j->c1[b], (const SbPack *)(j->less + 3 * b), left_out(j, b, factor),
+                x, t);
     for (PetscInt l = 0; l < j->n[b]; l++) {
       for (int k = 0; k < 4; k++) {
         PetscReal *plus = f + 3 * node[k * SB_BATCH + l];
@@ -959,11 +901,11 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
     const SbPack *r = left_out(j, b, factor);
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
+      const FaceTerms t = get_terms(j, b, l);
       PetscReal J[9], sum[3];
 
       gather_jumps(j->node + 8 * SB_BATCH * b, x, r, l, J, sum);
-      energy += 0.5 * scale * j->share[b][l] *
-                (j->c1[b][l] * squares_of(J) + j->c0[b][l] * SbDot3(sum, sum));
+      energy += 0.5 * scale * j->share[b][l] * (penalty_of(&t, J) + t.c0 * SbDot3(sum, sum));
       if (j->gaps && factor == SB_JUMP_STIFFNESS)
         energy += j->share[b][l] * SbEdgeGapsEnergy(s, j->gaps, x, b, l);
     }
@@ -982,21 +924,26 @@ PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
   return s->jump->nbatch;
 }
 
-/* Entry (a, b) of the 8x8 matrix of a face, sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
+/* Entry (a, b) of the 8x8 matrix of a face, sum_i (d_ia d_ib c1 - less_i (d_i - d_(i + 1))_a (d_i -
+   d_(i + 1))_b) + (c1 + c0) D_a D_b. */
 void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
 {
   static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}};
   static const PetscReal D[4] = {3, 0, 0, 0};
-  const PetscReal c1 = s->jump->c1[b][l];
-  const PetscReal c0 = s->jump->c0[b][l];
+  const FaceTerms t = get_terms(s->jump, b, l);
 
   for (int p = 0; p < 8; p++) {
     for (int q = 0; q < 8; q++) {
       const PetscReal sign = p / 4 == q / 4 ? 1. : -1.;
-      PetscReal sum = (c1 + c0) * D[p % 4] * D[q % 4];
+      PetscReal sum = (t.c1 + t.c0) * D[p % 4] * D[q % 4];
 
-      for (int i = 0; i < 3; i++)
-        sum += c1 * d[i][p % 4] * d[i][q % 4];
+      for (int i = 0; i < 3; i++) {
+        const PetscReal *a = d[i];
+        const PetscReal *c = d[(i + 1) % 3];
+
+        sum += t.c1 * a[p % 4] * a[q % 4];
+        sum -= t.less[i] * (a[p % 4] - c[p % 4]) * (a[q % 4] - c[q % 4]);
+      }
       K[p][q] = sign * sum;
     }
   }

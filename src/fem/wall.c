@@ -14,7 +14,9 @@
   facet, the jump at a corner is 2 J_i,
 
     J_i = (u_1 + u_2 + u_3 - 3 u_i)_n - (d_i - (d_1 + d_2 + d_3) / 3)_n,    W/2 = c1 sum J_i^2,  c1
-    = kappa1 |F| / 12.
+    = kappa1 |F| / 12,
+
+  less sum less_i (J_i - J_(i + 1))^2 in long and flat cells, as for other faces (face_shape.c).
 
   The sum of J_i is zero: the wall gets no force, and the node on the facet has no part. A wall that
   moves as a whole has d_i alike. One that tilts is no plane of symmetry, but d keeps its slope from
@@ -85,12 +87,11 @@ PetscErrorCode SbWallsFind(SbSpace s, SbWalls *walls)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbWallJumps(SbSpace s, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
-                      PetscReal J[3])
+void SbWallJumps(SbSpace s, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
+                 PetscReal J[3])
 {
   const PetscReal *d = s->vertex_value;
   PetscReal sum = 0.;
-  PetscReal square = 0.;
 
   for (int i = 0; i < 3; i++)
     sum += x[3 * wall->node[i] + wall->axis];
@@ -99,23 +100,25 @@ PetscReal SbWallJumps(SbSpace s, const SbWall *wall, const PetscReal x[], SbJump
     for (int k = 1; k < 3 && factor == SB_JUMP_STIFFNESS; k++)
       J[i] -=
         (d[3 * wall->vertex[i] + wall->axis] - d[3 * wall->vertex[(i + k) % 3] + wall->axis]) / 3.;
-    square += J[i] * J[i];
   }
-  return square;
 }
 
-/* J less the offsets; returns the sum of squares. */
-static PetscReal held_jumps(SbSpace s, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
-                            PetscReal J[3])
+PetscReal SbWallPenalty(PetscReal c1, const PetscReal less[3], const PetscReal J[3])
 {
-  PetscReal square = 0.;
+  PetscReal energy = 0.;
 
-  (void)SbWallJumps(s, wall, x, factor, J);
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
+    energy += c1 * J[i] * J[i] - less[i] * PetscSqr(J[i] - J[(i + 1) % 3]);
+  return energy;
+}
+
+/* J less the offsets. */
+static void held_jumps(SbSpace s, const SbWall *wall, const PetscReal x[], SbJumpFactor factor,
+                       PetscReal J[3])
+{
+  SbWallJumps(s, wall, x, factor, J);
+  for (int i = 0; i < 3; i++)
     J[i] -= factor == SB_JUMP_STIFFNESS ? wall->r[i] : 0.;
-    square += J[i] * J[i];
-  }
-  return square;
 }
 
 /* 1, or the damping of the body of a wall, s. */
@@ -129,14 +132,18 @@ void SbWallsAdd(SbSpace s, const SbWalls *walls, const PetscReal x[], SbJumpFact
 {
   for (PetscInt w = 0; w < walls->n; w++) {
     const SbWall *wall = &walls->wall[w];
-    const PetscReal c = 2. * scale_of(s, wall, factor) * wall->c1;
-    PetscReal J[3];
+    const PetscReal scale = 2. * scale_of(s, wall, factor);
+    const PetscReal *less = wall->less;
+    PetscReal J[3], t[3];
 
-    if (c == 0.)
+    if (scale == 0.)
       continue;
-    (void)held_jumps(s, wall, x, factor, J);
+    held_jumps(s, wall, x, factor, J);
     for (int i = 0; i < 3; i++)
-      f[3 * wall->node[i] + wall->axis] += c * (J[0] + J[1] + J[2] - 3. * J[i]);
+      t[i] = scale * (wall->c1 * J[i] - less[i] * (J[i] - J[(i + 1) % 3]) +
+                      less[(i + 2) % 3] * (J[(i + 2) % 3] - J[i]));
+    for (int i = 0; i < 3; i++)
+      f[3 * wall->node[i] + wall->axis] += t[0] + t[1] + t[2] - 3. * t[i];
   }
 }
 
@@ -147,10 +154,10 @@ PetscReal SbWallsEnergy(SbSpace s, const SbWalls *walls, const PetscReal x[], Sb
 
   for (PetscInt w = 0; w < walls->n; w++) {
     const SbWall *wall = &walls->wall[w];
-    PetscReal J[3];
-    const PetscReal one =
-      scale_of(s, wall, factor) * wall->share * wall->c1 * held_jumps(s, wall, x, factor, J);
+    PetscReal J[3], one;
 
+    held_jumps(s, wall, x, factor, J);
+    one = scale_of(s, wall, factor) * wall->share * SbWallPenalty(wall->c1, wall->less, J);
     energy += one;
     if (body)
       body[s->mesh->cell_body[wall->face.cell[0]]] += one;
@@ -162,4 +169,14 @@ void SbWallMatrix(const SbWall *wall, PetscReal K[3][3])
 {
   for (int k = 0; k < 9; k++)
     K[k / 3][k % 3] = 2. * wall->c1 * (k / 3 == k % 3 ? 6. : -3.);
+
+  /* J_i - J_k = 3 (u_k - u_i) */
+  for (int i = 0; i < 3; i++) {
+    const int k = (i + 1) % 3;
+
+    K[i][i] -= 18. * wall->less[i];
+    K[k][k] -= 18. * wall->less[i];
+    K[i][k] += 18. * wall->less[i];
+    K[k][i] += 18. * wall->less[i];
+  }
 }

@@ -300,8 +300,8 @@ static PetscErrorCode check_body(PetscInt k, PetscBool classical, const char *mo
     if (!i)
       SB_CHECK_NEAR(again, error[0], 1e-3, "pressure of the closed form, DG and CR");
   }
-  SB_CHECK_NEAR(error[0], 0., 0.01, "pressure of the closed form, four layers");
-  SB_CHECK_NEAR(error[1], 0., 0.001, "pressure of the closed form, eight layers");
+  SB_CHECK_NEAR(error[0], 0., 0.025, "pressure of the closed form, four layers");
+  SB_CHECK_NEAR(error[1], 0., 0.005, "pressure of the closed form, eight layers");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -319,7 +319,7 @@ static PetscErrorCode check_beyond(const char *element, PetscReal nu, PetscInt s
   PetscFunctionBeginUser;
   for (PetscInt i = 1; i < 300; i++)
     limit = PetscMax(limit, closed_form(3, PETSC_TRUE, 1. + 0.01 * (PetscReal)i));
-  PetscCall(write_sphere(2, 2, mesh));
+  PetscCall(write_sphere(!strcmp(element, "cr") ? 3 : 2, 2, mesh)); /* 24 tets of cr are too few */
   PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %.17g "
