@@ -40,6 +40,13 @@ typedef struct {
   SbInitialContact *touch; /* [n] */
 } SbInitialContacts;
 
+/* How bodies that overlap when a static run begins are parted. */
+typedef enum {
+  SB_PARTED_RIGIDLY,
+  SB_PARTED_BY_SUPPORTS, /* moved apart with them, which push them together again */
+  SB_PARTED_BY_SPRINGS   /* in the first load step */
+} SbParted;
+
 /*
   Operations of a response; a star: not collective. Each may be NULL: nothing is to be done. u, u0,
   u1: local displacements [nnode][3], ghosts up to date, m; v0: velocities, m/s; f, r: forces
@@ -58,6 +65,8 @@ typedef struct {
   /* of a static run, after initial_contacts(): adds pairs of bodies that overlap as whole, with the
      depth as a negative gap; all: false if some have no common direction. Alike on all ranks */
   PetscErrorCode (*overlaps)(SbContact c, SbSpace space, PetscBool *all, SbInitialContacts *list);
+  /* of a static run, then: warns of what overlapped, once, and says how it was parted */
+  PetscErrorCode (*warn_overlaps)(SbContact c, SbSpace space, SbParted how);
   /* then, where surfaces touch that could not be moved apart rigidly: moves their vertices, u is
      changed, ghosts too; moved: it was, alike on all ranks */
   PetscErrorCode (*part)(SbContact c, SbSpace space, PetscReal t, PetscReal u[], PetscBool *moved);
@@ -199,12 +208,13 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 /*
   In the order of a run; collective.
 
-  Start     - a run begins at t with U, dt being the length of its first step: bodies that touch are
-              moved apart rigidly, as far as potentials ask for it.
+  Start     - a run begins at t with U, dt being the length of its first step: bodies that touch, in
+              a static run also those that overlap, are moved apart rigidly, as far as potentials
+              ask for it and supports let them.
   Shift     - then, in a static run: supported bodies that touch or overlap, each other or an
               obstacle, and bodies between them, are moved apart rigidly, by S, as if nothing held
               them, so that a solution can push them together again; of: the first potential with
-              such bodies, NULL: nothing was moved.
+              such bodies, NULL: nothing was moved. It warns of what overlapped.
   FindPenetrated - the first contact of nodes with some inside its obstacle, where supports hold
               every body along all axes; NULL: there is none.
   Part      - then, for each of the potentials k: vertices of surfaces that still touch are moved

@@ -188,17 +188,17 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace space, Vec U, Vec step, PetscReal 
    with the energies of full jumps; time steps, where the energy of each face at U is kept within
    bounds; time steps without damping, where no penalty falls. changed (or NULL): some penalty did;
    in load steps, the energy of jumps by more than `enough`, J, or a penalty or tension by more than
-   what the old one bears, on all ranks, else penalties stay; enough = SB_FAILED_SOLVE: tensions on
+   what the old one bears, on all ranks, else penalties stay; in one that failed at U, tensions on
    the mean by more than that, as where stress is even.
    Until the next call the face terms are constant; at first they are those of the rest state.
    even[nbody], Pa: pressure of loads that work on the volume of all cells, which balances as much
    of their stress; NULL: none. Collective. */
 typedef enum {
   SB_STEPS_OF_LOAD,
+  SB_STEPS_FAILED, /* of load */
   SB_STEPS_IN_TIME,
   SB_STEPS_UNDAMPED
 } SbStepsOf;
-#define SB_FAILED_SOLVE (-1.)
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, const PetscReal even[], SbStepsOf steps,
                                   PetscReal enough, PetscBool *changed);
 /* Warns of bodies of CR and DG with many tets of shapes for which the penalty on jumps is not

@@ -88,7 +88,7 @@ PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec
    Collective. */
 PetscErrorCode SbModelFollowJumps(SbModel model, PetscReal t, Vec U, SbStepsOf steps,
                                   PetscBool *changed);
-/* The same in a load step that failed at U, with SB_FAILED_SOLVE. */
+/* The same in a load step that failed at U, with SB_STEPS_FAILED. */
 PetscErrorCode SbModelBearStress(SbModel model, PetscReal t, Vec U, PetscBool *changed);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);

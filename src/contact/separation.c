@@ -174,6 +174,22 @@ static PetscErrorCode open_parted(Surfaces *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactWarnOverlaps_Surfaces(SbContact contact, SbSpace s, SbParted how)
+{
+  static const char *const text[] = {
+    [SB_PARTED_RIGIDLY] = "moved apart",
+    [SB_PARTED_BY_SUPPORTS] = "moved apart with their supports, and pushed together from there",
+    [SB_PARTED_BY_SPRINGS] = "separated by springs in the first load step, as supports or shapes "
+                             "let nothing else; the energy balance has an error by that"};
+  Surfaces *b = (Surfaces *)contact;
+
+  PetscFunctionBeginUser;
+  if (b->separation.found[0])
+    PetscCall(SbWarning(s->comm, "%s. They are %s", b->separation.found, text[how]));
+  b->separation.found[0] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first,
                                   PetscBool touch)
 {
@@ -277,17 +293,10 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)N, MPI_UINT8_T, MPI_MAX, s->comm));
   b->pairs->known = PETSC_FALSE;
 
-  /* warns once, naming what overlaps */
+  /* names what overlaps, once */
   if (!b->separation.announced) {
     const char *name[2];
-    char how[3 * SB_NAME_MAX] = "moved apart with their supports, and pushed together from there";
 
-    if (e->dynamic || b->contact.partner.obstacle)
-      SbFormat(
-        sizeof(how), how,
-        "separated gradually (-effect_%s_separation_steps); until then they may pass through "
-        "each other there",
-        e->name);
     for (int k = 0; k < 2; k++)
       name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
     PetscCheck(
@@ -296,14 +305,24 @@ PetscErrorCode SbSurfacesSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool
       "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
       e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
       o->ncrossing);
+    SbFormat(
+      sizeof(b->separation.found), b->separation.found,
+      "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
+      " points are up to %g m deep",
+      e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
+      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest));
+    b->separation.announced = PETSC_TRUE;
+  }
+
+  /* in a static run SbContactSetShift() decides what happens to them */
+  if (e->dynamic && b->separation.found[0]) {
     PetscCall(SbWarning(
       s->comm,
-      "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
-      " points are up to %g m deep. They are %s",
-      e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
-      o->npoint, (double)(o->farthest > 0. ? o->farthest : o->deepest), how));
+      "%s. They are separated gradually (-effect_%s_separation_steps); until then they may pass "
+      "through each other there",
+      b->separation.found, e->name));
+    b->separation.found[0] = 0;
   }
-  b->separation.announced = PETSC_TRUE;
 
   if (e->dynamic)
     SbOverlapBegin(&b->contact.overlap, 0., dt);

@@ -22,10 +22,12 @@
   (friction_pairs.c), and reported.
 
   Initial contact. Bodies that touch when a run begins, or are in each other by less than the width,
-  are moved apart rigidly (initial_contacts.c), to a gap of the width or, in a static run, half of
-  it; where that fails, by their vertices. Beyond the width the barrier holds no energy: at half of
-  it, it holds many times that of the deformation, which it would throw them apart with. Bodies that
-  intersect by more are separated by penalty springs (separation.c).
+  are moved apart rigidly (initial_contacts.c), to a gap of the width (in a static run a little
+  less, so that it is felt); where that fails, by their vertices. Beyond the width the barrier holds
+  no energy: at half of it, it holds many times that of the deformation, which it would throw them
+  apart with, or lose in the first load step. Bodies that intersect by more are separated by penalty
+  springs (separation.c); in a static run they are moved apart rigidly, too, as far as their places
+  tell how.
 */
 #include "surfaces.h"
 
@@ -40,7 +42,7 @@
   64. /* largest factor on them: they are some 30 times as stiff as a layer of cells without it */
 #define HALF 0.5     /* fraction of the prescribed separation below which springs get stiffer */
 #define STIFFEST 11. /* of the shear modulus, for springs: lambda + 2 mu at nu = 0.45 */
-#define APART 0.5    /* initial gap over w in static runs, where a force closes it */
+#define CLOSED 0.999 /* initial gap over w in static runs, where a force closes it */
 #define OPEN 0.99    /* of the initial gap: a pair that is moved apart is so */
 #define WIDTH_ROUNDING 1e-6 /* of a gap that is meant to be w, over w */
 #define ON 1e-9             /* of the bodies' size: a distance below which it has no direction */
@@ -260,7 +262,7 @@ static PetscReal initial_target(const Surfaces *b, const SbContactPair *pair)
 {
   const PetscReal w = of_pair(b, b->widths.w, pair);
 
-  return PetscMin(b->contact.base.effect->dynamic ? w : APART * w, width_of(b, pair));
+  return PetscMin(b->contact.base.effect->dynamic ? w : CLOSED * w, width_of(b, pair));
 }
 
 static PetscErrorCode initial_contacts_surfaces(SbContact contact, SbSpace s, PetscReal t,
@@ -687,6 +689,27 @@ static void stiffen(Surfaces *b, PetscReal dt)
          : 0.);
 }
 
+/* Keeps the forces of pairs at the start of a load step, and its displacements u: their work is the
+   mean of both ends times the way, as that of the loads. */
+static PetscErrorCode keep_forces(Surfaces *b, const PetscReal u[])
+{
+  const PetscInt n = 3 * b->surface->space->nnode_owned;
+  const PetscInt nspring = b->springs.n;
+  PetscReal *force;
+
+  PetscFunctionBeginUser;
+  if (!b->motion.force)
+    PetscCall(PetscMalloc2(n, &b->motion.force, n, &b->motion.begin));
+  PetscCall(PetscArraycpy(b->motion.begin, u, n));
+  PetscCall(PetscCalloc1(3 * b->surface->space->nnode, &force));
+  b->springs.n = 0;
+  (void)SbSurfacesAddGradient(b, -1., force);
+  b->springs.n = nspring;
+  PetscCall(PetscArraycpy(b->motion.force, force, n));
+  PetscCall(PetscFree(force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
                                           PetscReal speed, PetscReal u0[])
 {
@@ -742,6 +765,14 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
              e->name, (double)least);
   b->sums.energy = gap_energy(b, &b->sums.obstacle_power);
 
+  /* the first load step begins without force, as if bodies came from apart: that gaps are within w
+     already is no work */
+  b->motion.from_rest = (PetscBool)(!e->dynamic && !b->motion.accepted && t == 0.);
+  if (b->motion.from_rest)
+    b->sums.energy = b->sums.obstacle_power = 0.;
+  else if (!e->dynamic && has_multipliers(b))
+    PetscCall(keep_forces(b, u0));
+
   /* friction with the normal forces at the start */
   b->friction.slip =
     e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
@@ -773,13 +804,14 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
   Surfaces *b = (Surfaces *)e->data;
   const SbContactSurface m = b->surface;
   PetscReal power;
-  PetscReal progress[2] = {0., 0.}; /* of springs: what they opened, what they should */
+  PetscReal progress[2] = {0., 0.};             /* of springs: what they opened, what they should */
+  const PetscReal part = e->dynamic ? 1. : 0.5; /* of the work that forces at the end do */
 
   PetscFunctionBeginUser;
   PetscCall(SbSurfacesUpdate(b, stage->u));
 
   /* work of contact on the bodies in the step: of pairs, by their energy or, with multipliers, the
-     forces at its end; of friction; of springs */
+     forces at its end, in load steps at both ends; of friction; of springs */
   b->contact.base.work = b->sums.energy + 0.5 * b->sums.obstacle_power;
   b->sums.energy = gap_energy(b, &power);
   b->contact.base.work += 0.5 * power - b->sums.energy;
@@ -791,9 +823,12 @@ static PetscErrorCode accept_surfaces(SbEffect e, SbSpace s, const SbStage *stag
       const PetscInt c = 3 * t.v[k / 3] + k % 3;
 
       if (t.v[k / 3] < m->nbody_vertex)
-        b->contact.base.work -= t.gradient[k] * (b->motion.x[c] - b->motion.start[c]);
+        b->contact.base.work -= part * t.gradient[k] * (b->motion.x[c] - b->motion.start[c]);
     }
   }
+  for (PetscInt k = 0; k < 3 * s->nnode_owned && b->motion.force && !b->motion.from_rest; k++)
+    b->contact.base.work += (1. - part) * b->motion.force[k] * (stage->u[k] - b->motion.begin[k]);
+  b->motion.accepted = PETSC_TRUE;
   for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
     const FrictionPair *pair = &b->friction.pairs.pair[i];
     PetscReal u[3], q[3];
@@ -996,6 +1031,7 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
   PetscCall(SbContactPairsDestroy(&b->pairs));
   PetscCall(SbContactSurfaceDestroy(&b->surface)); /* with positions */
   PetscCall(PetscFree4(b->widths.w, b->motion.u, b->motion.from, b->motion.to));
+  PetscCall(PetscFree2(b->motion.force, b->motion.begin));
   PetscCall(PetscFree(b->columns.slot));
   PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active.pair));
@@ -1015,6 +1051,7 @@ static PetscErrorCode destroy_surfaces(SbEffect e)
 static const SbContactOps surface_ops = {
   .initial_contacts = initial_contacts_surfaces,
   .overlaps = overlaps_surfaces,
+  .warn_overlaps = SbContactWarnOverlaps_Surfaces,
   .part = part_surfaces,
   .begin_step = begin_step_surfaces,
   .find_impacts = SbContactFindImpacts_Surfaces,

@@ -85,14 +85,19 @@ typedef struct {
 
 /* Positions of the surfaces' vertices within a step. */
 typedef struct {
-  PetscBool begun; /* the run has begun */
+  PetscBool begun;     /* the run has begun */
+  PetscBool accepted;  /* a step was accepted in this run */
+  PetscBool from_rest; /* this is the first load step, without forces at its start */
   PetscReal *x,
     *u; /* [nvertex][3], of SbContactSurfaceCreateArray(): current ones, m; [nnode_owned][3] displacements of them, m */
   PetscReal *start;     /* [nvertex][3] at the start of the step, m */
   PetscReal *from, *to; /* [obstacle's vertices][3] at the start and the end of the step, m */
   PetscReal *other;     /* [nvertex][3] end of a motion, m */
-  PetscReal progress;   /* SbContact.progress of x, the completed fraction of the obstacle's path */
-  PetscBool known;      /* x and the active pairs are up to date for u and progress */
+  PetscReal *force,
+    *begin;           /* load steps with multipliers, at the start of the step, [nnode_owned][3]:
+                               forces of pairs, N; displacements, m. NULL: there are none yet */
+  PetscReal progress; /* SbContact.progress of x, the completed fraction of the obstacle's path */
+  PetscBool known;    /* x and the active pairs are up to date for u and progress */
 } SurfaceMotion;
 
 /* By body, [nbody+1]; the obstacle's are infinite. */
@@ -130,7 +135,8 @@ typedef struct {
   PetscBool overlapping; /* there is some */
   PetscBool parted;      /* there was some at the start of this load step */
   PetscBool searched;    /* it was searched for when the run began */
-  PetscBool announced;   /* the warning was given */
+  PetscBool announced;   /* it was named */
+  char found[512];       /* what the warning says of it, until it was given */
   PetscBool resumed;     /* the run goes on in the middle of it */
   PetscInt opening;      /* steps since nothing intersects any more */
   uint8_t
@@ -418,6 +424,7 @@ PetscErrorCode SbContactGap_Surfaces(SbContact contact, SbSpace s, const SbStage
 PetscErrorCode SbContactPoints_Surfaces(SbContact contact, SbSpace s, const SbStage *stage,
                                         SbContactPoints *list);
 PetscErrorCode SbContactWarnAtEnd_Surfaces(SbContact contact, SbSpace s);
+PetscErrorCode SbContactWarnOverlaps_Surfaces(SbContact contact, SbSpace s, SbParted how);
 PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal *gap, size_t size,
                                          char text[]);
 PetscErrorCode SbEffectHistory_Surfaces(SbEffect e, SbSpace s, const SbStage *stage,

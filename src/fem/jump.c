@@ -614,12 +614,17 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static inline PetscBool is_in_time(SbStepsOf steps)
+{
+  return (PetscBool)(steps == SB_STEPS_IN_TIME || steps == SB_STEPS_UNDAMPED);
+}
+
 /* Updates the moduli of the penalty from x. Returns whether that changes a penalty, or faces have
    offsets r. */
 static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], SbStepsOf steps)
 {
-  const PetscReal factor = steps == SB_STEPS_OF_LOAD ? SB_FOLLOW : RATE * SB_FOLLOW;
-  const PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
+  const PetscReal factor = is_in_time(steps) ? RATE * SB_FOLLOW : SB_FOLLOW;
+  const PetscBool any = (PetscBool)(s->jump->renew || (is_in_time(steps) && s->jump->r));
 
   s->jump->renew = PETSC_FALSE;
   for (PetscInt b = 0; b < s->nbatch; b++) {
@@ -759,7 +764,7 @@ static PetscErrorCode follow_gaps(SbSpace s, const PetscReal x[], const PetscRea
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbStepsOf steps,
                                   PetscReal enough, PetscBool *changed)
 {
-  const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
+  const PetscBool in_time = is_in_time(steps);
   const SbJump j = s->jump;
   const PetscReal *x;
   SbGapsChange change = {0};
@@ -791,7 +796,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, const PetscReal even[], SbSt
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.energy, 1, MPIU_REAL, MPI_SUM, s->comm));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change.unborne, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
     *changed = (PetscBool)(change.energy > enough || change.unborne);
-    if (enough == SB_FAILED_SOLVE) {
+    if (steps == SB_STEPS_FAILED) {
       PetscReal sum[3] = {change.even[0], change.even[1], (PetscReal)j->walls.n};
 
       /* the states of other failed solves say nothing: tensions of bent bodies err by far more */

@@ -402,7 +402,7 @@ PetscErrorCode SbModelFollowJumps(SbModel m, PetscReal t, Vec U, SbStepsOf steps
 PetscErrorCode SbModelBearStress(SbModel m, PetscReal t, Vec U, PetscBool *changed)
 {
   PetscFunctionBeginUser;
-  PetscCall(follow_jumps(m, t, U, SB_STEPS_OF_LOAD, SB_FAILED_SOLVE, changed));
+  PetscCall(follow_jumps(m, t, U, SB_STEPS_FAILED, 0., changed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

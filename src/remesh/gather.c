@@ -173,6 +173,16 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
       for (int k = 0; k < 3 && node >= 0 && from[0] < PETSC_MAX_REAL; k++)
         array[3 * node + k] = from[k];
     }
+
+    // a new support node has the displacement of its face
+    for (PetscInt i = 0; i < 4 * mesh->ncell && s->dirichlet_node; i++) {
+      const PetscInt node = s->dirichlet_node[i];
+      const PetscInt k = 4 + i % 4;
+      const PetscReal *from = value + (g->nfield * (i / 4 * g->width + k) + f) * 3;
+
+      if (node >= 0 && (k >= g->width || from[0] >= PETSC_MAX_REAL))
+        PetscCall(PetscArraycpy(array + 3 * node, array + 3 * s->cell_node[i], 3));
+    }
     PetscCall(SbSpaceRestoreLocalWrite(s, vec[f], &array));
   }
   PetscCall(PetscFree(value));

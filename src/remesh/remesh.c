@@ -291,6 +291,26 @@ typedef struct {
   SbLedger ledger;
 } Scene;
 
+/* The values of supports at the present time. What a support of a static run holds from here on is
+   where it is until the next load step moves it, which then has the work of that. */
+static PetscErrorCode prescribe(const SbRemesh r, const Scene *s)
+{
+  const Vec U = s->run->state.U;
+  PetscBool meshed = PETSC_FALSE;
+  Vec values;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < r->nbody; b++)
+    meshed = (PetscBool)(meshed || r->due[b]);
+  PetscCall(VecDuplicate(U, &values));
+  PetscCall(VecCopy(U, values));
+  PetscCall(SbModelPrescribe(s->model, s->run->clock.t, values));
+  if (meshed || s->model->dynamic)
+    PetscCall(VecCopy(values, U));
+  PetscCall(VecDestroy(&values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Sets up the new scene and transfers the state. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
@@ -327,7 +347,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   // transfer the state
   PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
-  PetscCall(SbModelPrescribe(s.model, run->clock.t, run->state.U));
+  PetscCall(prescribe(r, &s));
 
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations
   PetscCall(PetscCalloc1(old->model->nbody, &momenta));

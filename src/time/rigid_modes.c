@@ -444,22 +444,19 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunLostBody(SbRun run, Vec X, const char **name, PetscReal *way)
+PetscErrorCode SbRunFreeWays(SbRun run, Vec from, Vec to, PetscReal way[], PetscReal *carried)
 {
   const SbModel m = run->model;
   const SbSpace s = m->space;
   const PetscInt nbody = m->nbody;
   const PetscScalar *x, *u;
   PetscReal *sum; /* of each body: displacements, nodes, prescribed ones */
-  PetscReal *most;
-  PetscReal carried = 0.;
 
   PetscFunctionBeginUser;
-  *name = NULL;
-  *way = 0.;
-  PetscCall(PetscCalloc2(5 * nbody, &sum, nbody, &most));
-  PetscCall(VecGetArrayRead(X, &x));
-  PetscCall(VecGetArrayRead(run->state.U, &u));
+  PetscCall(PetscCalloc1(5 * nbody, &sum));
+  PetscCall(PetscArrayzero(way, nbody));
+  PetscCall(VecGetArrayRead(to, &x));
+  PetscCall(VecGetArrayRead(from, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt b = s->node_body[i];
 
@@ -467,24 +464,46 @@ PetscErrorCode SbRunLostBody(SbRun run, Vec X, const char **name, PetscReal *way
       sum[5 * b + k] += PetscRealPart(x[3 * i + k] - u[3 * i + k]);
     sum[5 * b + 3] += 1.;
     sum[5 * b + 4] += s->fixed[i] != 0;
-    most[b] = PetscMax(most[b], PetscSqrtReal(SbDistance2(x + 3 * i, u + 3 * i)));
+    way[b] = PetscMax(way[b], PetscSqrtReal(SbDistance2(x + 3 * i, u + 3 * i)));
   }
-  PetscCall(VecRestoreArrayRead(run->state.U, &u));
-  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscCall(VecRestoreArrayRead(from, &u));
+  PetscCall(VecRestoreArrayRead(to, &x));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(5 * nbody), MPIU_REAL, MPI_SUM, s->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, (PetscMPIInt)nbody, MPIU_REAL, MPI_MAX, s->comm));
-  for (PetscInt b = 0; b < nbody; b++)
-    if (sum[5 * b + 4] > 0.)
-      carried = PetscMax(carried, most[b]);
-  for (PetscInt b = 0; b < nbody && !*name; b++) {
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, way, (PetscMPIInt)nbody, MPIU_REAL, MPI_MAX, s->comm));
+  if (carried)
+    *carried = 0.;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const PetscReal *of = sum + 5 * b;
+
+    if (of[4] > 0. && carried)
+      *carried = PetscMax(*carried, way[b]);
+    way[b] = of[4] > 0. ? 0. : PetscSqrtReal(SbDot3(of, of)) / of[3];
+  }
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunLostBody(SbRun run, Vec X, const char **name, PetscReal *way)
+{
+  const SbModel m = run->model;
+  PetscReal *moved;
+  PetscReal carried;
+
+  PetscFunctionBeginUser;
+  *name = NULL;
+  *way = 0.;
+  PetscCall(PetscMalloc1(m->nbody, &moved));
+  PetscCall(SbRunFreeWays(run, run->state.U, X, moved, &carried));
+  for (PetscInt b = 0; b < m->nbody && !*name; b++) {
     const PetscReal size = PetscSqrtReal(SbDistance2(m->body[b].bbox, m->body[b].bbox + 3));
 
-    *way = PetscSqrtReal(SbDot3(sum + 5 * b, sum + 5 * b)) / sum[5 * b + 3];
-    if (sum[5 * b + 4] == 0. && *way > size + carried + SbContactSetObstacleWay(&m->contacts, size))
-      *name = m->body[b].name;
+    if (moved[b] <= size + carried + SbContactSetObstacleWay(&m->contacts, size))
+      continue;
+    *name = m->body[b].name;
+    *way = moved[b];
   }
-  PetscCall(PetscFree2(sum, most));
+  PetscCall(PetscFree(moved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -224,41 +224,24 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies without supports that others pushed together by `way`, m, have to be held by them: where
-   nothing does, they slip out, or end where chance takes them. */
-static PetscErrorCode check_held(SbRun run, SbContact c, PetscReal way)
+/* Bodies without supports that others pushed together by `way`, m, from the displacements `from`
+   have to be held by them: where nothing does, they slip out, or end where chance takes them. */
+static PetscErrorCode check_held(SbRun run, SbContact c, Vec from, PetscReal way)
 {
   const SbModel m = run->model;
-  const SbSpace s = m->space;
-  const PetscScalar *u;
-  PetscReal *sum; /* of each body: displacements, nodes, prescribed ones */
+  PetscReal *moved;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(5 * m->nbody, &sum));
-  PetscCall(VecGetArrayRead(run->state.U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal *of = sum + 5 * s->node_body[i];
-
-    for (int k = 0; k < 3; k++)
-      of[k] += PetscRealPart(u[3 * i + k]);
-    of[3] += 1.;
-    of[4] += s->fixed[i] != 0;
-  }
-  PetscCall(VecRestoreArrayRead(run->state.U, &u));
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(5 * m->nbody), MPIU_REAL, MPI_SUM, s->comm));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    const PetscReal *of = sum + 5 * b;
-    const PetscReal moved = PetscSqrtReal(SbDot3(of, of)) / of[3];
-
+  PetscCall(PetscMalloc1(m->nbody, &moved));
+  PetscCall(SbRunFreeWays(run, from, run->state.U, moved, NULL));
+  for (PetscInt b = 0; b < m->nbody; b++)
     PetscCheck(
-      of[4] > 0. || moved <= SLIPPED * way, m->comm, PETSC_ERR_USER_INPUT,
+      moved[b] <= SLIPPED * way, m->comm, PETSC_ERR_USER_INPUT,
       "The effect %s: the body %s overlaps others when the run begins, and slips by %.2g m "
       "when they are pushed together by %.2g m, as nothing holds it; hold it by a support "
       "or by -effect_%s_friction, or let it come to rest in a dynamic run",
-      c->effect->name, m->body[b].name, (double)moved, (double)way, c->effect->name);
-  }
-  PetscCall(PetscFree(sum));
+      c->effect->name, m->body[b].name, (double)moved[b], (double)way, c->effect->name);
+  PetscCall(PetscFree(moved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,13 +255,17 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
   PetscReal work = 0.;   /* of all contacts */
   PetscReal way = 0.;
   SbEnergies after = {0};
-  Vec X;
+  Vec X, from;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->state.U, &X));
+  PetscCall(VecDuplicate(run->state.U, &from));
+  PetscCall(VecCopy(run->state.U, from));
   m->load = run->clock.t0;
-  if (S)
+  if (S) {
     PetscCall(VecNorm(S, NORM_INFINITY, &way));
+    PetscCall(VecAXPY(from, -1., S));
+  }
   if (way > 2. * c->width)
     length = nominal;
   while (part > 0.) {
@@ -320,13 +307,14 @@ PetscErrorCode SbStaticPush(SbRun run, Vec S, SbContact c, PetscReal strain)
   }
   PetscCall(VecDestroy(&X));
   run->solve.tangent_known = PETSC_FALSE; /* that of the last push, not of its end */
+  if (way > 2. * c->width && part == 0.)
+    PetscCall(check_held(run, c, from, way));
+  PetscCall(VecDestroy(&from));
   if (part > 0.) { /* stopped, or nothing was away and it takes loads to hold the bodies */
     if (!run->clock.stopped)
       run->clock.stop_reason[0] = 0;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (way > 2. * c->width)
-    PetscCall(check_held(run, c, way));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &work, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscCall(SbModelEnergies(m, run->state.U, NULL, &after));
   for (PetscInt i = 0; i < m->contacts.npotential; i++)

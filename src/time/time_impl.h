@@ -149,6 +149,10 @@ PetscErrorCode SbArcLengthSolve(SbRun run);
 /* rigid_modes.c, after a static solve: a body with a free rigid motion, -1: none; motion: in words;
    along: as displacements, not normalised (may be NULL). Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
+/* way[nbody], m: the mean displacement of each body without supports between two states, 0 of one
+   with supports; carried (or NULL): the longest displacement of a node of the latter, m.
+   Collective. */
+PetscErrorCode SbRunFreeWays(SbRun run, Vec from, Vec to, PetscReal way[], PetscReal *carried);
 /* Whether a body without supports went farther from the state to X than its own size, beyond what
    supported bodies and obstacles did: what contact lets slip has no equilibrium nearby. Its name,
    and its mean displacement in the step, m; NULL: none. Collective. */
