@@ -14,9 +14,12 @@ static PetscInt ntype;
 char SbMaterialNames[SB_MATERIAL_TYPES * SB_NAME_MAX];
 
 static const SbOption body_rows[] = {
-  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)",
+   "Young's modulus; not of laws with moduli of their own, as mooney_rivlin"},
   {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
-   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock; laws with moduli of their "
+   "own "
+   "take bulk instead, if it is given"},
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
    "mass per volume in the reference configuration"},
 };
@@ -104,6 +107,8 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
 
   PetscFunctionBeginUser;
   PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
+  PetscCheck(!type->own_moduli, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "Material law %s has moduli of its own, which do not follow from E and nu", law);
   PetscCall(create(type, E, nu, density, material));
   SbScopeSet(&nobody, "body", law, "");
   if (type->ops.setfromoptions)
@@ -115,14 +120,18 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 {
   const SbMaterialType *type = SbMaterialFind(law);
   SbScope scope;
-  PetscReal E, nu, density;
+  PetscReal density;
+  PetscReal E = 1;
+  PetscReal nu = 0;
   int choice;
   SbMaterial m;
 
   PetscFunctionBeginUser;
   SbScopeSet(&scope, body->klass, law, body->instance);
-  PetscCall(SbOptionReal(&scope, "young", &E));
-  PetscCall(SbOptionReal(&scope, "poisson", &nu));
+  if (!type || !type->own_moduli) {
+    PetscCall(SbOptionReal(&scope, "young", &E));
+    PetscCall(SbOptionReal(&scope, "poisson", &nu));
+  }
   PetscCall(SbOptionReal(&scope, "density", &density));
   PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
   PetscCall(create(type, E, nu, density, material));
