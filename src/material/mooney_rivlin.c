@@ -50,22 +50,23 @@ static PetscErrorCode set_from_options(SbMaterial m, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define TERM(p, q, preset)                                                                  \
+#define TERM(key, product)                                                                  \
   {                                                                                         \
-    "c" #p #q, SB_OPTION_REAL, 1, "Pa", preset, "(-inf, inf)", "factor of x1^" #p " x2^" #q \
+    key, SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of " product " in the energy" \
   }
 
 static const SbOption rows[] = {
   {"c10", SB_OPTION_REAL, 1, "Pa", NULL, "(-inf, inf)",
    "factor of x1 = J^(-2/3) I1 - 3 in the energy; the shear modulus at rest is 2 (c10 + c01)"},
-  {"c01", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of x2 = J^(-4/3) I2 - 3"},
-  TERM(2, 0, "0"),
-  TERM(1, 1, "0"),
-  TERM(0, 2, "0"),
-  TERM(3, 0, "0"),
-  TERM(2, 1, "0"),
-  TERM(1, 2, "0"),
-  TERM(0, 3, "0"),
+  {"c01", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)",
+   "factor of x2 = J^(-4/3) I2 - 3 in the energy"},
+  TERM("c20", "x1^2"),
+  TERM("c11", "x1 x2"),
+  TERM("c02", "x2^2"),
+  TERM("c30", "x1^3"),
+  TERM("c21", "x1^2 x2"),
+  TERM("c12", "x1 x2^2"),
+  TERM("c03", "x2^3"),
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialMooneyRivlin = {

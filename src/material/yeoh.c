@@ -36,8 +36,8 @@ static PetscErrorCode set_from_options(SbMaterial m, const SbScope *scope)
 static const SbOption rows[] = {
   {"c1", SB_OPTION_REAL, 1, "Pa", NULL, "(-inf, inf)",
    "factor of x1 = J^(-2/3) I1 - 3 in the energy; the shear modulus at rest is 2 c1"},
-  {"c2", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of x1^2"},
-  {"c3", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of x1^3"},
+  {"c2", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of x1^2 in the energy"},
+  {"c3", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)", "factor of x1^3 in the energy"},
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialYeoh = {
