@@ -71,19 +71,24 @@ SB_KERNEL static void energy_ogden(const struct _p_SbMaterial *m, const SbPack F
   }
 }
 
-/* T_k, and with h != NULL h_k, of a lane. */
-SB_INLINE void deviator(const Ogden *law, const PetscReal b[3], PetscReal T[3], PetscReal h[3])
+/* T_k of a lane; unless they are NULL h_k, and half[3 i + k] = l_k^(alpha_i / 2). */
+SB_INLINE void deviator(const Ogden *law, const PetscReal b[3], PetscReal T[3], PetscReal h[3],
+                        PetscReal half[3 * TERMS])
 {
   for (int k = 0; k < 3; k++) {
     T[k] = 0;
     if (h)
       h[k] = 0;
     for (PetscInt i = 0; i < law->n; i++) {
-      const PetscReal power = expm1(law->alpha[i] * b[k]);
+      const PetscReal a = law->alpha[i];
+      const PetscReal root = expm1(a * b[k] / 2);
+      const PetscReal power = root * (2 + root);
 
       T[k] += law->mu[i] * power;
       if (h)
-        h[k] += law->mu[i] * law->alpha[i] * (1 + power);
+        h[k] += law->mu[i] * a * (1 + power);
+      if (half)
+        half[3 * i + k] = 1 + root;
     }
   }
   const PetscReal mean = (T[0] + T[1] + T[2]) / 3;
@@ -106,7 +111,7 @@ SB_KERNEL static void stress_ogden(const struct _p_SbMaterial *m, const SbPack F
     SbPackGet(9, (const SbPack *)U, l, u);
     SbPackGet(9, (const SbPack *)V, l, v);
     logarithms((const SbPack *)s, l, b, r);
-    deviator(law, b, T, NULL);
+    deviator(law, b, T, NULL, NULL);
     for (int k = 0; k < 9; k++)
       u[k] *= T[k % 3] * r[k % 3];
     SbMatMulTranspose(u, v, p);
@@ -115,28 +120,35 @@ SB_KERNEL static void stress_ogden(const struct _p_SbMaterial *m, const SbPack F
   }
 }
 
-/* sinh(x) / x */
+/* sinh(x) / x for |x| <= 1, by its series, whose rest is below rounding. */
 SB_INLINE PetscReal sinh_over(PetscReal x)
 {
-  const PetscReal y = x * x;
+  PetscReal sum = 1;
 
-  return y > 1e-4 ? sinh(x) / x : 1 + y / 6 * (1 + y / 20 * (1 + y / 42));
+  for (int n = 16; n >= 2; n -= 2)
+    sum = 1 + sum * x * x / (n * (n + 1));
+  return sum;
 }
 
-/* (T_i - T_j) / (s_i - s_j): by the quotient where the stretches are far apart. */
+/* (T_i - T_j) / (s_i - s_j), i, j, k being three axes: by the quotient where the stretches are far
+   apart. As the b add up to zero, (l_i l_j)^(a/2) = l_k^(-a/2). */
 SB_INLINE PetscReal divided(const Ogden *law, const PetscReal b[3], const PetscReal T[3],
-                            const PetscReal s[3], int i, int j)
+                            const PetscReal half[3 * TERMS], const PetscReal s[3], int i, int j,
+                            int k)
 {
   const PetscReal d = b[i] - b[j];
-  const PetscReal mean = (b[i] + b[j]) / 2;
   PetscReal sum = 0;
 
   if (PetscAbsReal(d) > 1)
     return (T[i] - T[j]) / (s[i] - s[j]);
-  for (PetscInt k = 0; k < law->n; k++) {
-    const PetscReal a = law->alpha[k];
+  for (PetscInt n = 0; n < law->n; n++) {
+    const PetscReal a = law->alpha[n];
+    const PetscReal x = a * d / 2;
+    const PetscReal *e = half + 3 * n;
+    const PetscReal ratio = e[i] / e[j];
+    const PetscReal part = PetscAbsReal(x) > 1 ? (ratio - 1 / ratio) / (2 * x) : sinh_over(x);
 
-    sum += law->mu[k] * a * exp(a * mean) * sinh_over(a * d / 2);
+    sum += law->mu[n] * a * part / e[k];
   }
   return sum / (PetscSqrtReal(s[i] * s[j]) * sinh_over(d / 2));
 }
@@ -148,10 +160,10 @@ SB_KERNEL static void eigensystem(const Ogden *law, const SbPack s[restrict 3], 
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal x[3] = {s[0][l], s[1][l], s[2][l]};
-    PetscReal b[3], r[3], T[3], h[3];
+    PetscReal b[3], r[3], T[3], h[3], half[3 * TERMS];
 
     logarithms(s, l, b, r);
-    deviator(law, b, T, h);
+    deviator(law, b, T, h, half);
     const PetscReal ninth = (h[0] + h[1] + h[2]) / 9;
     for (int i = 0, n = 0; i < 3; i++) {
       for (int j = i; j < 3; j++, n++) {
@@ -167,7 +179,7 @@ SB_KERNEL static void eigensystem(const Ogden *law, const SbPack s[restrict 3], 
       const int j = (k + 2) % 3;
       const PetscReal middle = ((T[i] + T[j]) / 2 + q[l]) * r[i] * r[j];
 
-      flip[k][l] = divided(law, b, T, x, i, j) * (r[i] + r[j]) / 2 - middle;
+      flip[k][l] = divided(law, b, T, half, x, i, j, k) * (r[i] + r[j]) / 2 - middle;
       twist[k][l] = ((T[i] + q[l]) * r[i] + (T[j] + q[l]) * r[j]) / (x[i] + x[j]);
     }
   }
