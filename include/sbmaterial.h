@@ -60,7 +60,7 @@ typedef enum {
 
   theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
   (corotated), tr(E) (stvk), ln J (neohookean), the root of (J^2 - 1 - 2 ln J) / 2
-  (isochoric_neohookean), J - 1 (stable_neohookean); and lambda Lame's first parameter at rest
+  (isochoric_neohookean), J - 1 (stable_neohookean), by option (rubber); lambda Lame's first at rest
   (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
 */
 typedef struct {

@@ -1,7 +1,7 @@
 /*
   Eight-chain law of Arruda and Boyce (1993) for rubber, by the first five terms of the series of
-  the inverse Langevin function, as Abaqus and FEBio have it: finite at every stretch, within 3 % of
-  the exact force up to 0.7 of the full length of the chains. With I1' = J^(-2/3) I1,
+  the inverse Langevin function, as Abaqus and CalculiX have it: finite at every stretch, within 3 %
+  of the exact force up to 0.7 of the full length of the chains. With I1' = J^(-2/3) I1,
 
     psi = mu sum_i C_i / lambda_m^(2 i - 2) (I1'^i - 3^i) + K/2 theta^2,
     C = 1/2, 1/20, 11/1050, 19/7000, 519/673750,

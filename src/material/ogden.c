@@ -123,11 +123,15 @@ SB_KERNEL static void stress_ogden(const struct _p_SbMaterial *m, const SbPack F
 /* sinh(x) / x for |x| <= 1, by its series, whose rest is below rounding. */
 SB_INLINE PetscReal sinh_over(PetscReal x)
 {
-  PetscReal sum = 1;
+  static const PetscReal c[8] = {
+    1. / 6,        1. / 120,         1. / 5040,           1. / 362880,
+    1. / 39916800, 1. / 6227020800., 1. / 1.307674368e12, 1. / 3.55687428096e14};
+  const PetscReal y = x * x;
+  PetscReal sum = c[7];
 
-  for (int n = 16; n >= 2; n -= 2)
-    sum = 1 + sum * x * x / (n * (n + 1));
-  return sum;
+  for (int n = 6; n >= 0; n--)
+    sum = c[n] + sum * y;
+  return 1 + sum * y;
 }
 
 /* (T_i - T_j) / (s_i - s_j), i, j, k being three axes: by the quotient where the stretches are far
