@@ -24,7 +24,7 @@ typedef struct {
   void (*shape)(const struct _p_SbMaterial *m, const SbPack x1, const SbPack x2, SbShapeEnergy *w);
 } SbIsochoric;
 
-/* Without material.c, which knows the laws. */
+/* K */
 SB_INLINE PetscReal SbIsochoricBulk(const struct _p_SbMaterial *m)
 {
   return m->rest->lambda + 2. / 3. * m->rest->mu;

@@ -1,6 +1,5 @@
 /*
-  The registry of material laws, and their creation by name; stiffness at rest, choice of the
-  tangent, damping.
+  The registry of material laws, and their creation by name; choice of the tangent, damping.
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
@@ -194,54 +193,6 @@ PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point)
     PetscCall(with_lambda(m, m->rest->lambda - mean, &m->point));
   *point = mean != 0. ? m->point : m;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbMaterialSetLame(SbMaterial m, PetscReal lambda, PetscReal mu)
-{
-  m->rest->lambda = lambda;
-  m->rest->mu = mu;
-  m->rest->E = mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  m->rest->nu = lambda / (2 * (lambda + mu));
-}
-
-PetscReal SbMaterialYoungModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->E;
-}
-
-PetscReal SbMaterialPoisson(const struct _p_SbMaterial *m)
-{
-  return m->rest->nu;
-}
-
-PetscReal SbMaterialShearModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->mu;
-}
-
-PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda;
-}
-
-PetscReal SbMaterialMeanModulus(const struct _p_SbMaterial *m)
-{
-  return PetscMax(0., m->rest->lambda - SB_POINT_MODULUS * m->rest->mu);
-}
-
-PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + 2. * m->rest->mu / 3.;
-}
-
-PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + 2. * m->rest->mu;
-}
-
-PetscReal SbMaterialDilatationModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + m->type->share * m->rest->mu;
 }
 
 void SbMaterialPressure(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p)

@@ -97,6 +97,28 @@ def check_view():
         sys.exit("scenario.opts gives another run")
 
 
+def check_warnings():
+    """Unstable constants, with mode and stretch; a modulus that nothing reads; linear tets that lock by a bulk modulus; of copies once."""
+    cube = ("-bodies a -body_a_mesh box:0.1,0.1,0.1:1 -body_a_copies grid:2,1,1,0.3,0,0 -body_a_material mooney_rivlin -body_a_c10 1e5 -body_a_c01 {0} "
+            "-body_a_bulk {1} -effects hold -effect_hold_type fixed -effect_hold_on zmin -time static -output_fields none ")
+    for c01, bulk, more, words in (("-2e4", "1e6", "", ("-body_a_material mooney_rivlin", "equibiaxial tension beyond the stretch 1.6")),
+                                   ("1e4", "1e9", "", ("-body_a_bulk 1e+09 Pa", "-body_a_element p1")),
+                                   ("1e4", "1e6", "-body_a_young 1e5 ", ("-body_a_young", "moduli of their own")), ("1e4", "1e6", "", ())):
+        output = run(1, "warned", cube.format(c01, bulk) + more)
+        warnings = [line for line in output.splitlines() if "warning" in line]
+        if len(warnings) != bool(words) or not all(word in warnings[0] for word in words):
+            sys.exit(f"c01 {c01}, bulk {bulk} {more}: not one warning with {words}, but {warnings}")
+
+
+def check_inclusion():
+    """A stiff core by another law of this kind: its options are those of the inclusion."""
+    run(1, "inclusion", BAR.format("p2", -100) + RUNS["static"] + "-body_a_inclusions core -sets core -set_core_at box:-1,-1,-1,0.1,1,1 "
+        "-inclusion_core_material gent -inclusion_core_mu 1e6 -inclusion_core_jm 30 -inclusion_core_poisson 0.49")
+    with_core, without = (float(history(f)[1][-1][history(f)[0].index("max_displacement")]) for f in ("inclusion", "static_p2_1"))
+    if not 0.1 * without < with_core < 0.8 * without:
+        sys.exit(f"a stiff half of the bar: {with_core} m, without it {without} m")
+
+
 def main():
     for element in ("p1", "p2", "cr", "dg"):
         for kind in RUNS:
@@ -104,6 +126,8 @@ def main():
         check_restart(element)
         check_ledger(element)
     check_view()
+    check_warnings()
+    check_inclusion()
     print("4 elements, static and dynamic: 1 and 3 ranks, restart, ledger")
 
 
