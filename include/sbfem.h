@@ -303,8 +303,8 @@ void SbSpaceTurnedBetween(SbSpace space, const PetscReal u0[], const PetscReal u
    [0, 1] from X to X - s scale Y, X being admissible, that stays clear of that; 1 with other laws.
    Collective. */
 PetscErrorCode SbSpaceLongestStep(SbSpace space, Vec X, Vec Y, PetscReal scale, PetscReal *part);
-/* The worst tet with det F <= 0 of such a law: its number, body and place, for a message; "" if
-   there is none. Collective. */
+/* The worst tet with det F <= 0 of such a law, or beyond its limit of stretch: number, body and
+   place, for a message; "" if there is none. Collective. */
 PetscErrorCode SbSpaceDescribeInverted(SbSpace space, Vec U, size_t size, char text[]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL),
    smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */

@@ -60,7 +60,7 @@ typedef enum {
 
   theta the law's measure of the change of volume, its dilatation: tr(eps) (linear), tr(S - I)
   (corotated), tr(E) (stvk), ln J (neohookean), the root of (J^2 - 1 - 2 ln J) / 2
-  (isochoric_neohookean), J - 1 (stable_neohookean); and lambda Lame's first parameter at rest
+  (isochoric_neohookean), J - 1 (stable_neohookean), by option (rubber); lambda Lame's first at rest
   (SbMaterialVolumetricModulus()). psi_mu does not depend on lambda: it is the law with lambda = 0.
 */
 typedef struct {
@@ -108,6 +108,9 @@ typedef struct {
                laws theta is at most quadratic, that of a spin, or no polynomial, with the mean of
                the points of the law
     positive - psi is infinite where det F <= 0, and stress and tangent are no numbers there
+    own_moduli - `setfromoptions` sets the stiffness at rest by SbMaterialSetLame(): young is not
+               read, and poisson only by it
+    limited  - psi is also infinite beyond a limit of stretch, and stress and tangent are no numbers
     share    - psi_mu has the part share mu/2 theta^2
 */
 typedef struct {
@@ -115,7 +118,7 @@ typedef struct {
   size_t size; /* bytes of `data`, zero at first */
   PetscInt nrow;
   const SbOption *row; /* [nrow] */
-  PetscBool linear, softens, jacobian, positive;
+  PetscBool linear, softens, jacobian, positive, own_moduli, limited;
   PetscReal share;
   SbMaterialOps ops;
 } SbMaterialType;
@@ -155,7 +158,8 @@ const SbMaterialType *SbMaterialFind(const char *law);
    collective, same on all ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
 /* The same from numbers: E > 0 in Pa, nu in (-1, 0.5), density > 0 in kg/m^3; the law's options at
-   their defaults, its first tangent: the warped one of a law with a spin, else the exact one. */
+   their defaults, its first tangent: the warped one of a law with a spin, else the exact one.
+   Errors: PETSC_ERR_USER for an unknown law and for one with own_moduli. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
                                        PetscReal density, SbMaterial *m);
 /* For `setfromoptions`: the stiffness at rest by Lame's parameters, mu > 0 and lambda > -2/3 mu,
@@ -193,6 +197,22 @@ PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m);
 
 /* lambda + share mu: factor of theta^2/2 in psi */
 PetscReal SbMaterialDilatationModulus(const struct _p_SbMaterial *m);
+
+/*
+  SbMaterialFindUnstable - the first stretch from rest at which a law is unstable (Drucker).
+
+  Not collective. The material is incompressible: a stretch l, the other ones as the mode says, and
+  the pressure that keeps a free side without stress. Stable: with small changes of the logarithmic
+  strains the stresses do work, for all of constant volume.
+
+  Input:
+    mode    - 0: uniaxial, l, l^(-1/2), l^(-1/2); 1: equibiaxial, l, l, l^(-2); 2: planar, l, 1, 1/l
+    tension - l from 1 to 3, else from 1 to 0.3
+  Output:
+    stretch - 0 where there is none; also ends at a limit of stretch (`limited`)
+*/
+void SbMaterialFindUnstable(const struct _p_SbMaterial *m, int mode, PetscBool tension,
+                            PetscReal *stretch);
 
 /* p = -lambda theta, Pa, positive in compression: resists the change of volume, and oscillates from
    cell to cell where an element locks. Not collective. */

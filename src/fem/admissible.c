@@ -1,5 +1,6 @@
 /*
-  States in which energies are finite: det F > 0 at the points of laws with the flag `positive`.
+  States in which energies are finite: det F > 0 at the points of laws with the flag `positive`, and
+  below the limit of stretch of those that are `limited`, which only the search of a step heeds.
 
   Along a step from x by -s y, F - s H is linear in s, and det (F - s H) = J0 - s J1 + s^2 J2 - s^3
   J3 with J1 = cof F : H, J2 = F : cof H, J3 = det H. A step ends at the latest where this falls to
@@ -102,31 +103,36 @@ PetscErrorCode SbSpaceLongestStep(SbSpace s, Vec X, Vec Y, PetscReal scale, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned tet with the least det F <= 0; cell -1: none. */
+/* The owned tet with the least det F <= 0 or, with the key 0, beyond the limit of its law; cell -1:
+   none. */
 typedef struct {
-  PetscReal J;
+  PetscReal key, J;
   PetscInt cell;
 } Worst;
 
 static Worst find_worst(SbSpace s, const PetscReal x[])
 {
-  Worst worst = {PETSC_MAX_REAL, -1};
+  Worst worst = {PETSC_MAX_REAL, 1., -1};
 
   for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const struct _p_SbMaterial *law = s->batch_region[b]->material;
     const int npoint = SbBatchPoints(s, b).n;
-    SbPack U[30], F[SB_POINTS][9];
+    SbPack U[30], F[SB_POINTS][9], psi;
 
-    if (!s->batch_region[b]->material->positive)
+    if (!law->positive)
       continue;
     SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
     for (int q = 0; q < npoint; q++) {
+      if (law->type->limited)
+        law->ops.energy(law, (const SbPack *)F[q], psi);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         PetscReal f[9];
 
         SbPackGet(9, (const SbPack *)F[q], l, f);
         const PetscReal J = SbMatDet(f);
-        if (J <= 0. && J < worst.J)
-          worst = (Worst){J, s->batch_cell[b] + l};
+        const PetscReal key = J > 0. && law->type->limited && PetscIsInfReal(psi[l]) ? 0. : J;
+        if (key <= 0. && key < worst.key)
+          worst = (Worst){key, J, s->batch_cell[b] + l};
       }
     }
   }
@@ -149,7 +155,7 @@ PetscErrorCode SbSpaceDescribeInverted(SbSpace s, Vec U, size_t size, char text[
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
   worst = find_worst(s, x);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  least.J = worst.J;
+  least.J = worst.key;
   least.rank = s->rank;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
   if (least.J > 0.)
@@ -164,13 +170,20 @@ PetscErrorCode SbSpaceDescribeInverted(SbSpace s, Vec U, size_t size, char text[
               mesh->x[3 * v[3] + k]) /
              4.;
     SbFormat(size, text,
-             "tet %" PetscInt_FMT
-             " of the body %s, at rest around (%.4g, %.4g, %.4g) m, is inverted or flat (det F "
-             "%.3g), where the energy of the law %s is infinite; the law stable_neohookean is "
-             "finite there",
+             "tet %" PetscInt_FMT " of the body %s, at rest around (%.4g, %.4g, %.4g) m, ",
              mesh->cell_orig[worst.cell], mesh->body[mesh->cell_body[worst.cell]].name,
-             (double)p[0], (double)p[1], (double)p[2], (double)least.J,
-             s->material[mesh->cell_material[worst.cell]]->type->name);
+             (double)p[0], (double)p[1], (double)p[2]);
+    if (worst.J > 0.)
+      SbAppend(
+        size, text,
+        "is stretched beyond the limit of the law %s, where its energy is infinite; one with "
+        "a higher limit, or another law, is finite there",
+        s->material[mesh->cell_material[worst.cell]]->type->name);
+    else
+      SbAppend(size, text,
+               "is inverted or flat (det F %.3g), where the energy of the law %s is infinite; the "
+               "law stable_neohookean is finite there",
+               (double)least.J, s->material[mesh->cell_material[worst.cell]]->type->name);
   }
   PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, least.rank, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

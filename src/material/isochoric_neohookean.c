@@ -13,46 +13,12 @@
   law. K/4 (J^2 - 1 - 2 ln J) is convex, unlike (ln J)^2; both are infinite at J = 0, where this
   law ends as the classical one does (neohookean.c).
 */
-#include "invariants.h"
-
-#define CLOSE 0.05 /* |J - 1| up to which theta comes from its series: 12 terms are exact */
+#include "volumetric.h"
 
 /* Without material.c, which knows the laws. */
 SB_INLINE PetscReal bulk_modulus(const struct _p_SbMaterial *m)
 {
   return m->rest->lambda + 2. / 3. * m->rest->mu;
-}
-
-/* r = theta^2 / j^2 = 1 + j rest, with j = J - 1. */
-SB_INLINE PetscReal square(const SbVolume *v, PetscReal *rest)
-{
-  const PetscReal j = v->j;
-  PetscReal series = 0;
-
-  for (int n = 14; n >= 3; n--)
-    series = (n % 2 ? -1. : 1.) / n + j * series;
-  if (PetscAbsReal(j) > CLOSE) {
-    const PetscReal r = (j + j * j / 2 - v->log) / (j * j);
-
-    *rest = (r - 1) / j;
-    return r;
-  }
-  *rest = series;
-  return 1 + j * series;
-}
-
-/* theta; t = J d theta/dJ = (2 + j) / (2 sqrt(r)) and u = J dt/dJ = (J^2 - t^2) / theta, from which
-   j was divided out. */
-SB_INLINE PetscReal theta_of(const SbVolume *v, PetscReal *t, PetscReal *u)
-{
-  PetscReal rest;
-  const PetscReal j = v->j;
-  const PetscReal r = square(v, &rest);
-  const PetscReal root = PetscSqrtReal(r);
-
-  *t = (2 + j) / (2 * root);
-  *u = (4 + 3 * j + 4 * rest * v->J * v->J) / (4 * r * root);
-  return v->J > 0 ? j * root : -INFINITY;
 }
 
 /* psi_mu = mu/2 (I1 - 3 + 3 e + e (I1 - 3)) with e = J^(-2/3) - 1 = expm1(x); the terms of first
@@ -72,7 +38,7 @@ SB_KERNEL static void energy_isochoric(const struct _p_SbMaterial *m, const SbPa
     const PetscReal e = expm1(x);
     const PetscReal growth = 2 * (v.j - v.minors) + v.square;
     const PetscReal shape = 2 * ((v.j - v.log) - v.minors) + v.square + 3 * (e - x) + e * growth;
-    const PetscReal value = mu / 2 * shape + K / 2 * v.j * v.j * square(&v, &rest);
+    const PetscReal value = mu / 2 * shape + K / 2 * v.j * v.j * SbSimoTaylorSquare(&v, &rest);
 
     psi[l] = v.J > 0 ? value : INFINITY;
   }
@@ -129,7 +95,7 @@ SB_KERNEL static void dilatation_isochoric(const struct _p_SbMaterial *m,
 
     SbPackGet(9, F, l, f);
     const SbVolume v = SbVolumeOf(f);
-    theta[l] = theta_of(&v, &t, &u);
+    theta[l] = SbSimoTaylor(&v, &t, &u);
   }
 }
 
@@ -145,7 +111,7 @@ SB_KERNEL static void dilatation_gradient_isochoric(const struct _p_SbMaterial *
 
     SbPackGet(9, F, l, f);
     const SbVolume v = SbVolumeOf(f);
-    (void)theta_of(&v, &t, &u);
+    (void)SbSimoTaylor(&v, &t, &u);
     for (int k = 0; k < 9; k++)
       D[k][l] *= t;
   }
@@ -163,7 +129,7 @@ SB_KERNEL static void dilatation_hessian_isochoric(const struct _p_SbMaterial *m
 
     SbPackGet(9, F, l, f);
     const SbVolume v = SbVolumeOf(f);
-    (void)theta_of(&v, &t, &u);
+    (void)SbSimoTaylor(&v, &t, &u);
     of_DD[l] = p[l] * u;
     q[l] = p[l] * t;
   }

@@ -1,6 +1,5 @@
 /*
-  The registry of material laws, and their creation by name; stiffness at rest, choice of the
-  tangent, damping.
+  The registry of material laws, and their creation by name; choice of the tangent, damping.
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
@@ -14,9 +13,12 @@ static PetscInt ntype;
 char SbMaterialNames[SB_MATERIAL_TYPES * SB_NAME_MAX];
 
 static const SbOption body_rows[] = {
-  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)",
+   "Young's modulus; not of laws with moduli of their own, as mooney_rivlin"},
   {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
-   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock; laws with moduli of their "
+   "own "
+   "take bulk instead, if it is given"},
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
    "mass per volume in the reference configuration"},
 };
@@ -104,6 +106,8 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
 
   PetscFunctionBeginUser;
   PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
+  PetscCheck(!type->own_moduli, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "Material law %s has moduli of its own, which do not follow from E and nu", law);
   PetscCall(create(type, E, nu, density, material));
   SbScopeSet(&nobody, "body", law, "");
   if (type->ops.setfromoptions)
@@ -115,14 +119,18 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
 {
   const SbMaterialType *type = SbMaterialFind(law);
   SbScope scope;
-  PetscReal E, nu, density;
+  PetscReal density;
+  PetscReal E = 1;
+  PetscReal nu = 0;
   int choice;
   SbMaterial m;
 
   PetscFunctionBeginUser;
   SbScopeSet(&scope, body->klass, law, body->instance);
-  PetscCall(SbOptionReal(&scope, "young", &E));
-  PetscCall(SbOptionReal(&scope, "poisson", &nu));
+  if (!type || !type->own_moduli) {
+    PetscCall(SbOptionReal(&scope, "young", &E));
+    PetscCall(SbOptionReal(&scope, "poisson", &nu));
+  }
   PetscCall(SbOptionReal(&scope, "density", &density));
   PetscCheck(type, PETSC_COMM_SELF, PETSC_ERR_USER, "There is no material law \"%s\"", law);
   PetscCall(create(type, E, nu, density, material));
@@ -185,54 +193,6 @@ PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point)
     PetscCall(with_lambda(m, m->rest->lambda - mean, &m->point));
   *point = mean != 0. ? m->point : m;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbMaterialSetLame(SbMaterial m, PetscReal lambda, PetscReal mu)
-{
-  m->rest->lambda = lambda;
-  m->rest->mu = mu;
-  m->rest->E = mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  m->rest->nu = lambda / (2 * (lambda + mu));
-}
-
-PetscReal SbMaterialYoungModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->E;
-}
-
-PetscReal SbMaterialPoisson(const struct _p_SbMaterial *m)
-{
-  return m->rest->nu;
-}
-
-PetscReal SbMaterialShearModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->mu;
-}
-
-PetscReal SbMaterialVolumetricModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda;
-}
-
-PetscReal SbMaterialMeanModulus(const struct _p_SbMaterial *m)
-{
-  return PetscMax(0., m->rest->lambda - SB_POINT_MODULUS * m->rest->mu);
-}
-
-PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + 2. * m->rest->mu / 3.;
-}
-
-PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + 2. * m->rest->mu;
-}
-
-PetscReal SbMaterialDilatationModulus(const struct _p_SbMaterial *m)
-{
-  return m->rest->lambda + m->type->share * m->rest->mu;
 }
 
 void SbMaterialPressure(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p)

@@ -12,7 +12,12 @@
   LAW(SbMaterialStVK)                \
   LAW(SbMaterialNeoHookean)          \
   LAW(SbMaterialIsochoricNeoHookean) \
-  LAW(SbMaterialStableNeoHookean)
+  LAW(SbMaterialStableNeoHookean)    \
+  LAW(SbMaterialMooneyRivlin)        \
+  LAW(SbMaterialYeoh)                \
+  LAW(SbMaterialOgden)               \
+  LAW(SbMaterialGent)                \
+  LAW(SbMaterialArrudaBoyce)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;
 SB_MATERIAL_LAWS(SB_DECLARE_LAW)
@@ -61,6 +66,9 @@ SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, Pets
 */
 void SbSpectralTangent(const SbPack U[9], const SbPack V[9], const SbPack hessian[6],
                        const SbPack flip[3], const SbPack twist[3], SbPack C[81]);
+/* The same with its negative eigenvalues. */
+void SbSpectralTangentExact(const SbPack U[9], const SbPack V[9], const SbPack hessian[6],
+                            const SbPack flip[3], const SbPack twist[3], SbPack C[81]);
 
 /* C_(ij)(kl) = C_(kl)(ij) = c */
 SB_INLINE void SbTangentPut(const SbPack c, int ij, int kl, SbPack C[81])

@@ -218,3 +218,74 @@ SB_KERNEL void SbSpectralTangent(const SbPack U[restrict 9], const SbPack V[rest
     }
   }
 }
+
+/* The parts of the axes i and j: with A = u_i v_j^T and B = u_j v_i^T the flip and the twist are
+   f/2 (A + B)(A + B) + t/2 (A - B)(A - B), that is A (p A + m B) + B (m A + p B) with p and m = (f
+   +- t) / 2. */
+SB_KERNEL static void shear_pair(const SbPack U[restrict 9], const SbPack V[restrict 9], int i,
+                                 int j, const SbPack flip, const SbPack twist, SbPack A[restrict 9],
+                                 SbPack B[restrict 9], SbPack YA[restrict 9], SbPack YB[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal plus = (flip[l] + twist[l]) / 2;
+    const PetscReal minus = (flip[l] - twist[l]) / 2;
+
+    for (int p = 0; p < 3; p++) {
+      for (int q = 0; q < 3; q++) {
+        const PetscReal ij = U[3 * p + i][l] * V[3 * q + j][l];
+        const PetscReal ji = U[3 * p + j][l] * V[3 * q + i][l];
+
+        A[3 * p + q][l] = ij;
+        B[3 * p + q][l] = ji;
+        YA[3 * p + q][l] = plus * ij + minus * ji;
+        YB[3 * p + q][l] = minus * ij + plus * ji;
+      }
+    }
+  }
+}
+
+/* The parts of the stretches: E_k = u_k v_k^T, Y_k = sum_n W_kn E_n. */
+SB_KERNEL static void stretch_parts(const SbPack U[restrict 9], const SbPack V[restrict 9],
+                                    const SbPack W[restrict 6], SbPack E[restrict 3][9],
+                                    SbPack Y[restrict 3][9])
+{
+  static const int at[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    for (int pq = 0; pq < 9; pq++) {
+      PetscReal e[3];
+
+      for (int k = 0; k < 3; k++)
+        E[k][pq][l] = e[k] = U[3 * (pq / 3) + k][l] * V[3 * (pq % 3) + k][l];
+      for (int k = 0; k < 3; k++)
+        Y[k][pq][l] = W[at[k][0]][l] * e[0] + W[at[k][1]][l] * e[1] + W[at[k][2]][l] * e[2];
+    }
+  }
+}
+
+SB_KERNEL void SbSpectralTangentExact(const SbPack U[restrict 9], const SbPack V[restrict 9],
+                                      const SbPack hessian[restrict 6],
+                                      const SbPack flip[restrict 3], const SbPack twist[restrict 3],
+                                      SbPack C[restrict 81])
+{
+  SbPack E[9][9], Y[9][9];
+
+  stretch_parts(U, V, hessian, E, Y);
+  for (int k = 0; k < 3; k++)
+    shear_pair(U, V, (k + 1) % 3, (k + 2) % 3, flip[k], twist[k], E[3 + k], E[6 + k], Y[3 + k],
+               Y[6 + k]);
+  for (int ij = 0; ij < 9; ij++) {
+    for (int kl = ij; kl < 9; kl++) {
+      SbPack c;
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        PetscReal sum = E[0][ij][l] * Y[0][kl][l];
+
+        for (int k = 1; k < 9; k++)
+          sum += E[k][ij][l] * Y[k][kl][l];
+        c[l] = sum;
+      }
+      SbTangentPut(c, ij, kl, C);
+    }
+  }
+}

@@ -92,18 +92,72 @@ static PetscErrorCode check_poisson(SbModel model, const SbMaterial material, co
                                     const char *name, const SbBody *body)
 {
   const PetscReal nu = SbMaterialPoisson(material);
+  PetscBool bulk = PETSC_FALSE;
+  SbScope scope;
+  char what[4 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
+  if (nu < LOCKS && nu >= AUXETIC)
+    PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* what gives it: Poisson's ratio, or the bulk modulus of a law with moduli of its own */
+  SbScopeSet(&scope, klass, material->type->name, name);
+  if (SbOptionFind(&scope, "bulk"))
+    PetscCall(SbOptionGiven(&scope, "bulk", &bulk));
+  if (bulk)
+    SbFormat(sizeof(what), what, "-%s_%s_bulk %g Pa, a Poisson's ratio of %g,", klass, name,
+             (double)SbMaterialBulkModulus(material), (double)nu);
+  else
+    SbFormat(sizeof(what), what, "-%s_%s_poisson %g", klass, name, (double)nu);
   if (nu >= LOCKS && !strcmp(body->element, "p1"))
     PetscCall(SbWarning(model->comm,
-                        "-%s_%s_poisson %g with -body_%s_element p1: linear tets lock, the body "
-                        "is too stiff; take p2, cr or dg",
-                        klass, name, (double)nu, body->copy_of[0] ? body->copy_of : body->name));
+                        "%s with -body_%s_element p1: linear tets lock, the body is too stiff; "
+                        "take p2, cr or dg",
+                        what, body->copy_of[0] ? body->copy_of : body->name));
   if (nu < AUXETIC)
     PetscCall(SbWarning(model->comm,
-                        "-%s_%s_poisson %g is near -1, where the shear modulus E/(2(1+nu)) has no "
-                        "limit: it is %g times that of nu = 0",
-                        klass, name, (double)nu, (double)(1. / (1. + nu))));
+                        "%s is near -1, where the shear modulus E/(2(1+nu)) has no limit: it is %g "
+                        "times that of nu = 0",
+                        what, (double)(1. / (1. + nu))));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Warns of constants with which a law is unstable at stretches of 0.3 to 3, once for each mode. */
+static PetscErrorCode check_stability(SbModel model, const SbMaterial material, const char *klass,
+                                      const char *name)
+{
+  static const char *const modes[3] = {"uniaxial", "equibiaxial", "planar"};
+  char text[512] = "";
+
+  PetscFunctionBeginUser;
+  if (!material->type->own_moduli)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (int mode = 0; mode < 3; mode++) {
+    for (int tension = 0; tension < 2; tension++) {
+      PetscReal stretch;
+
+      SbMaterialFindUnstable(material, mode, tension ? PETSC_TRUE : PETSC_FALSE, &stretch);
+      if (stretch > 0.)
+        SbAppend(sizeof(text), text, "%s%s %s %s the stretch %.3g", text[0] ? ", " : "",
+                 modes[mode], tension ? "tension" : "compression", tension ? "beyond" : "below",
+                 (double)stretch);
+    }
+  }
+  if (text[0])
+    PetscCall(SbWarning(model->comm,
+                        "-%s_%s_material %s: with these constants the law is unstable (Drucker), "
+                        "its tangent modulus negative, in %s; stay within, or fit the constants "
+                        "to tests of all these modes",
+                        klass, name, material->type->name, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_material(SbModel model, const SbMaterial material, const char *klass,
+                                     const char *name, const SbBody *body)
+{
+  PetscFunctionBeginUser;
+  PetscCall(check_poisson(model, material, klass, name, body));
+  PetscCall(check_stability(model, material, klass, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -115,11 +169,11 @@ static PetscErrorCode check_materials(SbModel model, PetscInt i)
   PetscFunctionBeginUser;
   if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of))
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(check_poisson(model, model->material[i], "body",
-                          body->copy_of[0] ? body->copy_of : body->name, body));
+  PetscCall(check_material(model, model->material[i], "body",
+                           body->copy_of[0] ? body->copy_of : body->name, body));
   for (PetscInt k = 0; k < body->ninclusion; k++)
-    PetscCall(check_poisson(model, model->material[body->inclusion[k].material], "inclusion",
-                            model->set[body->inclusion[k].set].name, body));
+    PetscCall(check_material(model, model->material[body->inclusion[k].material], "inclusion",
+                             model->set[body->inclusion[k].set].name, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,6 +1,7 @@
 // Cell pressure of the volumetric term: lambda/2 theta^2 is the part of every material's energy
 // that vanishes with lambda, positive in compression, and for small strains it is -lambda tr(eps).
 // Cells of a scene get it from their own material.
+#include "../laws.h"
 #include "../scene.h"
 
 /* F = I + size times reproducible numbers in [-1, 1]. */
@@ -24,10 +25,10 @@ static PetscErrorCode test_energy(const char *law, PetscRandom random)
   SbPack F[9], psi, without, p;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., &m));
+  PetscCall(law_create(law, 1000., 0.45, 1., &m));
 
   /* lambda is 0 for nu = 0; mu is that of m */
-  PetscCall(SbMaterialCreateElastic(law, 2. * SbMaterialShearModulus(m), 0., 1., &shear));
+  PetscCall(law_create(law, 2. * SbMaterialShearModulus(m), 0., 1., &shear));
   for (int i = 0; i < 20; i++) {
     PetscCall(deform(random, 0.3, F));
     m->ops.energy(m, (const SbPack *)F, psi);
@@ -49,7 +50,7 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
   SbPack F[9], p;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialCreateElastic(law, 1000., 0.4999, 1., &m));
+  PetscCall(law_create(law, 1000., 0.4999, 1., &m));
   PetscCall(deform(random, size, F));
   SbMaterialPressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) {

@@ -4,6 +4,7 @@
   derivatives of the energy, blocks as derivatives of the forces, vanishing terms, and a patch of
   tets under constant strain.
 */
+#include "../laws.h"
 #include "material_checks.h"
 #include <sbelement.h>
 
@@ -446,7 +447,7 @@ int main(int argc, char **argv)
   for (PetscInt k = 0; k < n; k++) {
     SbMaterial m;
 
-    PetscCall(SbMaterialCreateElastic(laws[k], 2e4, 0.35, 1000, &m));
+    PetscCall(law_create(laws[k], 2e4, 0.35, 1000, &m));
     test_force(e, m);
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT));
     PetscCall(test_blocks(e, m, SB_TANGENT_EXACT_SPD));

@@ -7,6 +7,7 @@
   Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the
   energies: 1e-24 of them.
 */
+#include "../laws.h"
 #include "../../src/ledger/ledger_impl.h"
 #include "../scene.h"
 
@@ -111,8 +112,8 @@ static PetscErrorCode check_patch(const char *element, const char *law)
   PetscCall(
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:1,1,1:3 -body_a_element %s -body_a_material %s "
-                  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 1 -time static",
-                  element, law));
+                  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 1 -time static %s",
+                  element, law, law_moduli(law, "a", 1e3, 0.3)));
   PetscCall(open_scene(PETSC_COMM_WORLD, text, &m));
   PetscCall(estimate(m, linear_field, &est));
   SB_CHECK(est->strain[0] > 0.1, "%s, %s: strain energy %g", element, law, est->strain[0]);

@@ -14,6 +14,7 @@
     ranks       the same displacement as on one rank, also from an .h5 file read in slabs
     refused     error for a tet whose Jacobian is not positive, with its number
 */
+#include "../laws.h"
 #include "curved.h"
 #include "../../src/ledger/ledger_impl.h"
 #include "sbmeshio.h"
@@ -60,8 +61,10 @@ static PetscErrorCode check_patch(const char *mesh, const char *law, const char 
     "-bodies a -body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
     "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
     "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
-    "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
-    volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law));
+    "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3",
+                                                                 "0.45") "%s",
+    volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law,
+    law_moduli(law, "a", 1e3, 0.45)));
   PetscCall(verify_solve(&t, "patch test"));
   PetscCall(affine_error(&t, A, &error));
   test_print("  patch test, %s, %s: %.1e\n", law, volume, error);
@@ -135,8 +138,9 @@ static PetscErrorCode check_equilibrium(const char *mesh)
     if (!strcmp(laws[law], "linear"))
       continue;
     PetscCall(test_open(
-      &t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
-      mesh, laws[law]));
+      &t,
+      "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45") "%s",
+      mesh, laws[law], law_moduli(laws[law], "a", 1e3, 0.45)));
     PetscCall(VecDuplicate(t.run->state.U, &U));
     PetscCall(residual(&t, U, &still));
     PetscCall(test_fill(t.model, turn, U));
