@@ -98,6 +98,63 @@ static PetscReal face_corners(SbMesh mesh, PetscInt i, const PetscReal *corner[3
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
 
+/* The part of the mean of |J|^2 over a face that is due to the slopes of J, J[3] at the middles of
+   its edges, as long and flat cells of a height h have it; src/fem/face_shape.c. */
+static PetscReal slope_square(const PetscReal *const corner[3], PetscReal h,
+                              const PetscReal J[3][3])
+{
+  PetscReal e[3], g[3], n[3], f[3], x[3][2];
+  PetscReal M[3] = {0.};
+  PetscReal moment[2], part[2];
+  PetscReal square = 0.;
+
+  SbSubtract(corner[1], corner[0], e);
+  SbSubtract(corner[2], corner[0], g);
+  SbCross(e, g, n);
+  (void)SbNormalise(n);
+  (void)SbNormalise(e);
+  SbCross(n, e, f);
+  for (int k = 0; k < 3; k++) {
+    PetscReal middle[3];
+
+    for (int c = 0; c < 3; c++)
+      middle[c] = (corner[k][c] + corner[(k + 1) % 3][c]) / 2. -
+                  (corner[0][c] + corner[1][c] + corner[2][c]) / 3.;
+    x[k][0] = SbDot3(middle, e);
+    x[k][1] = SbDot3(middle, f);
+    M[0] += x[k][0] * x[k][0] / 3.;
+    M[1] += x[k][0] * x[k][1] / 3.;
+    M[2] += x[k][1] * x[k][1] / 3.;
+  }
+  const PetscReal angle = 0.5 * atan2(2. * M[1], M[0] - M[2]);
+  const PetscReal axis[2][2] = {{PetscCosReal(angle), PetscSinReal(angle)},
+                                {-PetscSinReal(angle), PetscCosReal(angle)}};
+
+  for (int k = 0; k < 2; k++)
+    moment[k] = M[0] * PetscSqr(axis[k][0]) + 2. * M[1] * axis[k][0] * axis[k][1] +
+                M[2] * PetscSqr(axis[k][1]);
+  const PetscReal a = PetscSqrtReal(12. * moment[0]);
+  const PetscReal b = PetscMin(a, 1.9494 * PetscSqrtReal(12. * moment[1]));
+  const PetscReal H = PetscMin(a, PetscMax(b, 1.78 * h));
+  const PetscReal flat = PetscSqr(PetscMin(1., 1.78 * h / b));
+
+  part[0] = flat * PetscSqr(H * b / (a * a));
+  part[1] = flat * PetscSqr(H / a);
+  for (int k = 0; k < 2; k++) {
+    for (int c = 0; c < 3; c++) {
+      const PetscReal p = J[1][c] - J[0][c];
+      const PetscReal q = J[2][c] - J[0][c];
+      const PetscReal dx[4] = {x[1][0] - x[0][0], x[1][1] - x[0][1], x[2][0] - x[0][0],
+                               x[2][1] - x[0][1]};
+      const PetscReal slope[2] = {(p * dx[3] - q * dx[1]) / (dx[0] * dx[3] - dx[1] * dx[2]),
+                                  (q * dx[0] - p * dx[2]) / (dx[0] * dx[3] - dx[1] * dx[2])};
+
+      square += part[k] * moment[k] * PetscSqr(slope[0] * axis[k][0] + slope[1] * axis[k][1]);
+    }
+  }
+  return square;
+}
+
 /* Energy of an interior face. */
 static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
@@ -108,7 +165,7 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
   const PetscReal area = face_corners(s->mesh, i, corner);
   PetscReal h;
   PetscReal mean[3] = {0., 0., 0.};
-  PetscReal square = 0.;
+  PetscReal J[3][3], square;
 
   h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->mesh->neighbour[i])) / (2. * area);
   for (int k = 0; k < 3; k++) {
@@ -119,10 +176,11 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
     cell_value(s, i / 4, u, at, a);
     cell_value(s, s->mesh->neighbour[i], u, at, b);
     for (int c = 0; c < 3; c++) {
-      mean[c] += (a[c] - b[c]) / 3.;
-      square += PetscSqr(a[c] - b[c]) / 3.;
+      J[k][c] = a[c] - b[c];
+      mean[c] += J[k][c] / 3.;
     }
   }
+  square = SbDot3(mean, mean) + slope_square(corner, 3. * h, J);
   return 0.5 * area / h *
          (e->gamma1 * 2. * SbMaterialShearModulus(law) * square +
           e->gamma0 * (2. * SbMaterialShearModulus(law) + SbMaterialVolumetricModulus(law)) *
