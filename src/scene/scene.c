@@ -182,6 +182,21 @@ static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a body begins away from its rest state; 0;0;0, as scenario.opts has it, is none. */
+static PetscErrorCode is_moved(const SbStart *start, PetscBool *moved)
+{
+  PetscFunctionBeginUser;
+  *moved = PETSC_FALSE;
+  for (int k = 0; k < 3; k++) {
+    PetscReal u = 1.;
+
+    if (!SbFormulaUses(start->displacement[k], 'x'))
+      PetscCall(SbFormulaEval(start->displacement[k], 0., NULL, &u));
+    *moved = (PetscBool)(*moved || u != 0.);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_body(SbModel model, PetscInt i)
 {
   SbBody *body = &model->body[i];
@@ -221,7 +236,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
     PetscCall(SbFormulaEval(model->start[i].velocity[k], 0., NULL, &body->velocity[k]));
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }
-  PetscCall(SbOptionGiven(&scope, "displacement", &model->start[i].moved));
+  PetscCall(is_moved(&model->start[i], &model->start[i].moved));
   PetscCall(SbOptionString(&scope, "state", sizeof(model->start[i].state), model->start[i].state));
   PetscCheck(
     !model->start[i].state[0] || !model->start[i].moved, PETSC_COMM_SELF, PETSC_ERR_USER,

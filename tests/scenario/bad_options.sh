@@ -200,6 +200,8 @@ check "no history" test -s view/history.csv
 check "-scenario_view ran the scenario" test ! -e out/bar/history.csv
 "$supple" opts/scenario.opts -quiet -output_dir again 2>/dev/null
 check "scenario.opts differs" cmp -s opts/history.csv again/history.csv
+"$supple" bar.opts -time static -quiet -output_dir static && "$supple" static/scenario.opts -quiet -output_dir again -output_overwrite
+check "scenario.opts of a static run differs" cmp -s static/history.csv again/history.csv
 
 # a body deep in another one: no look can tell which way it came in
 cat >inside.opts <<'END'
