@@ -539,11 +539,56 @@ PetscErrorCode SbSpaceWarnShapes(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor c1 of a face whose jumps have an energy; once, twice: theirs with c1 at rest and twice
+   that. */
+static PetscReal factor_of(const SbSlopes *slopes, PetscReal energy, PetscReal once,
+                           PetscReal twice)
+{
+  if (energy <= once)
+    return slopes->rest * energy / once;
+  return slopes->rest * (1. + (energy - once) / (twice - once));
+}
+
+/* The factor c1 with which a face without offsets would have its energy at x, or its own one. */
+static PetscReal face_factor(SbJump j, PetscInt b, PetscInt l, const SbSlopes *slopes,
+                             const PetscReal x[])
+{
+  const FaceTerms now = get_terms(j, b, l);
+  FaceTerms rest[2];
+  PetscReal J[9], part, energy[2];
+
+  part = held_part(j, b, l, x, J);
+  for (int k = 0; k < 2; k++) {
+    rest[k].c1 = (1. + k) * slopes->rest;
+    SbSlopesLess(slopes, rest[k].c1, rest[k].less);
+    energy[k] = penalty_of(&rest[k], J);
+  }
+  if (energy[0] <= 0. || energy[1] <= energy[0])
+    return now.c1;
+  return factor_of(slopes, PetscSqr(part) * penalty_of(&now, J), energy[0], energy[1]);
+}
+
+/* The same of a wall. */
+static PetscReal wall_factor(SbSpace s, const SbWall *wall, const PetscReal x[])
+{
+  const SbSlopes *slopes = &wall->slopes;
+  PetscReal J[3], less[3], part, energy[2];
+
+  part = held_part_of_wall(s, wall, x, J);
+  for (int k = 0; k < 2; k++) {
+    SbSlopesLess(slopes, (1. + k) * slopes->rest, less);
+    energy[k] = SbWallPenalty((1. + k) * slopes->rest, less, J);
+  }
+  if (energy[0] <= 0. || energy[1] <= energy[0])
+    return wall->c1;
+  return factor_of(slopes, PetscSqr(part) * SbWallPenalty(wall->c1, wall->less, J), energy[0],
+                   energy[1]);
+}
+
 PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
 {
   const SbJump j = s->jump;
   const PetscReal *x;
-  PetscReal J[9];
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
@@ -555,7 +600,7 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
         const PetscInt cell = j->face[i].cell[side];
 
         if (cell < s->mesh->ncell_owned)
-          k[5 * cell + j->face[i].face[side]] = j->c1[b][l] * PetscSqr(held_part(j, b, l, x, J));
+          k[5 * cell + j->face[i].face[side]] = face_factor(j, b, l, &j->slopes[i], x);
       }
     }
   }
@@ -563,8 +608,7 @@ PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
     const SbWall *wall = &j->walls.wall[w];
 
     if (wall->share > 0.)
-      k[5 * wall->face.cell[0] + wall->face.face[0]] =
-        wall->c1 * PetscSqr(held_part_of_wall(s, wall, x, J));
+      k[5 * wall->face.cell[0] + wall->face.face[0]] = wall_factor(s, wall, x);
   }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,9 +7,10 @@
 */
 #include "material_impl.h"
 
-#define STEPS 200    /* from 1 to the last stretch, equal in its logarithm */
-#define DELTA 1e-5   /* step of the differences in e: error 1e-10 of the modulus */
-#define LOWEST -1e-6 /* eigenvalue, in shear moduli at rest, below which a law is unstable */
+#define STEPS 200  /* from 1 to the last stretch, equal in its logarithm */
+#define DELTA 1e-5 /* step of the differences in e: error 1e-10 of the modulus */
+#define LOWEST \
+  -1e-5 /* eigenvalue, in shear moduli at rest or larger ones, below which a law is unstable */
 
 /* (e1, e2) of a mode at the logarithm e of its stretch. */
 static void strains(int mode, PetscReal e, PetscReal s[2])
@@ -18,8 +19,8 @@ static void strains(int mode, PetscReal e, PetscReal s[2])
   s[1] = mode == 0 ? -e / 2 : mode == 1 ? e : 0;
 }
 
-/* The lower eigenvalue of D, Pa; no number beyond a limit of stretch. */
-static PetscReal lowest(const struct _p_SbMaterial *m, const PetscReal e[2])
+/* The eigenvalues of D, Pa, the lower one first; no numbers beyond a limit of stretch. */
+static void eigenvalues(const struct _p_SbMaterial *m, const PetscReal e[2], PetscReal value[2])
 {
   SbPack F[9], P[9];
   PetscReal D[2][2];
@@ -50,7 +51,8 @@ static PetscReal lowest(const struct _p_SbMaterial *m, const PetscReal e[2])
   const PetscReal skew = (D[0][0] - D[1][1]) / 2;
   const PetscReal off = (D[0][1] + D[1][0]) / 2;
 
-  return half - PetscSqrtReal(skew * skew + off * off);
+  value[0] = half - PetscSqrtReal(skew * skew + off * off);
+  value[1] = half + PetscSqrtReal(skew * skew + off * off);
 }
 
 void SbMaterialFindUnstable(const struct _p_SbMaterial *m, int mode, PetscBool tension,
@@ -60,12 +62,12 @@ void SbMaterialFindUnstable(const struct _p_SbMaterial *m, int mode, PetscBool t
 
   *stretch = 0;
   for (int n = 1; n <= STEPS; n++) {
-    PetscReal e[2];
+    PetscReal e[2], value[2];
 
     strains(mode, n * last / STEPS, e);
-    const PetscReal value = lowest(m, e);
-    if (!(value >= LOWEST * m->rest->mu)) {
-      if (value == value)
+    eigenvalues(m, e, value);
+    if (!(value[0] >= LOWEST * PetscMax(m->rest->mu, value[1]))) {
+      if (value[0] == value[0])
         *stretch = PetscExpReal(n * last / STEPS);
       return;
     }

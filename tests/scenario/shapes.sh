@@ -34,4 +34,9 @@ for cells in 40,2,2 10,2,2; do
   check "$cells: $(cat err.txt)" test ! -s err.txt
   check "$cells: energy $energy, of p2 $true" awk -v a="$energy" -v b="$true" 'BEGIN { exit !(a > 0.86 * b && a < 1.01 * b) }'
 done
+# of laws for large strains cells are verified to 2.4 times
+"$supple" -bodies a -body_a_mesh box:0.4,0.1,0.1:4,4,4 -body_a_element cr -body_a_material neohookean -body_a_young 5e6 \
+  -body_a_poisson 0.3 -body_a_density 1000 -effects hold -effect_hold_type fixed -effect_hold_on xmin -time static -output_fields none \
+  >out.txt 2>err.txt
+check "4 times: $(cat err.txt)" grep -qF '4 times as long as wide: bending is verified to 2 times only' err.txt
 finish
