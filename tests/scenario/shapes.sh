@@ -28,7 +28,6 @@ bar 1 dg 2,2,2 >/dev/null
 check "dg: $(cat err.txt)" grep -qF 'body a, element dg: 48 of 48 tets' err.txt
 bar 1 cr 20,1,8 >/dev/null
 check "flat: $(cat err.txt)" grep -qF 'times as wide as high' err.txt
-cat err.txt
 for cells in 40,2,2 10,2,2; do
   energy=$(bar 1 cr $cells)
   check "$cells: $(cat err.txt)" test ! -s err.txt
