@@ -40,6 +40,13 @@ typedef struct {
   SbInitialContact *touch; /* [n] */
 } SbInitialContacts;
 
+/* How far bodies go in a direction, one by one. */
+typedef struct {
+  PetscInt n;      /* number of bodies */
+  PetscReal *part; /* [n] fraction of the direction that is free of collisions */
+  PetscInt *group; /* [n] a body that it touches, or itself; SbBodyStepsJoin() */
+} SbBodySteps;
+
 /* How bodies that overlap when a static run begins are parted. */
 typedef enum {
   SB_PARTED_RIGIDLY,
@@ -101,9 +108,9 @@ typedef struct {
   PetscErrorCode (*hessian)(SbContact c, SbSpace space, const PetscReal u[], SbContactHessian kind,
                             SbBlocks *blocks, PetscReal r[]);
   /* part: largest collision-free fraction of the motion from u0 to u1, and from the present
-     progress to 1; nactive: active pairs at u0 */
+     progress to 1; nactive: active pairs at u0; bodies: NULL, or lowered to the same by bodies */
   PetscErrorCode (*max_step)(SbContact c, SbSpace space, const PetscReal u0[], const PetscReal u1[],
-                             PetscReal *part, PetscInt *nactive);
+                             SbBodySteps *bodies, PetscReal *part, PetscInt *nactive);
   /* exact constraints: adds the rows of those that are active at u */
   PetscErrorCode (*constraints)(SbContact c, SbSpace space, const PetscReal u[],
                                 SbConstraintRows *rows);
@@ -267,6 +274,9 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
   Advance  - obstacles are at the fraction `progress` of their path in the step.
   MaxStep  - largest collision-free fraction of the motion from X to X - Y over all ranks, by
              continuous collision detection, and the number of active pairs.
+  BodySteps - the same by bodies: Y of each body becomes the fraction of it that is free of
+             collisions with the motions of all; bodies that touch each other keep a common one.
+             MaxStep of the new Y may be below 1: a body that is held up is in another one's way.
   Gradient - F += scale times the gradient of the energy at U, N; free_only: not where prescribed.
              energy: J, or NULL.
   Hessian  - its blocks, and R as the operation `hessian` says, zero at prescribed unknowns.
@@ -276,6 +286,7 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
 void SbContactSetAdvance(const SbContactSet *contacts, PetscReal progress);
 PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, PetscReal *part,
                                    PetscInt *nactive);
+PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y);
 PetscErrorCode SbContactSetGradient(const SbContactSet *contacts, Vec U, PetscReal scale,
                                     PetscBool free_only, PetscReal *energy, Vec F);
 PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContactHessian kind,

@@ -23,6 +23,8 @@ typedef struct {
 
     max_step         - part: largest s in [0, 1] without a collision; nactive: number of pairs
                        within a barrier, all ranks (may be NULL)
+    body_steps       - makes Y shorter, body by body, as far as each is held up by collisions;
+                       bodies that touch each other keep a common length
     advance          - obstacles move to this fraction of their motion in the step
     inverted         - strain energy at X, J, and number of inverted cells, all ranks
     hessian          - assembles the Hessian of the barriers at X, or its substitute; nblock: number
@@ -35,6 +37,7 @@ typedef struct {
 */
 typedef struct {
   PetscErrorCode (*max_step)(void *ctx, Vec X, Vec Y, PetscReal *part, PetscInt *nactive);
+  PetscErrorCode (*body_steps)(void *ctx, Vec X, Vec Y);
   PetscErrorCode (*advance)(void *ctx, PetscReal fraction);
   PetscErrorCode (*inverted)(void *ctx, Vec X, PetscReal *energy, PetscInt *n);
   PetscErrorCode (*hessian)(void *ctx, Vec X, Vec F, SbContactHessian kind, Vec rhs,
@@ -80,7 +83,11 @@ typedef struct {
   PetscBool nonsymmetric; /* some forces have no potential */
   PetscBool quadratic;    /* static: tangents are exact */
   PetscBool may_give_up;  /* static: the load step can be shortened */
-  PetscBool warm_start;   /* the solve starts from the last one's solution, with its tolerance */
+  PetscInt iterations;    /* barriers: after so many the solve ends where it is, and in each of them
+                          bodies go as far as collisions let them, one by one; 0: when it is solved */
+  Vec left; /* with them: what the last direction had beyond the solution, m, 0 if it is solved;
+               borrowed */
+  PetscBool warm_start; /* the solve starts from the last one's solution, with its tolerance */
 } SbNewtonProblem;
 
 /* Constructor of the SNESType, for SNESRegister(). */
@@ -91,3 +98,5 @@ PetscErrorCode SbNewtonSetProblem(SNES snes, const SbNewtonProblem *problem);
 /* Whether a tangent of the last solve was indefinite; false for another SNESType or tangent. Not
    collective. */
 PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
+/* Change of E over the last iteration, J. Not collective. */
+PetscErrorCode SbNewtonChange(SNES snes, PetscReal *change);

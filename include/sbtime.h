@@ -163,6 +163,9 @@ typedef struct {
   } stage;
   PetscReal barrier_weight; /* of barrier contact's forces, those at X, in the residual */
   PetscBool single;         /* one linear solve per step instead of Newton's method */
+  PetscBool fast;           /* -contact_quality fast: a limited number of iterations; */
+  Vec left; /* then what its direction had beyond the solution, m; owned; else NULL; and */
+  PetscReal longest_left; /* the largest displacement of it in the last step, m */
 
   /* attempts that are not accepted */
   PetscBool reject_inverted;   /* -time_inverted reject */
@@ -211,6 +214,8 @@ typedef struct {
   PetscInt newton_step, linear_step;     /* iterations of the current step, not yet in the totals */
   PetscInt newton_before, linear_before; /* iterations of the runs before a re-meshing */
   PetscInt rejected_seen;                /* rejected attempts up to the last step */
+  PetscInt unsolved; /* accepted steps that ended before they were solved (-contact_quality fast) */
+  PetscReal most_left;     /* the largest displacement that one of them left, m */
   PetscInt contact_rounds; /* active-set iterations of this step, 0: without contact */
   PetscInt turned;         /* load steps that were cut as they would turn supports or cells far */
   PetscInt bifurcations;   /* arc length: detected by changes of negative pivots */

@@ -24,6 +24,9 @@
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
   } while (0)
 
+/* Two parts touch, bodies or an obstacle: bodies keep a common length of steps. */
+void SbBodyStepsJoin(SbBodySteps *bodies, PetscInt one, PetscInt two);
+
 typedef enum {
   AUTO,
   PROJECTED,

@@ -109,7 +109,7 @@ PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, P
     PetscReal mine = 1.;
     PetscInt pairs = 0;
 
-    PHASE_CALL(contacts->contact[k], max_step, s, u0, u1, &mine, &pairs);
+    PHASE_CALL(contacts->contact[k], max_step, s, u0, u1, NULL, &mine, &pairs);
     found[0] = PetscMin(found[0], mine);
     found[1] -= (PetscReal)pairs;
   }

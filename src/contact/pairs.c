@@ -606,8 +606,22 @@ static PetscReal safe_part(SbContactSurface m, const SbContactPair *pair, PetscR
   return PetscMin(1., part);
 }
 
+/* Lowers the fractions of the bodies of a pair. */
+static void lower_bodies(SbContactSurface m, const SbContactPair *pair, PetscReal safe,
+                         PetscReal body[])
+{
+  const PetscInt nbody = m->space->mesh->nbody;
+
+  for (int side = 0; side < 2; side++) {
+    const PetscInt b = SbContactPairPart(m, pair, side);
+
+    if (b < nbody)
+      body[b] = PetscMin(body[b], safe);
+  }
+}
+
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], const PetscReal x1[],
-                                     PetscReal *part)
+                                     PetscReal body[], PetscReal *part)
 {
   const SbContactSurface m = p->mesh;
   PetscReal *const *follow[2] = {SbContactSurfaceFollow(m, x0), SbContactSurfaceFollow(m, x1)};
@@ -646,6 +660,8 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
       continue;
     safe = safe_part(m, pair, LEFT_MOST * p->reach, x0, x1);
     *part = PetscMin(*part, safe); /* a macro: its arguments are evaluated twice */
+    if (body && whole * safe < 1.)
+      lower_bodies(m, pair, whole * safe, body);
   }
   *part *= whole;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -148,6 +148,12 @@ static inline int SbContactPairSplit(const SbContactPair *pair)
   return pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
 }
 
+/* The part, a body or the obstacle, of side 0 or 1. */
+static inline PetscInt SbContactPairPart(SbContactSurface mesh, const SbContactPair *pair, int side)
+{
+  return mesh->part[pair->v[side ? SbContactPairSplit(pair) : 0]];
+}
+
 /* Radius of the obstacle if it is one of the sides, m. */
 static inline PetscReal SbContactPairRadius(SbContactSurface mesh, const SbContactPair *pair)
 {
@@ -229,9 +235,10 @@ static inline PetscBool SbContactPairSweptApart(SbContactSurface mesh, const SbC
   return PETSC_FALSE;
 }
 /* Largest collision-free fraction, 0..1, of the motion from x0 to x1, for this rank's pairs; each
-   keeps a tenth of its gap. As SbContactPairsFind(). Collective. */
+   keeps a tenth of its gap; body[nbody], unless NULL, is lowered to that of the body's own pairs.
+   As SbContactPairsFind(). Collective. */
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[],
-                                     const PetscReal x1[], PetscReal *part);
+                                     const PetscReal x1[], PetscReal body[], PetscReal *part);
 /* A penetrating vertex, or the midpoint of the penetrating part of an edge. */
 typedef struct {
   PetscInt number; /* among those of all ranks */

@@ -785,7 +785,8 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
 }
 
 static PetscErrorCode max_step_surfaces(SbContact contact, SbSpace s, const PetscReal u0[],
-                                        const PetscReal u1[], PetscReal *part, PetscInt *nactive)
+                                        const PetscReal u1[], SbBodySteps *bodies, PetscReal *part,
+                                        PetscInt *nactive)
 {
   Surfaces *b = (Surfaces *)contact;
 
@@ -794,7 +795,11 @@ static PetscErrorCode max_step_surfaces(SbContact contact, SbSpace s, const Pets
   PetscCall(SbSurfacesUpdate(b, u0));
   *nactive = b->active.n;
   PetscCall(SbSurfacesPlace(b, u1, 1., b->motion.other));
-  PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other, part));
+  PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other,
+                                  bodies ? bodies->part : NULL, part));
+  for (PetscInt i = 0; bodies && i < b->active.n; i++)
+    SbBodyStepsJoin(bodies, SbContactPairPart(b->surface, &b->active.pair[i].pair, 0),
+                    SbContactPairPart(b->surface, &b->active.pair[i].pair, 1));
   b->record.shortest = PetscMin(b->record.shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

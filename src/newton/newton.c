@@ -105,6 +105,8 @@ static PetscErrorCode begin(SNES snes)
   if (p->barrier)
     PetscCall(SbNewtonApproach(snes));
   n->filtered = PETSC_FALSE;
+  if (p->iterations)
+    PetscCall(VecZeroEntries(p->left));
   if (snes->reason)
     PetscFunctionReturn(PETSC_SUCCESS);
   if (p->linearise)
@@ -208,6 +210,36 @@ static PetscErrorCode update_friction(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A limited number of iterations: in each, bodies go on one by one, as far as collisions let
+   them. */
+static PetscErrorCode shorten_by_bodies(SNES snes, PetscReal *slope)
+{
+  const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
+  const Vec Y = snes->vec_sol_update;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(Y, p->left));
+  PetscCall((*p->barrier->body_steps)(p->ctx, snes->vec_sol, Y));
+  PetscCall(VecDot(snes->vec_func, Y, slope));
+  *slope = -*slope;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the last of them the solve ends where it is, at an X free of intersections. */
+static PetscErrorCode end_early(SNES snes, PetscReal s)
+{
+  const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
+
+  PetscFunctionBeginUser;
+  if (snes->reason > 0)
+    PetscCall(VecZeroEntries(p->left));
+  else if (snes->iter >= p->iterations) {
+    PetscCall(VecAXPBY(p->left, s, -1., snes->vec_sol_update));
+    snes->reason = SNES_CONVERGED_ITS;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
@@ -232,6 +264,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, largest safe step, line search */
     PetscCall(SbNewtonFindDirection(snes, &slope));
     s = 1.;
+    if (!snes->reason && p->iterations)
+      PetscCall(shorten_by_bodies(snes, &slope));
     if (!snes->reason)
       PetscCall(SbNewtonLongestStep(snes, &s));
     if (!snes->reason && !p->barrier && s < SHORTEST)
@@ -257,6 +291,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     check_progress(snes, s);
     if (p->barrier)
       PetscCall(update_friction(snes));
+    if (p->iterations)
+      PetscCall(end_early(snes, s));
   }
   if (p->linearise)
     PetscCall((*p->linearise)(p->ctx, NULL, NULL, 0.));
@@ -313,6 +349,13 @@ PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is)
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, is));
   if (*is)
     *is = ((const Newton *)snes->data)->unstable;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonChange(SNES snes, PetscReal *change)
+{
+  PetscFunctionBeginUser;
+  *change = ((const Newton *)snes->data)->change;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

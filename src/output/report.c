@@ -312,6 +312,12 @@ PetscErrorCode SbReportSummary(SbRun run)
         "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
         " Newton and %" PetscInt_FMT " linear iterations",
         run->counters.steps, run->counters.rejected, run->counters.newton, run->counters.linear);
+  if (run->counters.unsolved)
+    entry("",
+          "%" PetscInt_FMT " of %" PetscInt_FMT
+          " steps ended before they were solved, with at most "
+          "%.3g m left of their displacement (-contact_quality fast)",
+          run->counters.unsolved, run->counters.steps, (double)run->counters.most_left);
   if (run->counters.turned)
     entry("",
           "%" PetscInt_FMT " load steps were cut, in which supports would turn by more than 30 "

@@ -79,6 +79,30 @@ static PetscErrorCode check_active_set(SbRun run, PetscBool implicit, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -contact_quality fast */
+static PetscErrorCode check_fast(SbRun run)
+{
+  const SbContactSet *c = &run->model->contacts;
+  const char *why = NULL;
+
+  PetscFunctionBeginUser;
+  if (!c->n)
+    why = "no effect here is of type contact";
+  else if (c->npotential < c->n)
+    why = "an effect here has another response";
+  else if (c->nrigid)
+    why = "the response of an effect here has multipliers";
+  else if (c->nrestitution)
+    why = "an effect here has restitution";
+  else if (run->solve.preset != SB_TIME_EULER_IMPLICIT)
+    why = "the integrator here is another one";
+  PetscCheck(!why, run->model->comm, PETSC_ERR_USER_INPUT,
+             "-contact_quality fast is for contact with response barrier, without restitution, and "
+             "-time euler_implicit: %s",
+             why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCheckContact(SbRun run)
 {
   const SbModel m = run->model;
@@ -94,6 +118,8 @@ PetscErrorCode SbRunCheckContact(SbRun run)
       m->comm, PETSC_ERR_USER_INPUT,
       "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
       m->contacts.contact[k]->effect->name);
+  if (run->solve.fast)
+    PetscCall(check_fast(run));
   if (m->contacts.npotential)
     PetscCall(check_barrier(run, implicit, matrix));
   if (m->contacts.nactive_set)

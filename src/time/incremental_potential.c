@@ -140,6 +140,13 @@ static PetscErrorCode max_step(void *ctx, Vec X, Vec Y, PetscReal *part, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode body_steps(void *ctx, Vec X, Vec Y)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbContactSetBodySteps(&((SbPotential)ctx)->run->model->contacts, X, Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode advance(void *ctx, PetscReal fraction)
 {
   PetscFunctionBeginUser;
@@ -255,6 +262,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
   run->solve.potential = q;
   q->run = run;
   q->barrier = (SbNewtonBarrier){.max_step = max_step,
+                                 .body_steps = body_steps,
                                  .advance = advance,
                                  .inverted = inverted,
                                  .hessian = hessian,
@@ -273,6 +281,15 @@ PetscErrorCode SbPotentialCreate(SbRun run)
                                  .barrier = m->contacts.npotential ? &q->barrier : NULL,
                                  .ctx = q,
                                  .nonsymmetric = (PetscBool)(run->solve.nonsymmetric.U != NULL)};
+
+  /* -contact_quality fast */
+  if (run->solve.fast) {
+    q->problem.iterations = 1;
+    PetscCall(PetscOptionsGetInt(NULL, NULL, "-snes_max_it", &q->problem.iterations, NULL));
+    PetscCall(VecDuplicate(run->state.U, &run->solve.left));
+    PetscCall(VecZeroEntries(run->solve.left));
+    q->problem.left = run->solve.left;
+  }
 
   q->problem.quadratic = (PetscBool)!m->dynamic;
   for (PetscInt k = 0; k < m->nmaterial; k++)

@@ -85,6 +85,12 @@ const SbOption SbTimeRows[] = {
    "contact with response barrier: how linear systems are solved: by a factorisation, or by CG "
    "whose coarse space contains the unknowns in contact; auto takes iterations while they are less "
    "work"},
+  {"contact_quality", SB_OPTION_CHOICE, 1, "", "exact", "exact|fast",
+   "contact with response barrier and implicit Euler. exact: steps are solved to -snes_rtol; fast: "
+   "for interactive runs and large heaps: steps end after -snes_max_it Newton iterations, 1 unless "
+   "given, in which each body goes as far as collision detection lets it. Nothing passes through "
+   "anything; impacts last some steps and lose energy, heaps settle later; velocities keep what "
+   "was left of the step, which the summary reports"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_adapt", SB_OPTION_BOOL, 1, "", "true", "",

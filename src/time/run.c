@@ -72,7 +72,7 @@ static PetscErrorCode read_static(SbRun r)
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
-  int inverted;
+  int inverted, quality;
   PetscBool barrier = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -118,6 +118,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->solve.saddle_choice));
   if (barrier)
     PetscCall(SbOptionChoice(&SbRunScope, "contact_solver", &r->solve.contact_choice));
+  PetscCall(SbOptionChoice(&SbRunScope, "contact_quality", &quality));
+  r->solve.fast = (PetscBool)(quality == 1);
   PetscCall(SbSolverSetFromOptions(r->solve.solver_choice, sizeof(r->solve.solver_choice)));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -368,6 +370,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
   Vec *const vectors[] = {&r->solve.R,
+                          &r->solve.left,
                           &r->solve.nonsymmetric.U,
                           &r->solve.nonsymmetric.x,
                           &r->solve.nonsymmetric.y,

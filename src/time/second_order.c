@@ -267,6 +267,43 @@ static PetscErrorCode is_finite(TS ts, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  A step that ended after one iteration: its velocity keeps what was left of the displacement, so
+  that bodies which a collision holds up lose time, not speed. All of it, w = left / h, unless that
+  makes energy. With the predictor X0 + h V0, E = |V - V0|^2 / 2 + psi at X0 + h V (norms by mass,
+  psi of strain, contact and loads): kinetic energy may be |V0|^2 / 2 less the change of psi, which
+  is |V1 - V0|^2 / 2 less the change of E from X0 to X1.
+*/
+static PetscErrorCode carry_over(SecondOrder *so, PetscReal h)
+{
+  const SbRun run = so->run;
+  const Vec w = run->solve.left;
+  PetscReal change, allowed, kinetic, along, more, room, root;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecNorm(w, NORM_INFINITY, &run->solve.longest_left));
+  if (run->solve.longest_left == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecScale(w, 1. / h));
+  PetscCall(VecPointwiseMult(so->work, run->state.mass, so->A1)); /* (V1 - V0) / h */
+  PetscCall(VecDot(so->A1, so->work, &allowed));
+  PetscCall(VecPointwiseMult(so->work, run->state.mass, so->V1));
+  PetscCall(VecDot(so->V1, so->work, &kinetic));
+  PetscCall(VecDot(w, so->work, &along));
+  PetscCall(VecPointwiseMult(so->work, run->state.mass, w));
+  PetscCall(VecDot(w, so->work, &more));
+
+  /* the largest part <= 1 with kinetic + 2 part along + part^2 more <= allowed, twice the
+     energies */
+  PetscCall(SbNewtonChange(run->solve.snes, &change));
+  allowed = PetscSqr(h) * allowed - 2. * change;
+  room = PetscMax(0., allowed - kinetic);
+  root = PetscSqrtReal(PetscSqr(along) + more * room);
+  if (more > 0.)
+    PetscCall(VecAXPY(so->V1, PetscMin(1., (root - along) / more), w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Computes velocity and acceleration at the end. */
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool *ok)
 {
@@ -281,6 +318,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(end_state(ts, so->X1));
   PetscCall(is_finite(ts, ok));
   *ok = (PetscBool)(*ok && reason > 0 && !unsettled[0]);
+  if (*ok && run->solve.left)
+    PetscCall(carry_over(so, h));
   if (*ok && so->set.separate) {
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));

@@ -178,7 +178,7 @@ static PetscErrorCode call_monitors(SbRun run, const SbStep *step)
 }
 
 /* Adds the iterations and rejections of the step to the totals. */
-static void count(SbRunCounters *c, PetscBool first, SbStep *now)
+static void count(SbRunCounters *c, PetscBool first, PetscReal left, SbStep *now)
 {
   now->newton = c->newton_step;
   now->linear = c->linear_step;
@@ -186,6 +186,8 @@ static void count(SbRunCounters *c, PetscBool first, SbStep *now)
   c->newton += now->newton;
   c->linear += now->linear;
   c->steps += !first;
+  c->unsolved += !first && left > 0.;
+  c->most_left = first ? c->most_left : PetscMax(c->most_left, left);
   c->rejected_seen = c->rejected;
   c->newton_step = c->linear_step = 0;
 }
@@ -246,7 +248,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   now.energies = run->state.energies;
 
   /* monitors */
-  count(&run->counters, first, &now);
+  count(&run->counters, first, run->solve.longest_left, &now);
   now.wall = MPI_Wtime() - clock->wall_start;
   PetscCall(call_monitors(run, &now));
   run->monitors.last = now;

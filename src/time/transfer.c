@@ -22,6 +22,8 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   to->counters.linear = to->counters.linear_before = from->counters.linear;
   to->counters.rejected = to->counters.rejected_seen = from->counters.rejected;
   to->counters.steps = from->counters.steps;
+  to->counters.unsolved = from->counters.unsolved;
+  to->counters.most_left = from->counters.most_left;
   to->clock.wall_start = from->clock.wall_start;
   to->clock.stop = from->clock.stop;
 
