@@ -39,9 +39,9 @@ static const SbOption rows[] = {
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "static coefficient of friction"},
   {"response", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|projected|multiplier|augmented|penalty|barrier",
-   "how contact is enforced. auto: barrier; projected in static runs without friction where all "
-   "obstacles are half-spaces or bowls, there also with -snes_type ksponly, and where -time or an "
-   "option needs it. projected: active set, constraints eliminated by solving in their null space; "
+   "how contact is enforced. auto: barrier; projected with -snes_type ksponly where all obstacles "
+   "are half-spaces or bowls, and where -time or an option needs it. projected: active set, "
+   "constraints eliminated by solving in their null space; "
    "multiplier: Lagrange multipliers; "
    "augmented: "
    "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; "
@@ -102,8 +102,8 @@ static const SbOption rows[] = {
   {"unsettled", SB_OPTION_CHOICE, 1, "", "auto", "auto|fail|barrier",
    "between bodies: what happens to a step in which the forces of augmented, projected and "
    "multiplier do not settle: fail: it is halved, and where that does not help the run ends; "
-   "barrier: it is repeated with the response barrier, with a warning; auto: barrier if the "
-   "response is the choice of auto, fail if it is given by name"},
+   "barrier: it is repeated with the response barrier, with a warning; auto: fail, as these "
+   "responses are never the choice of -effect_<name>_response auto"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -138,7 +138,6 @@ typedef struct {
   PetscBool bodies;    /* some is contact between bodies */
   PetscBool facets;    /* some obstacle is neither a half-space nor a bowl */
   PetscBool lacks;     /* some obstacle has an option that `barrier` lacks */
-  PetscBool friction;  /* some has friction */
   SbResponse response; /* the option of the last one that gives it; AUTO: none does */
 } Wishes;
 
@@ -147,7 +146,6 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
 {
   char text[PETSC_MAX_PATH_LEN];
   int response;
-  PetscReal mu;
   SbScope scope;
 
   PetscFunctionBeginUser;
@@ -159,8 +157,6 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
   PetscCall(SbOptionChoice(&scope, "response", &response));
   if (response != AUTO)
     wishes->response = (SbResponse)response;
-  PetscCall(SbOptionReal(&scope, "friction", &mu));
-  wishes->friction = (PetscBool)(wishes->friction || mu > 0);
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
   if (!text[0]) {
     wishes->bodies = PETSC_TRUE;
@@ -183,7 +179,6 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
                              const char **why)
 {
   PetscBool possible = PETSC_TRUE;
-  PetscBool moves = PETSC_TRUE;
   PetscBool once = PETSC_FALSE;
   Wishes wishes = {0};
   char snes[SB_NAME_MAX] = "";
@@ -212,7 +207,6 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
 
     PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
     possible = (PetscBool)(time == 0 || time == 6); /* euler_implicit, static */
-    moves = (PetscBool)(time != 6);
   }
   PetscCall(PetscOptionsGetString(NULL, NULL, "-snes_type", snes, sizeof(snes), NULL));
   once = (PetscBool)!strcmp(snes, SNESKSPONLY);
@@ -231,9 +225,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
       {wishes.lacks, PROJECTED, "an option that barrier lacks"},
       {wishes.facets, BARRIER, "edges and corners may touch"},
       {once, PROJECTED, "one linear solve a step, half-spaces and bowls only"},
-      {moves, BARRIER, "no active set has to settle in a step"},
-      {wishes.friction, BARRIER, "friction, whose active set may not settle"},
-      {PETSC_TRUE, PROJECTED, "half-spaces and bowls only, without motion and friction"},
+      {PETSC_TRUE, BARRIER, "no active set has to settle in a step"},
     };
     size_t k = 0;
 
@@ -291,7 +283,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   c->base.restitution = c->bounce.e;
   if (surfaces)
-    PetscCall(SbSurfacesCreate(e, scope, (PetscBool)(why != NULL)));
+    PetscCall(SbSurfacesCreate(e, scope));
   else
     PetscCall(SbContactNodesCreate(e, scope));
   PetscFunctionReturn(PETSC_SUCCESS);

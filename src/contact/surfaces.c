@@ -1087,7 +1087,7 @@ static const SbEffectOps surface_effect = {
   .destroy = destroy_surfaces,
 };
 
-PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_auto)
+PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
 {
   static const char *const obstacle[] = {
     "force_x",     "force_y", "force_z", "torque_x",      "torque_y",     "torque_z", "contacts",
@@ -1125,7 +1125,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
   e->linear = PETSC_FALSE;
   PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
   b->fall_back.response = b->contact.response;
-  b->fall_back.may = (PetscBool)(has_multipliers(b) && (unsettled == 2 || (by_auto && !unsettled)));
+  b->fall_back.may = (PetscBool)(has_multipliers(b) && unsettled == 2);
   e->nstate = PAIR_KEY + 4;
   e->column = b->contact.partner.obstacle ? obstacle : bodies;
   e->ncolumn = b->contact.partner.obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle)
