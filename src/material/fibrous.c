@@ -16,6 +16,8 @@
 #include "fibrous.h"
 #include "sbgeometry.h"
 
+#define ROUNDING 4e-15 /* of the largest entry: what eigenvalues are below zero by rounding */
+
 /* Of a batch. No numbers for J <= 0. */
 typedef struct {
   SbPack a;    /* J^(-2/3) */
@@ -240,6 +242,57 @@ SB_KERNEL static void add_tangent(const Strains *s, const SbFibreEnergy *w,
   }
 }
 
+/* Whether C is positive semi-definite but for rounding, by its Cholesky factor: least > 0. */
+SB_KERNEL static void least_pivot(const SbPack C[restrict 81], SbPack least)
+{
+  SbPack L[81], shift;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal most = 0;
+
+    for (int k = 0; k < 9; k++)
+      most = PetscMax(most, C[10 * k][l]);
+    shift[l] = ROUNDING * most;
+    least[l] = 1;
+  }
+  for (int j = 0; j < 9; j++) {
+    for (int i = j; i < 9; i++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        PetscReal sum = C[9 * i + j][l] + (i == j ? shift[l] : 0);
+
+        for (int k = 0; k < j; k++)
+          sum -= L[9 * i + k][l] * L[9 * j + k][l];
+        if (i == j) {
+          least[l] = sum > 0 ? least[l] : 0;
+          L[10 * j][l] = PetscSqrtReal(sum > 0 ? sum : 1);
+        } else {
+          L[9 * i + j][l] = sum / L[10 * j][l];
+        }
+      }
+    }
+  }
+}
+
+/* Raises the negative eigenvalues to zero, of the lanes that have some. */
+static void project(SbPack C[81])
+{
+  SbPack least;
+
+  least_pivot((const SbPack *)C, least);
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal c[81];
+    PetscReal sum = 0;
+
+    SbPackGet(81, (const SbPack *)C, l, c);
+    for (int k = 0; k < 81; k++)
+      sum += c[k];
+    if (least[l] > 0 || PetscIsInfOrNanReal(sum))
+      continue;
+    SbSymmetricProjectPSD(9, c);
+    SbPackPut(81, c, l, C);
+  }
+}
+
 void SbFibrousTangent(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
 {
   struct _p_SbMaterial exact = *m;
@@ -255,16 +308,6 @@ void SbFibrousTangent(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C
   directions(axes_of(m), &s, &w, F, (const SbPack *)D, B, S, T, trace);
   add_tangent(&s, &w, (const SbPack(*)[9])B, (const SbPack *)D, (const SbPack *)S,
               (const SbPack *)T, trace, C);
-  for (int l = 0; m->tangent == SB_TANGENT_EXACT_SPD && l < SB_BATCH; l++) {
-    PetscReal c[81];
-    PetscReal sum = 0;
-
-    SbPackGet(81, (const SbPack *)C, l, c);
-    for (int k = 0; k < 81; k++)
-      sum += c[k];
-    if (PetscIsInfOrNanReal(sum))
-      continue;
-    SbSymmetricProjectPSD(9, c);
-    SbPackPut(81, c, l, C);
-  }
+  if (m->tangent == SB_TANGENT_EXACT_SPD)
+    project(C);
 }
