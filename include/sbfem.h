@@ -288,6 +288,10 @@ typedef struct {
    collective. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                       PetscReal psi[], PetscReal pressure[]);
+/* Fills SbMesh.direction for laws that take directions from the mesh file or by a rule; material as
+   SbSpaceCreate() takes it. Errors: those of SbImportDirections(); PETSC_ERR_USER_INPUT for a set
+   without a vertex of the body. Collective. */
+PetscErrorCode SbFibresFind(SbMesh mesh, const SbMaterial material[]);
 /* Per owned cell: the unit vector of an axis, 0: fibre, 1: sheet, at rest, value[ncell_owned][3];
    zero where the law has none. Not collective. */
 void SbSpaceCellAxis(SbSpace space, int axis, PetscReal value[]);

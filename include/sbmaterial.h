@@ -148,6 +148,18 @@ struct _p_SbMaterial {
   const SbPack *axes;
 };
 
+/* Where the axes of a law with fibres come from: formulas of the place; fields of the mesh file; or
+   the rule of src/fem/fibre_rule.c, from surfaces. */
+#define SB_FIBRE_SURFACES 5
+struct _p_SbFibres {
+  char option[2][3 * SB_NAME_MAX]; /* names of the options of fibre and sheet, */
+  SbFormula direction[6];          /* which they have; no sheet: NULL */
+  char field[2][SB_NAME_MAX];      /* arrays in the mesh file; "": none */
+  /* outer, inner, base, apex, inner of the right ventricle or ""; the first one "": no rule */
+  char surface[SB_FIBRE_SURFACES][SB_NAME_MAX];
+  PetscReal angle[4]; /* rad, alpha inside and outside, beta inside and outside */
+};
+
 /* Names of all laws, "linear|corotated|...": the range of the option `material`. */
 extern char SbMaterialNames[];
 /* Adds a law, which must live as long as the program, and its option rows (classes "body" and
@@ -187,9 +199,11 @@ PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point);
 PetscErrorCode SbMaterialGetStiffest(SbMaterial m, SbMaterial *stiffest);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
 /* The axes of a law with fibres at a place x, m, at rest: Q[9], orthonormal, its columns the fibre,
-   the sheet and their normal. Errors: PETSC_ERR_USER_INPUT with option and place where a direction
-   is zero, or the sheet is along the fibre. Not collective. */
-PetscErrorCode SbMaterialAxes(SbMaterial m, const PetscReal x[3], PetscReal Q[9]);
+   the sheet and their normal. given[6]: fibre and sheet by fields or by the rule, or NULL. Errors:
+   PETSC_ERR_USER_INPUT with option and place where a direction is zero, or the sheet is along the
+   fibre. Not collective. */
+PetscErrorCode SbMaterialAxes(SbMaterial m, const PetscReal x[3], const PetscReal given[6],
+                              PetscReal Q[9]);
 
 /*
   Stiffness at rest, where every law is Hooke's; Pa, Poisson's ratio without unit. Young's modulus

@@ -5,28 +5,41 @@
 */
 #include "fem_impl.h"
 
-PetscErrorCode SbSpaceFindAxes(SbSpace s)
+static PetscErrorCode find(SbSpace s, SbRegion *region)
 {
   PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    SbRegion *region = &s->region[r];
+  PetscCall(PetscMalloc1(9 * (region->bend - region->bstart), &region->axes));
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    for (PetscInt l = 0; l < SB_BATCH; l++) {
+      const PetscInt cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
+      const PetscReal *given = s->mesh->direction ? s->mesh->direction + 6 * cell : NULL;
+      PetscReal x[3], Q[9];
 
-    if (!region->material->type->fibres)
-      continue;
-    PetscCall(PetscMalloc1(9 * (region->bend - region->bstart), &region->axes));
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscInt cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
-        PetscReal x[3] = {0., 0., 0.};
-        PetscReal Q[9];
-
-        for (int k = 0; k < 12; k++)
-          x[k % 3] += s->mesh->x[3 * s->mesh->cell[4 * cell + k / 3] + k % 3] / 4.;
-        PetscCall(SbMaterialAxes(region->material, x, Q));
-        SbPackPut(9, Q, (int)l, region->axes + 9 * (b - region->bstart));
-      }
+      SbCellCentre(s->mesh, cell, x);
+      PetscCall(SbMaterialAxes(region->material, x, given, Q));
+      SbPackPut(9, Q, (int)l, region->axes + 9 * (b - region->bstart));
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceFindAxes(SbSpace s)
+{
+  SbCaughtError caught = {0, ""};
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < s->mesh->nbody; b++)
+    for (PetscInt i = -1; i < s->mesh->body[b].ninclusion; i++)
+      any =
+        (PetscBool)(any ||
+                    s->material[i < 0 ? b : s->mesh->body[b].inclusion[i].material]->type->fibres);
+  if (!any)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt r = 0; r < s->nregion && !caught.code; r++)
+    if (s->region[r].material->type->fibres)
+      SB_CATCH(&caught, find(s, &s->region[r]));
+  PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -113,7 +113,12 @@ void SbWallMatrix(const SbWall *wall, PetscReal K[3][3]);
    docs/reference/theory.md. */
 #define SB_FOLLOW 4.
 
-/* axes.c: the axes of cells of laws with fibres, once there are batches. Not collective; errors as
+/* fibre_field.c: centre of a straight tet at rest, m. fibre_rule.c: SbMesh.direction of the cells
+   of material k of a body by the rule of surfaces; collective. */
+void SbCellCentre(SbMesh mesh, PetscInt cell, PetscReal x[3]);
+PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres fibres);
+
+/* axes.c: the axes of cells of laws with fibres, once there are batches. Collective; errors as
    SbMaterialAxes(). */
 PetscErrorCode SbSpaceFindAxes(SbSpace space);
 

@@ -21,6 +21,33 @@ PetscErrorCode SbFibresDestroy(SbFibres *fibres)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The surfaces of the rule and its angles, if there is one. */
+static PetscErrorCode read_rule(SbFibres f, const SbScope *scope)
+{
+  char(*names)[SB_NAME_MAX];
+  char option[3 * SB_NAME_MAX];
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  SbOptionName(scope, "fibre_surfaces", sizeof(option), option);
+  PetscCall(SbOptionNames(scope, "fibre_surfaces", &n, &names));
+  PetscCheck(!n || n == 4 || n == 5, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s names %" PetscInt_FMT
+             " sets; the rule needs four, outer, inner, base and apex, or five, with the inner "
+             "surface of a right ventricle",
+             option, n);
+  PetscCheck(!n || (!f->field[0][0] && !f->field[1][0]), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: a rule and fields of the mesh file both give directions: leave one of them out",
+             option);
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(PetscStrncpy(f->surface[i], names[i], sizeof(f->surface[i])));
+  PetscCall(PetscFree(names));
+  PetscCall(SbOptionReals(scope, "fibre_angles", f->angle));
+  for (int i = 0; i < 4; i++)
+    f->angle[i] *= PETSC_PI / 180;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
 {
   static const char *const key[2] = {"fibre", "sheet"};
@@ -47,6 +74,10 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
       PetscCall(SbFormulaEval(f->direction[k], 0., NULL, &value));
     given = (PetscBool)(given || value != 0);
   }
+  PetscCall(SbOptionString(scope, "fibre_field", sizeof(f->field[0]), f->field[0]));
+  PetscCall(SbOptionString(scope, "sheet_field", sizeof(f->field[1]), f->field[1]));
+  PetscCall(read_rule(f, scope));
+  given = (PetscBool)(given || f->field[1][0] || f->surface[0][0]);
   PetscCheck(given || !sheet, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s must be given: with these constants the law %s has directions in the plane of "
              "fibre and sheet",
@@ -58,11 +89,15 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
 }
 
 /* A direction at x, as a unit vector. */
-static PetscErrorCode evaluate(const SbFibres f, int i, const PetscReal x[3], PetscReal a[3])
+static PetscErrorCode evaluate(const SbFibres f, int i, const PetscReal x[3],
+                               const PetscReal *given, PetscReal a[3])
 {
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++)
-    PetscCall(SbFormulaEval(f->direction[3 * i + k], 0., x, &a[k]));
+  for (int k = 0; k < 3; k++) {
+    a[k] = given ? given[3 * i + k] : 0;
+    if (!given)
+      PetscCall(SbFormulaEval(f->direction[3 * i + k], 0., x, &a[k]));
+  }
   PetscCheck(SbNormalise(a) > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s is a vector of length 0 at (%.4g, %.4g, %.4g) m: it must have a direction at the "
              "centre of every tet",
@@ -70,17 +105,21 @@ static PetscErrorCode evaluate(const SbFibres f, int i, const PetscReal x[3], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialAxes(SbMaterial m, const PetscReal x[3], PetscReal Q[9])
+PetscErrorCode SbMaterialAxes(SbMaterial m, const PetscReal x[3], const PetscReal given[6],
+                              PetscReal Q[9])
 {
   const SbFibres f = m->fibres;
+  const PetscBool rule = (PetscBool)(f->surface[0][0] != 0);
   PetscReal a[3];
   PetscReal b[3] = {0, 0, 0};
   PetscReal n[3];
 
   PetscFunctionBeginUser;
-  PetscCall(evaluate(f, 0, x, a));
-  if (f->direction[3]) {
-    PetscCall(evaluate(f, 1, x, b));
+  PetscCall(evaluate(f, 0, x, rule || f->field[0][0] ? given : NULL, a));
+  if (rule || f->field[1][0]) {
+    PetscCall(evaluate(f, 1, x, given, b));
+  } else if (f->direction[3]) {
+    PetscCall(evaluate(f, 1, x, NULL, b));
   } else {
     int least = PetscAbsReal(a[0]) < PetscAbsReal(a[1]) ? 0 : 1;
 

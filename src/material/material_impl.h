@@ -36,12 +36,6 @@ struct _p_SbElastic {
   PetscReal fibre;
 };
 
-/* Directions of the axes of a law with fibres, as formulas of the place. */
-struct _p_SbFibres {
-  char option[2][3 * SB_NAME_MAX]; /* names of the options of fibre and sheet */
-  SbFormula direction[6];          /* fibre, sheet */
-};
-
 PetscErrorCode SbFibresDestroy(SbFibres *fibres);
 
 /* Option row of a law without a warped tangent. */

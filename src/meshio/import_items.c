@@ -643,6 +643,7 @@ PetscErrorCode SbImportDestroy(SbImport *im)
   SbImportParts(im, part);
   for (int i = 0; i < SB_IMPORT_NPART; i++)
     PetscCall(PetscFree(*part[i].array));
+  PetscCall(PetscFree2(im->field_number, im->field_value));
   PetscCall(PetscMemzero(im, sizeof(*im)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

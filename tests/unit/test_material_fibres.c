@@ -164,7 +164,7 @@ static PetscErrorCode test_printed(void)
                (double)(a[1][0] + skew * a[0][0]), (double)(a[1][1] + skew * a[0][1]),
                (double)(a[1][2] + skew * a[0][2]));
       PetscCall(law_of(laws[k][0], text, &m));
-      PetscCall(SbMaterialAxes(m, x, R));
+      PetscCall(SbMaterialAxes(m, x, NULL, R));
       SB_CHECK(difference(9, Q, R) < 1e-14, "axes are %g from those given", difference(9, Q, R));
 
       /* lane 2 has these axes, and its neighbours others */
@@ -239,7 +239,7 @@ static PetscErrorCode test_directions(void)
     const PetscReal x[3] = {uniform(), uniform(), uniform()};
     const PetscReal r = sqrt(x[0] * x[0] + x[1] * x[1]);
 
-    PetscCall(SbMaterialAxes(m, x, Q));
+    PetscCall(SbMaterialAxes(m, x, NULL, Q));
     SB_CHECK(fabs(Q[0] + x[1] / r) < 1e-14 && fabs(Q[3] - x[0] / r) < 1e-14 && Q[6] == 0,
              "direction %g %g %g", Q[0], Q[3], Q[6]);
     SbMatTransposeMul(Q, Q, unit);
@@ -248,13 +248,13 @@ static PetscErrorCode test_directions(void)
     SB_CHECK_NEAR(SbMatDet(Q), 1, 1e-14, "right-handed axes");
   }
   const PetscReal centre[3] = {0, 0, 1};
-  SB_CHECK_ERROR(SbMaterialAxes(m, centre, Q), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbMaterialAxes(m, centre, NULL, Q), PETSC_ERR_USER_INPUT,
                  "-body_sample_fibre|(0, 0, 1)");
   PetscCall(SbMaterialDestroy(&m));
   SbFormat(sizeof(text), text, "%s -body_sample_bulk 1e6 -body_sample_sheet x,0,0", laws[1][1]);
   PetscCall(law_of(laws[1][0], text, &m));
   const PetscReal along[3] = {2, 0, 0};
-  SB_CHECK_ERROR(SbMaterialAxes(m, along, Q), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbMaterialAxes(m, along, NULL, Q), PETSC_ERR_USER_INPUT,
                  "-body_sample_sheet|-body_sample_fibre|(2, 0, 0)");
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -37,7 +37,7 @@ static void find_state(SbMaterial m, PetscReal l, PetscReal r[2], PetscReal *psi
   SbPack axes[9], F[9], P[9], W;
   struct _p_SbMaterial turned = *m;
 
-  (void)SbMaterialAxes(m, x, Q);
+  (void)SbMaterialAxes(m, x, NULL, Q);
   for (int k = 0; k < 9; k++)
     for (int n = 0; n < SB_BATCH; n++)
       axes[k][n] = Q[k];
