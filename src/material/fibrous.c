@@ -14,9 +14,10 @@
   Holzapfel, Nonlinear solid mechanics, 2000, chapter 6; Gasser, Ogden and Holzapfel 2006.
 */
 #include "fibrous.h"
-#include "sbgeometry.h"
 
-#define ROUNDING 4e-15 /* of the largest entry: what eigenvalues are below zero by rounding */
+#define SWEEPS 12        /* at most; 6 or 7 are needed */
+#define NEGLIGIBLE 1e-17 /* off-diagonal entry over the largest one that is left */
+#define ROUNDING 4e-15   /* of the largest entry: what eigenvalues are below zero by rounding */
 
 /* Of a batch. No numbers for J <= 0. */
 typedef struct {
@@ -273,24 +274,107 @@ SB_KERNEL static void least_pivot(const SbPack C[restrict 81], SbPack least)
   }
 }
 
-/* Raises the negative eigenvalues to zero, of the lanes that have some. */
+/* One sweep of Jacobi's method: A <- V A V^T, rows of V likewise; turned: in which lanes a rotation
+   was not negligible. */
+SB_KERNEL static void sweep(const SbPack size, SbPack A[restrict 81], SbPack V[restrict 81],
+                            SbPack turned)
+{
+  SbPack c, s;
+
+  for (int l = 0; l < SB_BATCH; l++)
+    turned[l] = 0;
+  for (int p = 0; p < 8; p++) {
+    for (int q = p + 1; q < 9; q++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal off = A[9 * p + q][l];
+        const PetscBool on = (PetscBool)(PetscAbsReal(off) > NEGLIGIBLE * size[l]);
+        const PetscReal z = (A[10 * q][l] - A[10 * p][l]) / (2 * (on ? off : 1));
+        const PetscReal t =
+          on ? (z < 0 ? -1 : 1) / (PetscAbsReal(z) + PetscSqrtReal(1 + z * z)) : 0;
+
+        turned[l] += on;
+        c[l] = 1 / PetscSqrtReal(1 + t * t);
+        s[l] = t * c[l];
+      }
+      for (int k = 0; k < 9; k++) {
+        for (int l = 0; l < SB_BATCH; l++) {
+          const PetscReal x = A[9 * k + p][l];
+          const PetscReal y = A[9 * k + q][l];
+          const PetscReal v = V[9 * p + k][l];
+          const PetscReal u = V[9 * q + k][l];
+
+          A[9 * k + p][l] = c[l] * x - s[l] * y;
+          A[9 * k + q][l] = s[l] * x + c[l] * y;
+          V[9 * p + k][l] = c[l] * v - s[l] * u;
+          V[9 * q + k][l] = s[l] * v + c[l] * u;
+        }
+      }
+      for (int k = 0; k < 9; k++) {
+        for (int l = 0; l < SB_BATCH; l++) {
+          const PetscReal x = A[9 * p + k][l];
+          const PetscReal y = A[9 * q + k][l];
+
+          A[9 * p + k][l] = c[l] * x - s[l] * y;
+          A[9 * q + k][l] = s[l] * x + c[l] * y;
+        }
+      }
+    }
+  }
+}
+
+/* C = sum of w v v^T over the eigenvalues w > 0, in lanes with least = 0. */
+SB_KERNEL static void recompose(const SbPack A[restrict 81], const SbPack V[restrict 81],
+                                const SbPack least, SbPack C[restrict 81])
+{
+  for (int i = 0; i < 9; i++) {
+    for (int k = i; k < 9; k++) {
+      SbPack c;
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        PetscReal sum = 0;
+
+        for (int e = 0; e < 9; e++)
+          sum += (A[10 * e][l] > 0 ? A[10 * e][l] : 0) * V[9 * e + i][l] * V[9 * e + k][l];
+        c[l] = least[l] > 0 ? C[9 * i + k][l] : sum;
+      }
+      SbTangentPut(c, i, k, C);
+    }
+  }
+}
+
+/* Raises the negative eigenvalues to zero, of the lanes that have some; others stay as they are,
+   and do not depend on them. */
 static void project(SbPack C[81])
 {
-  SbPack least;
+  PetscReal more = 0;
+  SbPack least, size, turned, A[81], V[81];
 
   least_pivot((const SbPack *)C, least);
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal c[81];
     PetscReal sum = 0;
 
-    SbPackGet(81, (const SbPack *)C, l, c);
-    for (int k = 0; k < 81; k++)
-      sum += c[k];
-    if (least[l] > 0 || PetscIsInfOrNanReal(sum))
-      continue;
-    SbSymmetricProjectPSD(9, c);
-    SbPackPut(81, c, l, C);
+    size[l] = 0;
+    for (int k = 0; k < 81; k++) {
+      sum += C[k][l];
+      size[l] = PetscMax(size[l], PetscAbsReal(C[k][l]));
+    }
+    if (PetscIsInfOrNanReal(sum))
+      least[l] = 1;
+    for (int k = 0; k < 81; k++) {
+      A[k][l] = least[l] > 0 ? 0 : C[k][l];
+      V[k][l] = k % 10 == 0;
+    }
+    more += 1 - least[l];
   }
+  if (more == 0)
+    return;
+  for (int n = 0; n < SWEEPS && more > 0; n++) {
+    sweep(size, A, V, turned);
+    more = 0;
+    for (int l = 0; l < SB_BATCH; l++)
+      more += turned[l];
+  }
+  recompose((const SbPack *)A, (const SbPack *)V, least, C);
 }
 
 void SbFibrousTangent(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])

@@ -5,20 +5,6 @@
 */
 #include "meshio_impl.h"
 
-PetscErrorCode SbImportKeep(SbImport *im, PetscInt n, const int64_t number[], int64_t first,
-                            const double value[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree2(im->field_number, im->field_value));
-  PetscCall(PetscMalloc2(n, &im->field_number, 3 * n, &im->field_value));
-  im->nfield = n;
-  for (PetscInt i = 0; i < n; i++)
-    im->field_number[i] = number ? number[i] : first + i;
-  for (PetscInt i = 0; i < 3 * n; i++)
-    im->field_value[i] = value[i];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportDirections(const SbBody *body, const char *option, const char *name,
                                   PetscInt *n, PetscReal **centre, PetscReal **direction)
 {
