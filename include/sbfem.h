@@ -43,6 +43,7 @@ typedef struct {
   SbPack *curve_g, *curve_weight, *curve_mass;
   SbMaterial pointwise; /* the law at the points, less what of its volumetric part is of the mean */
   PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
+  SbPack *axes;         /* [batches][9] SbMaterial.axes of a law with fibres, else NULL; owned */
   SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
 } SbRegion;
 
@@ -287,6 +288,13 @@ typedef struct {
    collective. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                       PetscReal psi[], PetscReal pressure[]);
+/* Fills SbMesh.direction for laws that take directions from the mesh file or by a rule; material as
+   SbSpaceCreate() takes it. Errors: those of SbImportDirections(); PETSC_ERR_USER_INPUT for a set
+   without a vertex of the body. Collective. */
+PetscErrorCode SbFibresFind(SbMesh mesh, const SbMaterial material[]);
+/* Per owned cell: the unit vector of an axis, 0: fibre, 1: sheet, at rest, value[ncell_owned][3];
+   zero where the law has none. Not collective. */
+void SbSpaceCellAxis(SbSpace space, int axis, PetscReal value[]);
 /* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the
    linear law; may be NULL), energy density psi (J/m^3, rest); of P2, whose stresses are means over
    the points of SbRuleQuadratic, P there as well, point[ncell][4][9] (may be NULL); of a curved

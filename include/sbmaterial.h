@@ -12,6 +12,7 @@
 #include "sbkernel.h"
 
 typedef struct _p_SbMaterial *SbMaterial;
+typedef struct _p_SbFibres *SbFibres; /* directions of the axes of a law with fibres */
 
 /* polar.c, spectral.c: 3x3 matrices of a batch */
 
@@ -111,6 +112,8 @@ typedef struct {
     own_moduli - `setfromoptions` sets the stiffness at rest by SbMaterialSetLame(): young is not
                read, and poisson only by it
     limited  - psi is also infinite beyond a limit of stretch, and stress and tangent are no numbers
+    fibres   - the law depends on directions in the rest state, SbMaterial.axes; Hooke's law at rest
+               has the mean of its shear moduli over all directions
     share    - psi_mu has the part share mu/2 theta^2
 */
 typedef struct {
@@ -118,7 +121,7 @@ typedef struct {
   size_t size; /* bytes of `data`, zero at first */
   PetscInt nrow;
   const SbOption *row; /* [nrow] */
-  PetscBool linear, softens, jacobian, positive, own_moduli, limited;
+  PetscBool linear, softens, jacobian, positive, own_moduli, limited, fibres;
   PetscReal share;
   SbMaterialOps ops;
 } SbMaterialType;
@@ -137,7 +140,24 @@ struct _p_SbMaterial {
   SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
   SbMaterial point;      /* SbMaterialGetPointwise(), likewise */
+  SbMaterial stiffest;   /* SbMaterialGetStiffest(), likewise */
   void *data;            /* the law's own constants; freed with the material */
+  SbFibres fibres;       /* of a law with fibres, else NULL; owned */
+  /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
+     state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
+  const SbPack *axes;
+};
+
+/* Where the axes of a law with fibres come from: formulas of the place; fields of the mesh file; or
+   the rule of src/fem/fibre_rule.c, from surfaces. */
+#define SB_FIBRE_SURFACES 5
+struct _p_SbFibres {
+  char option[2][3 * SB_NAME_MAX]; /* names of the options of fibre and sheet, */
+  SbFormula direction[6];          /* which they have; no sheet: NULL */
+  char field[2][SB_NAME_MAX];      /* arrays in the mesh file; "": none */
+  /* outer, inner, base, apex, inner of the right ventricle or ""; the first one "": no rule */
+  char surface[SB_FIBRE_SURFACES][SB_NAME_MAX];
+  PetscReal angle[4]; /* rad, alpha inside and outside, beta inside and outside */
 };
 
 /* Names of all laws, "linear|corotated|...": the range of the option `material`. */
@@ -174,7 +194,16 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear);
    the modulus min(lambda, SB_POINT_MODULUS mu): m with that lambda. What is left is
    SbMaterialMeanModulus(); m itself where that is zero. Otherwise as SbMaterialGetShear(). */
 PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point);
+/* A law whose Hooke's tensor at rest is nowhere less stiff than m with all its fibres in tension: m
+   itself without fibres. Otherwise as SbMaterialGetShear(). */
+PetscErrorCode SbMaterialGetStiffest(SbMaterial m, SbMaterial *stiffest);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
+/* The axes of a law with fibres at a place x, m, at rest: Q[9], orthonormal, its columns the fibre,
+   the sheet and their normal. given[6]: fibre and sheet by fields or by the rule, or NULL. Errors:
+   PETSC_ERR_USER_INPUT with option and place where a direction is zero, or the sheet is along the
+   fibre. Not collective. */
+PetscErrorCode SbMaterialAxes(SbMaterial m, const PetscReal x[3], const PetscReal given[6],
+                              PetscReal Q[9]);
 
 /*
   Stiffness at rest, where every law is Hooke's; Pa, Poisson's ratio without unit. Young's modulus

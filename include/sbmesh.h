@@ -199,6 +199,9 @@ struct _p_SbMesh {
   uint64_t *cell_set; /* [ncell] SB_SET_BIT(k), SB_CURVED */
   PetscReal *
     edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
+  /* [ncell][6] directions of fibre and sheet of laws that take them from the mesh file or by a
+     rule, else unset; NULL: no law does. By SbFibresFind(), later than the rest. */
+  PetscReal *direction;
   uint64_t
     *face_set; /* [ncell][4] face f is opposite vertex f: SB_ON_BOUNDARY, SB_SET_BIT(k) in set k */
 };

@@ -96,6 +96,21 @@ static const Part parts[] = {
   {"material", "arruda_boyce",
    "-body_bar_material arruda_boyce -body_bar_mu 1.7e4 -body_bar_lambda_m 3", NULL, NULL,
    PETSC_TRUE},
+  {"material", "transversely_isotropic",
+   "-body_bar_material transversely_isotropic -body_bar_mu 1.5e4 -body_bar_mu_fibre 2e4 "
+   "-body_bar_young_fibre 1e5",
+   NULL, NULL, PETSC_TRUE},
+  {"material", "holzapfel_gasser_ogden",
+   "-body_bar_material holzapfel_gasser_ogden -body_bar_mu 1.8e4 -body_bar_k1 1e4 -body_bar_k2 2 "
+   "-body_bar_angles 30,-30 -body_bar_sheet 0,1,0",
+   NULL, NULL, PETSC_TRUE},
+  {"material", "guccione",
+   "-body_bar_material guccione -body_bar_c 1e4 -body_bar_bf 8 -body_bar_bt 2 -body_bar_bfs 4",
+   NULL, NULL, PETSC_TRUE},
+  {"material", "holzapfel_ogden",
+   "-body_bar_material holzapfel_ogden -body_bar_a 1.8e4 -body_bar_b 2 -body_bar_a_f 2e4 "
+   "-body_bar_b_f 3",
+   NULL, NULL, PETSC_TRUE},
   {"time", "euler_implicit", "", NULL, "", PETSC_FALSE},
   {"time", "newmark", "-time newmark", NULL, "", PETSC_FALSE},
   {"time", "genalpha", "-time genalpha", NULL, "", PETSC_FALSE},

@@ -115,7 +115,9 @@ static Worst find_worst(SbSpace s, const PetscReal x[])
   Worst worst = {PETSC_MAX_REAL, 1., -1};
 
   for (PetscInt b = 0; b < s->nbatch_owned; b++) {
-    const struct _p_SbMaterial *law = s->batch_region[b]->material;
+    struct _p_SbMaterial own;
+    const struct _p_SbMaterial *law =
+      SbBatchLaw(s->batch_region[b], s->batch_region[b]->material, b, &own);
     const int npoint = SbBatchPoints(s, b).n;
     SbPack U[30], F[SB_POINTS][9], psi;
 

@@ -113,6 +113,15 @@ void SbWallMatrix(const SbWall *wall, PetscReal K[3][3]);
    docs/reference/theory.md. */
 #define SB_FOLLOW 4.
 
+/* fibre_field.c: centre of a straight tet at rest, m. fibre_rule.c: SbMesh.direction of the cells
+   of material k of a body by the rule of surfaces; collective. */
+void SbCellCentre(SbMesh mesh, PetscInt cell, PetscReal x[3]);
+PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres fibres);
+
+/* axes.c: the axes of cells of laws with fibres, once there are batches. Collective; errors as
+   SbMaterialAxes(). */
+PetscErrorCode SbSpaceFindAxes(SbSpace space);
+
 /* residual.c */
 /* Per owned cell: Cauchy stress, symmetric, T[9] (Pa), and of P2 as in SbSpaceCellPiola() at its
    points, point[ncell] (may be NULL). Not collective. */
@@ -228,6 +237,18 @@ typedef struct {
   const SbPack *weight;    /* [n] fractions of the volume */
 } SbPoints;
 SbPoints SbBatchPoints(SbSpace space, PetscInt b);
+/* A law of a region as its operations take it for batch b: itself or, of a law with fibres, `own`,
+   a copy with the axes of these cells. */
+SB_INLINE const struct _p_SbMaterial *SbBatchLaw(const SbRegion *region,
+                                                 const struct _p_SbMaterial *law, PetscInt b,
+                                                 struct _p_SbMaterial *own)
+{
+  if (!region->axes)
+    return law;
+  *own = *law;
+  own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
+  return own;
+}
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {

@@ -284,7 +284,9 @@ PetscErrorCode SbJumpFindWalls(SbSpace s)
 static void follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal even,
                          PetscReal factor, PetscBool keep)
 {
-  const SbMaterial m = s->batch_region[b]->material;
+  struct _p_SbMaterial own;
+  const struct _p_SbMaterial *m =
+    SbBatchLaw(s->batch_region[b], s->batch_region[b]->material, b, &own);
   const PetscReal *tension = s->jump->tension;
   const PetscReal borne = s->jump->bears * SbMaterialShearModulus(m) / factor;
   const PetscInt n = s->batch_n[b];

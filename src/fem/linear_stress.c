@@ -223,6 +223,8 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
       const SbPoints at = SbBatchPoints(s, b);
       SbPack x[30], dx[30], F[SB_POINTS][9], H[SB_POINTS][9];
       SbPack pressure[3] = {{0.}};
+      struct _p_SbMaterial own;
+      const struct _p_SbMaterial *here = SbBatchLaw(region, law, b, &own);
 
       SbBatchGradients(s, b, u, PETSC_FALSE, x, F);
       if (step) {
@@ -239,7 +241,7 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
                        step ? (const SbPack *)dx : NULL, step ? part : 1., s->pressure[b],
                        pressure);
       for (int q = 0; points && q < at.n; q++)
-        linearise(law, (const SbPack *)F[q], step ? (const SbPack *)H[q] : NULL,
+        linearise(here, (const SbPack *)F[q], step ? (const SbPack *)H[q] : NULL,
                   (const SbPack *)pressure, step ? part : 1.,
                   &region->stress[at.n * (b - region->bstart) + q]);
     }

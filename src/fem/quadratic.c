@@ -160,14 +160,16 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
   const SbRegion *region = s->batch_region[b];
   const SbMaterial m = region->pointwise;
   const SbPoints at = SbBatchPoints(s, b);
+  struct _p_SbMaterial own;
+  const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
   SbPack U[30], p;
 
   SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
   for (int q = 0; q < at.n; q++) {
     if (P)
-      m->ops.stress(m, (const SbPack *)F[q], P[q]);
+      law->ops.stress(law, (const SbPack *)F[q], P[q]);
     if (psi)
-      m->ops.energy(m, (const SbPack *)F[q], psi[q]);
+      law->ops.energy(law, (const SbPack *)F[q], psi[q]);
     if (pressure)
       SbMaterialPressure(m, (const SbPack *)F[q], pressure[q]);
   }

@@ -28,6 +28,8 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     const SbPoints at = SbBatchPoints(s, b);
     SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30];
     SbPack p = {0};
+    struct _p_SbMaterial own;
+    const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
 
     if (at.rule)
       memset(fe, 0, sizeof(fe));
@@ -51,7 +53,7 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     }
     for (int q = 0; q < at.n; q++) {
       if (elastic)
-        m->ops.stress(m, (const SbPack *)F[q], P);
+        law->ops.stress(law, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
         if (mean)

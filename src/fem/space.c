@@ -242,6 +242,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   s->nnode_cell = s->nnode;
   PetscCall(find_regions(s));
   PetscCall(tabulate_batches(s));
+  PetscCall(SbSpaceFindAxes(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
     PetscCall(SbJumpCreate(s, &s->jump));
@@ -312,8 +313,10 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(PetscFree(s->batch_weight));
   PetscCall(PetscFree(s->couplings.start));
   PetscCall(PetscFree(s->couplings.node));
-  for (PetscInt r = 0; r < s->nregion; r++)
+  for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscFree(s->region[r].stress));
+    PetscCall(PetscFree(s->region[r].axes));
+  }
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));
   PetscCall(PetscFree(s->batch_memory));

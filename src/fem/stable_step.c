@@ -14,7 +14,7 @@
   The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1
   for CR and DG, which bounds w for a consistent mass.
 
-  Not handled: frequencies that increase where a body is compressed.
+  Not handled: frequencies that increase where a body is compressed, or its fibres are stretched.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
@@ -70,8 +70,18 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
 
     /* f = K x at rest, with Hooke's tensor of every law: the force of damping with beta = 1 */
     PetscCall(SbSpaceGetLocalRead(s, X, &stage.v));
-    for (PetscInt r = 0; r < s->nregion; r++)
-      SbRegionForces(s, &s->region[r], PETSC_FALSE, 1., &stage, f);
+    for (PetscInt r = 0; r < s->nregion; r++) {
+      SbRegion region = s->region[r];
+
+      /* with fibres: as stiff in all directions as along them */
+      PetscCall(SbMaterialGetStiffest(region.material, &region.material));
+      if (region.material != s->region[r].material) {
+        region.pointwise = region.material;
+        if (region.quadratic && region.element->mean_volume)
+          PetscCall(SbMaterialGetPointwise(region.material, &region.pointwise));
+      }
+      SbRegionForces(s, &region, PETSC_FALSE, 1., &stage, f);
+    }
     if (s->jump)
       SbJumpAdd(s, stage.v, SB_JUMP_STIFFNESS, f);
     PetscCall(SbSpaceRestoreLocalRead(s, X, &stage.v));

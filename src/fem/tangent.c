@@ -134,8 +134,8 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
 }
 
 /* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
-static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                       const SbPack F[9], Split *split, SbPack K[10][9])
+static void law_blocks(const struct _p_SbMaterial *m, const SbPack *g, const SbPack V,
+                       const Factors *x, const SbPack F[9], Split *split, SbPack K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping;
   const PetscReal lambda = split ? 0. : x->lambda;
@@ -238,6 +238,8 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   const PetscBool split = (PetscBool)(out && mean && lambda_m > 0.);
   SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
     b[30] = {{0}};
+  struct _p_SbMaterial own;
+  const struct _p_SbMaterial *local = SbBatchLaw(region, law, batch, &own);
   Factors at = *x;
 
   SbBatchGradients(s, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
@@ -254,7 +256,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     if (has_linear_stress(s, region))
       at.stress = &region->stress[points.n * (batch - region->bstart) + q];
     SbPointVolume(&points, q, W);
-    law_blocks(law, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
+    law_blocks(local, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
   }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal both = x->stiffness + (one_D ? x->damping : 0.);
@@ -361,12 +363,14 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       quadratic_blocks(s, region, stage->u, &factors, b, out, K);
     else {
       Factors at = factors;
+      struct _p_SbMaterial own;
+      const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
 
       if (!m->linear)
         SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
       if (has_linear_stress(s, region))
         at.stress = &region->stress[b - region->bstart];
-      law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
+      law_blocks(law, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
 
       /* b_a = V D grad psi_a, as the force of a stress D */
       for (int l = 0; out && l < SB_BATCH; l++) {

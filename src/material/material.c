@@ -155,21 +155,23 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
   PetscCall(SbMaterialDestroy(&(*m)->point));
+  PetscCall(SbMaterialDestroy(&(*m)->stiffest));
+  PetscCall(SbFibresDestroy(&(*m)->fibres));
   PetscCall(PetscFree((*m)->rest));
   PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* m with another lambda, in *other, which m owns. */
-static PetscErrorCode with_lambda(SbMaterial m, PetscReal lambda, SbMaterial *other)
+/* m with other Lame parameters, in *other, which m owns. */
+static PetscErrorCode with_lame(SbMaterial m, PetscReal lambda, PetscReal mu, SbMaterial *other)
 {
   PetscFunctionBeginUser;
   if (*other)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(create(m->type, 2 * m->rest->mu, 0., m->density, other));
+  PetscCall(create(m->type, 2 * mu, 0., m->density, other));
   if (lambda != 0.)
-    SbMaterialSetLame(*other, lambda, m->rest->mu);
+    SbMaterialSetLame(*other, lambda, mu);
   PetscCall(SbMaterialSetTangent(*other, m->tangent));
   if (m->type->size)
     PetscCall(PetscMemcpy((*other)->data, m->data, m->type->size));
@@ -179,7 +181,7 @@ static PetscErrorCode with_lambda(SbMaterial m, PetscReal lambda, SbMaterial *ot
 PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
-  PetscCall(with_lambda(m, 0., &m->shear));
+  PetscCall(with_lame(m, 0., m->rest->mu, &m->shear));
   *shear = m->shear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,8 +192,19 @@ PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point)
 
   PetscFunctionBeginUser;
   if (mean != 0.)
-    PetscCall(with_lambda(m, m->rest->lambda - mean, &m->point));
+    PetscCall(with_lame(m, m->rest->lambda - mean, m->rest->mu, &m->point));
   *point = mean != 0. ? m->point : m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialGetStiffest(SbMaterial m, SbMaterial *stiffest)
+{
+  const PetscReal more = m->rest->fibre / 2;
+
+  PetscFunctionBeginUser;
+  if (more > 0)
+    PetscCall(with_lame(m, m->rest->lambda, m->rest->mu + more, &m->stiffest));
+  *stiffest = more > 0 ? m->stiffest : m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,18 +6,22 @@
 #include <sbmaterial.h>
 
 /* The laws, each a constant SbMaterialType in a file of its own: a new one is a line here. */
-#define SB_MATERIAL_LAWS(LAW)        \
-  LAW(SbMaterialLinear)              \
-  LAW(SbMaterialCorotated)           \
-  LAW(SbMaterialStVK)                \
-  LAW(SbMaterialNeoHookean)          \
-  LAW(SbMaterialIsochoricNeoHookean) \
-  LAW(SbMaterialStableNeoHookean)    \
-  LAW(SbMaterialMooneyRivlin)        \
-  LAW(SbMaterialYeoh)                \
-  LAW(SbMaterialOgden)               \
-  LAW(SbMaterialGent)                \
-  LAW(SbMaterialArrudaBoyce)
+#define SB_MATERIAL_LAWS(LAW)          \
+  LAW(SbMaterialLinear)                \
+  LAW(SbMaterialCorotated)             \
+  LAW(SbMaterialStVK)                  \
+  LAW(SbMaterialNeoHookean)            \
+  LAW(SbMaterialIsochoricNeoHookean)   \
+  LAW(SbMaterialStableNeoHookean)      \
+  LAW(SbMaterialMooneyRivlin)          \
+  LAW(SbMaterialYeoh)                  \
+  LAW(SbMaterialOgden)                 \
+  LAW(SbMaterialGent)                  \
+  LAW(SbMaterialArrudaBoyce)           \
+  LAW(SbMaterialTransverselyIsotropic) \
+  LAW(SbMaterialHolzapfelGasserOgden)  \
+  LAW(SbMaterialGuccione)              \
+  LAW(SbMaterialHolzapfelOgden)
 
 #define SB_DECLARE_LAW(law) extern const SbMaterialType law;
 SB_MATERIAL_LAWS(SB_DECLARE_LAW)
@@ -28,7 +32,11 @@ SB_MATERIAL_LAWS(SB_DECLARE_LAW)
 struct _p_SbElastic {
   PetscReal E, nu;
   PetscReal lambda, mu; /* Lame parameters, Pa; lambda 0: without the volumetric part */
+  /* Of a law with fibres, Pa: at rest psi is at most lambda/2 tr(E)^2 + (mu + fibre/2) E : E */
+  PetscReal fibre;
 };
+
+PetscErrorCode SbFibresDestroy(SbFibres *fibres);
 
 /* Option row of a law without a warped tangent. */
 #define SB_MATERIAL_TANGENT_ROW                                                          \

@@ -57,6 +57,13 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
                  im->where, (double)off[i], (double)SB_LENGTH_MAX);
     }
   }
+  for (PetscInt f = 0; f < im->nfield; f++) {
+    PetscReal *a = im->field_value + 3 * f;
+    const PetscReal y[3] = {a[0], a[1], a[2]};
+
+    for (int i = 0; i < 3; i++)
+      a[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2];
+  }
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscReal *x = im->x + 3 * v;
     PetscReal y[3];

@@ -353,6 +353,56 @@ static PetscErrorCode read_elements(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads an array of the elements: texts, real and whole numbers that describe it, and the rows;
+   kept if it is the wanted one. */
+static PetscErrorCode read_data(Gmsh *g)
+{
+  SbScan *s = &g->im->scan;
+  int64_t n;
+  int64_t whole[3] = {0, 0, 0}; /* step, components, rows */
+  int64_t *number;
+  double *value;
+  PetscReal x;
+  char name[SB_NAME_MAX] = "";
+  char text[SB_GROUP_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanCount(s, "texts of element data", 1, 1, &n));
+  for (int64_t i = 0; i < n; i++) {
+    PetscCall(SbScanQuoted(s, "name of element data in quotes", sizeof(text), text));
+    if (!i)
+      (void)snprintf(name, sizeof(name), "%.63s", text);
+  }
+  PetscCall(SbScanCount(s, "real numbers of element data", 1, 1, &n));
+  for (int64_t i = 0; i < n; i++)
+    PetscCall(SbScanReal(s, "real number of element data", 0, &x));
+  PetscCall(SbScanCount(s, "whole numbers of element data", 1, 1, &n));
+  for (int64_t i = 0; i < n; i++) {
+    int64_t one;
+
+    PetscCall(SbScanText(s, "whole number of element data", &one));
+    if (i < 3)
+      whole[i] = one;
+  }
+  if (!SbImportWants(g->im, name) || whole[1] != 3)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbScanRoom(s, "rows of element data", whole[2], 8, 28));
+  PetscCall(PetscMalloc2(whole[2], &number, 3 * whole[2], &value));
+  SbScanEndOfLine(s);
+  s->binary = g->binary;
+  for (int64_t i = 0; i < whole[2]; i++) {
+    PetscCall(SbScanInt(s, 4, "number of an element", &number[i]));
+    for (int k = 0; k < 3; k++) {
+      PetscCall(SbScanReal(s, "element data", number[i], &x));
+      value[3 * i + k] = x;
+    }
+  }
+  s->binary = PETSC_FALSE;
+  PetscCall(SbImportKeep(g->im, (PetscInt)whole[2], number, 0, value));
+  PetscCall(PetscFree2(number, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {
   Gmsh g = {.im = im};
@@ -410,9 +460,13 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
     } else if (!strcmp(name, "$PartitionedEntities"))
       SB_SCAN_ERROR(
         s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
-    else if (!SbScanFind(s, closing))
-      SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again",
-                    name);
+    else {
+      if (!strcmp(name, "$ElementData") && im->field[0])
+        PetscCall(read_data(&g));
+      if (!SbScanFind(s, closing))
+        SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again",
+                      name);
+    }
     if (!SbScanWord(s, sizeof(end), end))
       SB_SCAN_ENDS(s, "%s", closing);
     if (strcmp(end, closing))

@@ -617,6 +617,18 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   PetscCall(layout ? read_own(f) : read_output(f));
   if (layout)
     PetscCall(read_curved(f, layout));
+  if (im->field[0]) {
+    PetscInt rows_of = -1;
+    char name[SB_NAME_MAX + 8];
+    double *value;
+
+    (void)snprintf(name, sizeof(name), "/mesh/%s", im->field);
+    if (is_there(f, name)) {
+      PetscCall(
+        read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &rows_of, &value));
+      PetscCall(SbImportKeep(im, rows_of, NULL, 1, value));
+    }
+  }
   if (!im->item[3].n && !f->nparts && !(im->surface && im->item[2].n))
     H5_ERROR(f, "holds no tetrahedra; mesh the volume (supple-mesh tet)");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -634,6 +634,20 @@ void SbImportParts(SbImport *im, SbImportPart part[SB_IMPORT_NPART])
   part[n++] = (SbImportPart){(void **)&groups->slot, (size_t)groups->nslot * sizeof(*groups->slot)};
 }
 
+PetscErrorCode SbImportKeep(SbImport *im, PetscInt n, const int64_t number[], int64_t first,
+                            const double value[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(im->field_number, im->field_value));
+  PetscCall(PetscMalloc2(n, &im->field_number, 3 * n, &im->field_value));
+  im->nfield = n;
+  for (PetscInt i = 0; i < n; i++)
+    im->field_number[i] = number ? number[i] : first + i;
+  for (PetscInt i = 0; i < 3 * n; i++)
+    im->field_value[i] = value[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportDestroy(SbImport *im)
 {
   SbImportPart part[SB_IMPORT_NPART];
@@ -643,6 +657,7 @@ PetscErrorCode SbImportDestroy(SbImport *im)
   SbImportParts(im, part);
   for (int i = 0; i < SB_IMPORT_NPART; i++)
     PetscCall(PetscFree(*part[i].array));
+  PetscCall(PetscFree2(im->field_number, im->field_value));
   PetscCall(PetscMemzero(im, sizeof(*im)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

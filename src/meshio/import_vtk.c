@@ -198,7 +198,13 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
     SB_SCAN_ERROR(v->scan, "array '%s' of %lld components; expected up to 1024", name,
                   (long long)ncomponent);
   PetscCall(SbScanRoom(v->scan, "tuples", ntuple, 1, 1));
-  if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && grid->narray < SB_VTK_ARRAYS) {
+  if (v->on_cells && ncomponent == 3 && SbImportWants(v->im, name)) {
+    double *value = NULL;
+
+    PetscCall(read_array(v, "data of cells", 3 * ntuple, type, &value));
+    PetscCall(SbImportKeep(v->im, (PetscInt)ntuple, NULL, 0, value));
+  } else if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell &&
+             grid->narray < SB_VTK_ARRAYS) {
     const int a = grid->narray++;
 
     PetscCall(PetscStrncpy(grid->array[a].name, name, sizeof(grid->array[a].name)));

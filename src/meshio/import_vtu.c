@@ -393,6 +393,13 @@ static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, doubl
       const int a = grid->narray;
 
       attribute(tag, "NumberOfComponents", sizeof(value), value);
+      attribute(tag, "Name", sizeof(found), found);
+      if (!strcmp(value, "3") && SbImportWants(v->im, found)) {
+        double *vector = NULL;
+
+        PetscCall(read_array(v, tag, 3 * grid->ncell, &vector));
+        PetscCall(SbImportKeep(v->im, (PetscInt)grid->ncell, NULL, 0, vector));
+      }
       if (value[0] && strcmp(value, "1") != 0)
         continue;
       attribute(tag, "type", sizeof(value), value);

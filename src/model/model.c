@@ -143,6 +143,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
       if (!strcmp(m->set[k % m->nset].name, effect->on.name[k / m->nset]))
         m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
+  PetscCall(SbFibresFind(m->mesh, m->material));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   PetscCall(SbSpaceWarnShapes(m->space));
   m->load = 1.;

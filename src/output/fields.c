@@ -180,6 +180,15 @@ static PetscErrorCode number(const SbField *f, SbRun run, const SbStep *step, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An axis of the law of a cell, at rest. */
+static PetscErrorCode axis(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  (void)step;
+  SbSpaceCellAxis(run->model->space, strcmp(f->name, "fibre") ? 1 : 0, values);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 #define CELL .cell = PETSC_TRUE
 #define STEP(member) .from = offsetof(SbStep, member)
 #define STATE(member) .from = offsetof(struct _p_SbOutput, member)
@@ -212,6 +221,9 @@ static const SbField table[] = {
    .help = "strain energy per rest volume"},
   {"space_error", "J/m^3", 1, CELL, .compute = space_error,
    .help = "energy of the estimated error of the mesh per rest volume; needs -ledger"},
+  {"fibre", "1", 3, CELL, .compute = axis,
+   .help = "direction of the fibres at rest, of laws that have them; else 0"},
+  {"sheet", "1", 3, CELL, .compute = axis, .help = "second axis of these laws, at rest"},
   {"body", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
    .help = "number of the body, always written"},
   {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,

@@ -454,10 +454,20 @@ static PetscErrorCode read_sets(SbModel model)
       body->inclusion[k].set = find_set(model, name);
     }
   }
-  PetscCheck(model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the scenario uses more than %d sets (%" PetscInt_FMT
-             " in -sets, the others named by effects, probes and inclusions); join some of them",
-             SB_SET_MAX, room);
+
+  /* surfaces of rules for fibres */
+  for (PetscInt k = 0; k < model->nmaterial; k++) {
+    const SbFibres fibres = model->material[k]->fibres;
+
+    for (int i = 0; fibres && i < SB_FIBRE_SURFACES && model->nset <= SB_SET_MAX; i++)
+      if (fibres->surface[i][0])
+        PetscCall(use_name(model, fibres->surface[i]));
+  }
+  PetscCheck(
+    model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "the scenario uses more than %d sets (%" PetscInt_FMT
+    " in -sets, the others named by effects, probes, inclusions and fibres); join some of them",
+    SB_SET_MAX, room);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

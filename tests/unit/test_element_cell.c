@@ -104,7 +104,7 @@ static void test_gradient(SbElement e)
 }
 
 /* Force = d(V psi)/du by central differences of step 1e-5 size: truncation about 1e-10, rounding
-   1e-11 of E size^2. */
+   1e-11 of E size^2; laws with fibres are exponential, with larger third derivatives. */
 static void test_force(SbElement e, SbMaterial m)
 {
   const PetscReal size = 0.01;
@@ -129,7 +129,8 @@ static void test_force(SbElement e, SbMaterial m)
       for (int l = 0; l < SB_BATCH; l++) {
         u[k][l] += h;
         SB_CHECK_NEAR(f[k][l], c.V[l] * (plus[l] - minus[l]) / (2 * h),
-                      1e-8 * SbMaterialYoungModulus(m) * size * size, "force against energy");
+                      (m->type->fibres ? 1e-7 : 1e-8) * SbMaterialYoungModulus(m) * size * size,
+                      "force against energy");
       }
     }
     for (int k = 0; k < 3; k++) {

@@ -263,8 +263,8 @@ static void check_tangent(SbMaterial m, const PetscReal F[9], const char *what)
     for (int i = 0; i < 9; i++)
       worst = larger(worst, fabs((P[i] - Q[i]) / (2 * t) - C[9 * i + k]));
   }
-  SB_CHECK(worst < 2e-8 * stress_scale(m), "%s, %s: tangent off by %g of %g Pa", m->type->name,
-           what, worst, stress_scale(m));
+  SB_CHECK(worst < (m->type->fibres ? 2e-7 : 2e-8) * stress_scale(m),
+           "%s, %s: tangent off by %g of %g Pa", m->type->name, what, worst, stress_scale(m));
 }
 
 static PetscErrorCode test_equal_stretches(void)
@@ -291,7 +291,8 @@ static PetscErrorCode test_equal_stretches(void)
       with_stretches(0.8, 1.5, 0.8 - d, F);
       check_tangent(m, F, what);
       with_stretches(1.1, 1.1 + d, 1.1 - d, F);
-      check_tangent(m, F, what);
+      if (!m->type->fibres || d > 1e-4) /* where fibres begin to bear the tangent jumps */
+        check_tangent(m, F, what);
 
       /* without rounding of turned axes: the exact tangent takes the stress from d = 0 to d, up to
          the second order */

@@ -1,5 +1,5 @@
-"""Runs with a law that has moduli of its own, as the program does them: static and dynamic, on every element, the same numbers on one and on three ranks;
-a run taken up from a checkpoint is the run that was not interrupted, bit for bit; the ledger estimates its errors; the options that were used are written, and run again.
+"""Runs with laws that have moduli of their own, two of them with fibres, as the program does them: static and dynamic, on every element, the same numbers on
+one and on three ranks; a run taken up from a checkpoint is the run that was not interrupted, bit for bit; the ledger estimates its errors; the options that were used are written, and run again.
 """
 import csv
 import shutil
@@ -8,9 +8,12 @@ import sys
 
 from output_common import MPI, OUT, SUPPLE
 
-BAR = ("-bodies a,b -body_a_mesh box:0.2,0.05,0.05:6,2,2 -body_a_material ogden -body_a_mu 0.63e5,0.0012e5,-0.01e5 -body_a_alpha 1.3,5,-2 -body_a_bulk 2e6 "
+BAR = ("-bodies a,b,c,d -body_a_mesh box:0.2,0.05,0.05:6,2,2 -body_a_material ogden -body_a_mu 0.63e5,0.0012e5,-0.01e5 -body_a_alpha 1.3,5,-2 -body_a_bulk 2e6 "
        "-body_b_mesh box:0.1,0.05,0.05:3,2,2 -body_b_translate 0,0.1,0 -body_b_material mooney_rivlin -body_b_c10 2e4 -body_b_c01 4e3 -body_b_poisson 0.45 "
-       "-body_b_volumetric quadratic -body_default_element {0} -effects hold,gravity,pull -effect_hold_type fixed -effect_hold_on xmin "
+       "-body_b_volumetric quadratic -body_c_mesh box:0.1,0.05,0.05:3,2,2 -body_c_translate 0,0.2,0 -body_c_material holzapfel_gasser_ogden "
+       "-body_c_mu 2e4 -body_c_k1 3e4 -body_c_k2 2 -body_c_kappa 0.1 -body_c_angles 30,-30 -body_c_fibre 1,10*z,x -body_c_sheet 0,1,x -body_c_poisson 0.45 "
+       "-body_d_mesh box:0.1,0.05,0.05:3,2,2 -body_d_translate 0,0.3,0 -body_d_material guccione -body_d_c 1e4 -body_d_bf 8 -body_d_bt 2 -body_d_bfs 4 "
+       "-body_d_fibre cos(9*x),sin(9*x),0 -body_d_bulk 1e6 -body_default_element {0} -effects hold,gravity,pull -effect_hold_type fixed -effect_hold_on xmin "
        "-effect_gravity_vector 0,0,-9.81 -effect_pull_type traction -effect_pull_on xmax -effect_pull_vector 0;0;{1} -output_fields none -quiet "
        "-output_history_bodies -solver direct ")
 RUNS = {"static": "-time static -static_steps 3 -snes_rtol 1e-11 ",
