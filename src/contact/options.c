@@ -62,6 +62,11 @@ static const SbOption rows[] = {
    "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the "
    "softer "
    "body"},
+  {"weights", SB_OPTION_CHOICE, 1, "", "each", "each|once",
+   "response barrier: what of the surfaces several pairs share, as the side of two triangles: "
+   "each: each pair counts; once: they count once, as in the convergent formulation: contact "
+   "pressure is more even, and a vertex that slides from triangle to triangle is not pushed "
+   "sideways"},
   {"search", SB_OPTION_CHOICE, 1, "", "auto", "auto|hash|tree",
    "response barrier: search for the pairs of features that may meet; both find the same. auto: "
    "tree "
@@ -275,6 +280,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_stiffness is of springs, which barrier has not: use "
              "-effect_%s_barrier_pressure, or another -effect_%s_response",
              e->name, e->name, e->name);
+  PetscCall(SbOptionGiven(scope, "weights", &given));
+  PetscCheck(!given || c->response == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_weights is of response barrier: leave it out, or take "
+             "-effect_%s_response barrier",
+             e->name, e->name);
   PetscCall(SbOptionGiven(scope, "multiplier_tolerance", &given));
   PetscCheck(
     !given || surfaces, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

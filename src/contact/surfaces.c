@@ -119,6 +119,7 @@ static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
+  b->surface->once = b->options.once;
   b->surface->rim =
     2. * b->contact.base.width; /* what touches, and what faces turn by as they open */
   PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0],
@@ -1091,7 +1092,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Surfaces *b = (Surfaces *)e->data;
-  int search, sticking, unsettled;
+  int search, sticking, unsettled, weights;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
@@ -1118,6 +1119,8 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
+  PetscCall(SbOptionChoice(scope, "weights", &weights));
+  b->options.once = (PetscBool)(weights == 1);
   PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
   b->fall_back.response = b->contact.response;
   b->fall_back.may = (PetscBool)(has_multipliers(b) && (unsettled == 2 || (by_auto && !unsettled)));

@@ -76,6 +76,7 @@ typedef struct {
   PetscReal stiffness;       /* factor on that of springs */
   PetscBool sticks;          /* friction has multipliers, so that pairs stick */
   PetscReal settled;         /* tolerance of multipliers, over the width; 0: by default */
+  PetscBool once;            /* of the barrier: what pairs share counts once */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
   SbContactSearch search;

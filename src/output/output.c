@@ -16,7 +16,8 @@ const SbOption SbOutputRows[] = {
    "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
-   "contact_gap, nodal_stress, nodal_von_mises, stress, von_mises, pressure, mean_pressure, J, "
+   "contact_pressure, contact_gap, nodal_stress, nodal_von_mises, stress, von_mises, pressure, "
+   "mean_pressure, J, "
    "energy_density, space_error, rank; "
    "sets: "
    "where the sets and groups are that the scenario names; none: no such file"},
