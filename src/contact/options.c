@@ -80,6 +80,9 @@ static const SbOption rows[] = {
   {"sticking", SB_OPTION_CHOICE, 1, "", "exact", "exact|smooth",
    "friction between bodies, and of the barrier: exact: pairs below Coulomb's limit come to rest; "
    "smooth: they creep, at a ten-thousandth of the speed of a step at most"},
+  {"slip_speed", SB_OPTION_REAL, 1, "m/s", "0", "[0, inf)",
+   "sticking smooth, time steps: the speed below which friction falls to zero, so that what sticks "
+   "creeps more slowly; 0: a ten-thousandth of the speed of a step"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "response barrier: largest number of lagged-friction iterations of a step, each with the normal "
    "forces "

@@ -777,6 +777,8 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   /* friction with the normal forces at the start */
   b->friction.slip =
     e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
+  if (b->options.slip_speed > 0. && e->dynamic)
+    b->friction.slip = b->options.slip_speed * dt;
   b->friction.nlag = b->friction.nstuck = 0;
   b->friction.lag = 0.;
   b->friction.least = PETSC_INFINITY;
@@ -1113,6 +1115,11 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope, PetscBool by_a
   PetscCall(SbOptionReal(scope, "multiplier_tolerance", &b->options.settled));
   PetscCall(SbOptionChoice(scope, "sticking", &sticking));
   b->options.sticks = (PetscBool)(b->contact.friction.mu > 0. && sticking == 0);
+  PetscCall(SbOptionReal(scope, "slip_speed", &b->options.slip_speed));
+  PetscCheck(b->options.slip_speed == 0. || sticking == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_slip_speed is of -effect_%s_sticking smooth: give that, too, or leave it "
+             "out; with exact nothing creeps",
+             e->name, e->name);
   b->contact.base.ops = &surface_ops;
   b->contact.base.exact = is_exact(b);
   b->contact.base.rigid = has_multipliers(b);
