@@ -29,9 +29,11 @@ PetscErrorCode SbContactSurfaceRoom(SbContactSurface m, PetscInt nvertex, PetscI
     {1, sizeof(*m->fixed), &m->fixed},
     {2, 3 * sizeof(*m->triangle), &m->triangle},
     {2, sizeof(*m->triangle_number), &m->triangle_number},
+    {2, 6 * sizeof(*m->share), &m->share},
     {3, 2 * sizeof(*m->edge), &m->edge},
     {3, sizeof(*m->edge_number), &m->edge_number},
     {3, sizeof(*m->edge_area), &m->edge_area},
+    {3, 2 * sizeof(*m->edge_share), &m->edge_share},
   };
 
   PetscFunctionBeginUser;

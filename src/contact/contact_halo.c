@@ -163,7 +163,8 @@ PetscErrorCode SbContactSurfaceNormals(SbContactSurface m, const PetscReal x[], 
   A message holds blocks of features. Integers: numbers of vertices, triangles, edges; of each
   vertex number, part, owner, number there, whether it is driven, number n of nodes, n nodes, n bits
   of prescribed components; of each triangle its number and those of its vertices; of each edge
-  likewise. Reals: of each vertex position at rest, area, n weights; of each edge its area.
+  likewise. Reals: of each vertex position at rest, area, n weights; of each triangle its six parts;
+  of each edge its area and its two.
 */
 typedef struct {
   PetscInt n, size, *integer;
@@ -172,6 +173,8 @@ typedef struct {
 } Message;
 #define VERTEX_INTEGERS 6
 #define VERTEX_REALS 4
+#define TRIANGLE_REALS 6
+#define EDGE_REALS 3
 
 static PetscErrorCode free_message(Message *message)
 {
@@ -194,8 +197,9 @@ static PetscErrorCode pack(SbContactSurface m, const PetscInt n[3], PetscInt *co
     nentry += m->start[list[0][k] + 1] - m->start[list[0][k]];
   PetscCall(SbReserve(to->n + 3 + VERTEX_INTEGERS * n[0] + 2 * nentry + 4 * n[1] + 3 * n[2],
                       sizeof(PetscInt), &to->size, &to->integer));
-  PetscCall(SbReserve(to->nreal + VERTEX_REALS * n[0] + nentry + n[2], sizeof(PetscReal),
-                      &to->real_size, &to->real));
+  PetscCall(
+    SbReserve(to->nreal + VERTEX_REALS * n[0] + nentry + TRIANGLE_REALS * n[1] + EDGE_REALS * n[2],
+              sizeof(PetscReal), &to->real_size, &to->real));
   integer = to->integer + to->n;
   real = to->real + to->nreal;
   for (int i = 0; i < 3; i++)
@@ -227,6 +231,8 @@ static PetscErrorCode pack(SbContactSurface m, const PetscInt n[3], PetscInt *co
     *integer++ = m->triangle_number[t];
     for (int i = 0; i < 3; i++)
       *integer++ = m->number[m->triangle[3 * t + i]];
+    for (int i = 0; i < TRIANGLE_REALS; i++)
+      *real++ = m->share[TRIANGLE_REALS * t + i];
   }
   for (PetscInt k = 0; k < n[2]; k++) {
     const PetscInt e = list[2][k];
@@ -235,6 +241,8 @@ static PetscErrorCode pack(SbContactSurface m, const PetscInt n[3], PetscInt *co
     *integer++ = m->number[m->edge[2 * e]];
     *integer++ = m->number[m->edge[2 * e + 1]];
     *real++ = m->edge_area[e];
+    for (int i = 0; i < 2; i++)
+      *real++ = m->edge_share[2 * e + i];
   }
   to->n = (PetscInt)(integer - to->integer);
   to->nreal = (PetscInt)(real - to->real);
@@ -303,7 +311,7 @@ static PetscErrorCode take_vertices(SbContactSurface m, const Message *from)
       r += VERTEX_REALS + nnode;
     }
     i += 4 * count[1] + 3 * count[2];
-    r += count[2];
+    r += TRIANGLE_REALS * count[1] + EDGE_REALS * count[2];
   }
   PetscCall(SbSortByKeys(n, sizeof(*place), 1, place));
   nhalo = m->nbody_vertex - m->nkept_vertex;
@@ -348,6 +356,7 @@ static PetscErrorCode take_vertices(SbContactSurface m, const Message *from)
    of their numbers. */
 static PetscErrorCode take_features(SbContactSurface m, const Message *from)
 {
+  static const PetscInt reals[] = {TRIANGLE_REALS, EDGE_REALS};
   const PetscInt *integer = from->integer;
   PetscInt n[2] = {0, 0};
   PetscInt size[2] = {0, 0};
@@ -363,7 +372,7 @@ static PetscErrorCode take_features(SbContactSurface m, const Message *from)
       i += VERTEX_INTEGERS + 2 * integer[i + VERTEX_INTEGERS - 1];
     }
     for (int kind = 0; kind < 2; kind++) {
-      for (PetscInt k = 0; k < count[1 + kind]; k++, i += 4 - kind, r += kind) {
+      for (PetscInt k = 0; k < count[1 + kind]; k++, i += 4 - kind, r += reals[kind]) {
         PetscInt at;
 
         PetscCall(PetscFindInt(integer[i], kind ? m->nkept_edge : m->nkept_triangle,
@@ -382,6 +391,7 @@ static PetscErrorCode take_features(SbContactSurface m, const Message *from)
     PetscCall(SbSortByKeys(n[kind], sizeof(Place), 1, place[kind]));
     for (PetscInt k = 0; k < n[kind]; k++) {
       const PetscInt *at = integer + place[kind][k].integer;
+      const PetscReal *real = from->real + place[kind][k].real;
       PetscInt *to = kind ? m->edge + 2 * m->nedge : m->triangle + 3 * m->ntriangle;
 
       if (k && place[kind][k].number == place[kind][k - 1].number)
@@ -389,10 +399,13 @@ static PetscErrorCode take_features(SbContactSurface m, const Message *from)
       for (int i = 0; i < 3 - kind; i++)
         PetscCall(find_vertex(m, at[1 + i], &to[i]));
       if (kind) {
-        m->edge_area[m->nedge] = from->real[place[kind][k].real];
+        m->edge_area[m->nedge] = real[0];
+        PetscCall(PetscArraycpy(m->edge_share + 2 * m->nedge, real + 1, 2));
         m->edge_number[m->nedge++] = at[0];
-      } else
+      } else {
+        PetscCall(PetscArraycpy(m->share + TRIANGLE_REALS * m->ntriangle, real, TRIANGLE_REALS));
         m->triangle_number[m->ntriangle++] = at[0];
+      }
     }
     PetscCall(PetscFree(place[kind]));
   }
@@ -706,6 +719,8 @@ static PetscErrorCode add_obstacle(SbContactSurface m, SbContactSurface w)
       m->triangle[3 * m->nbody_triangle + k] - m->nbody_vertex + w->nbody_vertex;
   for (PetscInt k = 0; k < ntriangle; k++)
     w->triangle_number[w->ntriangle + k] = m->triangle_number[m->nbody_triangle + k];
+  PetscCall(
+    PetscArraycpy(w->share + 6 * w->ntriangle, m->share + 6 * m->nbody_triangle, 6 * ntriangle));
   w->ntriangle += ntriangle;
   for (PetscInt e = 0; e < m->nedge; e++) {
     if (m->edge[2 * e] < m->nbody_vertex)
@@ -713,6 +728,7 @@ static PetscErrorCode add_obstacle(SbContactSurface m, SbContactSurface w)
     for (int k = 0; k < 2; k++)
       w->edge[2 * w->nedge + k] = m->edge[2 * e + k] - m->nbody_vertex + w->nbody_vertex;
     w->edge_area[w->nedge] = m->edge_area[e];
+    PetscCall(PetscArraycpy(w->edge_share + 2 * w->nedge, m->edge_share + 2 * e, 2));
     w->edge_number[w->nedge++] = m->edge_number[e];
   }
   PetscFunctionReturn(PETSC_SUCCESS);

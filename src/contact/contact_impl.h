@@ -80,6 +80,7 @@ typedef struct {
   PetscReal e;    /* coefficient of restitution; 0: none */
   PetscReal left; /* factor on it in this step */
   PetscReal dt;   /* length of the step, s */
+  PetscBool said; /* that a body is too soft for it */
 } SbRestitution;
 
 /* Gap at the end of the step to which a rebounding point is constrained, m; 0: no rebound. */

@@ -299,6 +299,58 @@ static PetscErrorCode make_edges(SbContactSurface m, PetscBool lone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The parts of lower features in the pairs that share them (pair_energy.c): of a side of n
+   triangles n - 1, so that one remains, and of a corner what makes up for the sides there; each
+   triangle has its part of them. Of an end of n edges n - 1. */
+static PetscErrorCode find_shares(SbContactSurface m)
+{
+  PetscInt *ntriangle, *nedge; /* [nvertex] around */
+  PetscInt *excess;            /* [nvertex] triangles of the edges around beyond one each */
+  PetscInt(*side)[4];          /* vertices, triangle, which of its sides */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc3(m->nvertex, &ntriangle, m->nvertex, &nedge, m->nvertex, &excess));
+  PetscCall(PetscMalloc1(3 * m->ntriangle, &side));
+  for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
+    const PetscInt a = m->triangle[i];
+    const PetscInt b = m->triangle[3 * (i / 3) + (i + 1) % 3];
+
+    side[i][0] = PetscMin(a, b);
+    side[i][1] = PetscMax(a, b);
+    side[i][2] = i / 3;
+    side[i][3] = i % 3;
+    ntriangle[a]++;
+  }
+  PetscCall(SbSortByKeys(3 * m->ntriangle, sizeof(*side), 3, side));
+  for (PetscInt i = 0; i < 3 * m->ntriangle;) {
+    PetscInt last = i + 1;
+
+    while (last < 3 * m->ntriangle && side[last][0] == side[i][0] && side[last][1] == side[i][1])
+      last++;
+    for (int k = 0; k < 2; k++) {
+      nedge[side[i][k]]++;
+      excess[side[i][k]] += last - i - 1;
+    }
+    for (PetscInt k = i; k < last; k++)
+      m->share[6 * side[k][2] + side[k][3]] = (PetscReal)(last - i - 1) / (PetscReal)(last - i);
+    i = last;
+  }
+  for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
+    const PetscInt v = m->triangle[i];
+
+    m->share[6 * (i / 3) + 3 + i % 3] =
+      (PetscReal)(1 + excess[v] - ntriangle[v]) / (PetscReal)ntriangle[v];
+  }
+  for (PetscInt i = 0; i < 2 * m->nedge; i++) {
+    const PetscInt n = PetscMax(1, nedge[m->edge[i]]);
+
+    m->edge_share[i] = (PetscReal)(n - 1) / (PetscReal)n;
+  }
+  PetscCall(PetscFree(side));
+  PetscCall(PetscFree3(ntriangle, nedge, excess));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What this rank keeps of the whole surface, which is released. The numbers are those of the whole
    surface, the order as well. */
 static PetscErrorCode keep_own(SbContactSurface *mesh)
@@ -318,7 +370,7 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
     m->room[k] = 0;
   m->start = m->part = m->number = m->gnode = m->node = m->column = m->triangle =
     m->triangle_number = m->edge = m->edge_number = NULL;
-  m->X = m->area = m->weight = m->edge_area = NULL;
+  m->X = m->area = m->weight = m->edge_area = m->share = m->edge_share = NULL;
   m->mine = m->own = m->driven = m->fixed = NULL;
   m->remote = NULL;
 
@@ -343,6 +395,7 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
       at[v[k]] = 0;
       m->triangle[3 * m->ntriangle + k] = v[k];
     }
+    PetscCall(PetscArraycpy(m->share + 6 * m->ntriangle, w->share + 6 * t, 6));
     m->triangle_number[m->ntriangle++] = t;
     m->nbody_triangle += t < w->nbody_triangle;
   }
@@ -368,6 +421,7 @@ static PetscErrorCode keep_own(SbContactSurface *mesh)
     m->edge[2 * m->nedge] = v[0];
     m->edge[2 * m->nedge + 1] = v[1];
     m->edge_number[m->nedge] = e;
+    PetscCall(PetscArraycpy(m->edge_share + 2 * m->nedge, w->edge_share + 2 * e, 2));
     m->edge_area[m->nedge++] = w->edge_area[e];
   }
 
@@ -463,6 +517,7 @@ PetscErrorCode SbContactSurfaceCreate(SbSpace s, PetscInt n, const SbFacet facet
     m->driven[v] = 1;
   }
   PetscCall(make_edges(m, (PetscBool)(m->radius > 0. && o.nvert == 2)));
+  PetscCall(find_shares(m));
 
   /* shortest and mean edge of the bodies, size of the smallest one */
   m->shortest = PETSC_MAX_REAL;
@@ -558,6 +613,8 @@ PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *mesh)
   PetscCall(PetscFree(m->edge));
   PetscCall(PetscFree(m->edge_number));
   PetscCall(PetscFree(m->edge_area));
+  PetscCall(PetscFree(m->share));
+  PetscCall(PetscFree(m->edge_share));
   PetscCall(PetscFree(m->group));
   PetscCall(PetscFree(m->ngroup));
   PetscCall(PetscFree(m->halo_number));

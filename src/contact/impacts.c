@@ -10,6 +10,11 @@
 
   which is stiff relative to the lighter body, as whole bodies collide. Pairs already within the
   width get none, so that a body at rest stays at rest.
+
+  The law is for bodies that are stiff within a step. A body of the length L, the cube root of its
+  volume, with the wave speed c = sqrt(E / density) rebounds with e - 2.8 e (1 + e) (L / c h)^2 of
+  the relative speed, as measured with two balls; the rest is in vibrations, which implicit Euler
+  dissipates (docs/reports/contact.md).
 */
 #include "surfaces.h"
 
@@ -17,6 +22,9 @@
 #define EARLY 0.05 /* extension of the path over its length: near misses count as impacts */
 #define REST 0.999 /* of the width: a smaller gap is contact */
 #define KEEP 0.01  /* tolerance of the impact's position, over the gap above the width */
+
+#define CROSSINGS \
+  10. /* of a body by waves in a step: with less than this an impact with e = 1 loses more than 6 % */
 
 /* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
 static PetscReal meets(const Surfaces *b, const SbContactPair *pair, const PetscReal x0[],
@@ -76,6 +84,49 @@ static PetscBool find_spring(const Surfaces *b, const SbContactPair *pair, const
   return (PetscBool)(spring->approach > 0.);
 }
 
+/* Says which body of an impact is not stiff within a step of length dt. Collective. */
+static PetscErrorCode warn_of_soft(Surfaces *b, PetscReal dt)
+{
+  const SbSpace s = b->surface->space;
+  const SbEffect e = b->contact.base.effect;
+  struct {
+    double crossings;
+    int body;
+  } least = {PETSC_INFINITY, 0};
+
+  PetscFunctionBeginUser;
+  if (b->contact.bounce.said)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = b->springs.n - b->springs.nbounce; i < b->springs.n; i++) {
+    for (PetscInt k = 0; k < b->springs.spring[i].at.n; k++) {
+      const PetscInt body = b->surface->part[b->springs.spring[i].at.v[k]];
+      PetscReal crossings;
+
+      if (body >= s->mesh->nbody)
+        continue;
+      crossings =
+        PetscSqrtReal(SbMaterialYoungModulus(s->material[body]) / s->material[body]->density) * dt /
+        PetscCbrtReal(s->mesh->body[body].volume);
+      if (crossings >= least.crossings)
+        continue;
+      least.crossings = crossings;
+      least.body = (int)body;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
+  if (least.crossings >= CROSSINGS)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  b->contact.bounce.said = PETSC_TRUE;
+  PetscCall(SbWarning(
+    s->comm,
+    "effect %s: restitution is for bodies that are stiff within a step, which elastic waves cross "
+    "%g times or more; they cross body %s %.2g times in %g s: it rebounds more slowly, the rest is "
+    "vibrations that -time euler_implicit dissipates; a longer -ts_dt, or without restitution a "
+    "shorter one that resolves the impact; said once",
+    e->name, CROSSINGS, s->mesh->body[least.body].name, least.crossings, (double)dt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, PetscReal dt,
                                              const PetscReal u0[], const PetscReal v0[])
 {
@@ -125,6 +176,7 @@ PetscErrorCode SbContactFindImpacts_Surfaces(SbContact contact, SbSpace s, Petsc
     b->springs.nbounce++;
   }
   PetscCall(PetscFree(x));
+  PetscCall(warn_of_soft(b, dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

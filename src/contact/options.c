@@ -62,6 +62,11 @@ static const SbOption rows[] = {
    "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the "
    "softer "
    "body"},
+  {"weights", SB_OPTION_CHOICE, 1, "", "each", "each|once",
+   "response barrier: what of the surfaces several pairs share, as the side of two triangles: "
+   "each: each pair counts; once: they count once, as in the convergent formulation: contact "
+   "pressure is more even, and a vertex that slides from triangle to triangle is not pushed "
+   "sideways"},
   {"search", SB_OPTION_CHOICE, 1, "", "auto", "auto|hash|tree",
    "response barrier: search for the pairs of features that may meet; both find the same. auto: "
    "tree "
@@ -75,6 +80,9 @@ static const SbOption rows[] = {
   {"sticking", SB_OPTION_CHOICE, 1, "", "exact", "exact|smooth",
    "friction between bodies, and of the barrier: exact: pairs below Coulomb's limit come to rest; "
    "smooth: they creep, at a ten-thousandth of the speed of a step at most"},
+  {"slip_speed", SB_OPTION_REAL, 1, "m/s", "0", "[0, inf)",
+   "sticking smooth, time steps: the speed below which friction falls to zero, so that what sticks "
+   "creeps more slowly; 0: a ten-thousandth of the speed of a step"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "response barrier: largest number of lagged-friction iterations of a step, each with the normal "
    "forces "
@@ -267,6 +275,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_stiffness is of springs, which barrier has not: use "
              "-effect_%s_barrier_pressure, or another -effect_%s_response",
              e->name, e->name, e->name);
+  PetscCall(SbOptionGiven(scope, "weights", &given));
+  PetscCheck(!given || c->response == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_weights is of response barrier: leave it out, or take "
+             "-effect_%s_response barrier",
+             e->name, e->name);
   PetscCall(SbOptionGiven(scope, "multiplier_tolerance", &given));
   PetscCheck(
     !given || surfaces, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

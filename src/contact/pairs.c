@@ -206,6 +206,12 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
   else
     pair.area =
       i < m->nbody_vertex ? m->area[i] : (m->area[b[0]] + m->area[b[1]] + m->area[b[2]]) / 3.;
+  if (m->once && edges)
+    for (int k = 0; k < 4; k++)
+      pair.share[k] = m->edge_share[2 * (k < 2 ? low : high) + k % 2];
+  else if (m->once)
+    for (int k = 0; k < 6; k++)
+      pair.share[k] = m->share[6 * j + k];
   if (overlaps(p, &pair) || stays_apart(p, &pair) || (pair.rims && joined(p, &pair)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));

@@ -42,10 +42,14 @@ struct _p_SbContactSurface {
   PetscInt *edge_number;     /* [nedge] */
   PetscReal *X;              /* [nvertex][3] at rest, m; obstacle: its rest frame */
   PetscReal *area,
-    *edge_area;          /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
-  PetscReal radius;      /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side;   /* half-space or bowl, whose vertices are described there */
-  PetscInt Nbody_vertex; /* of all ranks */
+    *edge_area;     /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscBool once;   /* what pairs share counts once (pair_energy.c); set by the caller, false at
+                            first */
+  PetscReal *share; /* [ntriangle][6] parts of its sides 01, 12, 20 and corners, as below */
+  PetscReal *edge_share;         /* [nedge][2] parts of its ends */
+  PetscReal radius;              /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side;           /* half-space or bowl, whose vertices are described there */
+  PetscInt Nbody_vertex;         /* of all ranks */
   PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
   PetscReal size;                /* diagonal of the smallest body, m */
   PetscReal farthest;            /* largest coordinate at rest, m */
@@ -137,9 +141,11 @@ typedef struct {
   PetscBool side;
   SbPairKind
     kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE; with a side SB_PAIR_VERTEX_VERTEX */
-  PetscInt v[4];  /* vertices of the mesh */
-  PetscReal area; /* m^2 */
-  PetscBool rims; /* both sides have prescribed vertices, and one has others */
+  PetscInt v[4];      /* vertices of the mesh */
+  PetscReal area;     /* m^2 */
+  PetscReal share[6]; /* parts of lower features that other pairs count too: of the sides and
+                         corners of the triangle, or of the four ends of edges; 0: each pair counts */
+  PetscBool rims;     /* both sides have prescribed vertices, and one has others */
 } SbContactPair;
 
 /* Number of vertices on the first side. */

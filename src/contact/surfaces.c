@@ -119,6 +119,7 @@ static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
     "most half of that",
     e->name, (double)b->options.width, (double)b->surface->shortest);
   b->surface->self = b->options.self;
+  b->surface->once = b->options.once;
   b->surface->rim =
     2. * b->contact.base.width; /* what touches, and what faces turn by as they open */
   PetscCall(SbContactPairsCreate(b->surface, (has_multipliers(b) ? 2. : 1.) * b->widths.w[0],
@@ -776,6 +777,8 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
   /* friction with the normal forces at the start */
   b->friction.slip =
     e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
+  if (b->options.slip_speed > 0. && e->dynamic)
+    b->friction.slip = b->options.slip_speed * dt;
   b->friction.nlag = b->friction.nstuck = 0;
   b->friction.lag = 0.;
   b->friction.least = PETSC_INFINITY;
@@ -1096,7 +1099,7 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
     "contacts",      "penetration", "penetration_mean", "normal_force", "friction_force", "work",
     "friction_loss", "gap",         "energy",           "friction_lag", "unguarded"};
   Surfaces *b = (Surfaces *)e->data;
-  int search, sticking, unsettled;
+  int search, sticking, unsettled, weights;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->options.width));
@@ -1117,12 +1120,19 @@ PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "multiplier_tolerance", &b->options.settled));
   PetscCall(SbOptionChoice(scope, "sticking", &sticking));
   b->options.sticks = (PetscBool)(b->contact.friction.mu > 0. && sticking == 0);
+  PetscCall(SbOptionReal(scope, "slip_speed", &b->options.slip_speed));
+  PetscCheck(b->options.slip_speed == 0. || sticking == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_slip_speed is of -effect_%s_sticking smooth: give that, too, or leave it "
+             "out; with exact nothing creeps",
+             e->name, e->name);
   b->contact.base.ops = &surface_ops;
   b->contact.base.exact = is_exact(b);
   b->contact.base.rigid = has_multipliers(b);
   b->contact.base.saddle = (PetscBool)(b->contact.response == MULTIPLIER);
   b->contact.base.springs = (PetscBool)(b->contact.friction.mu > 0.);
   e->linear = PETSC_FALSE;
+  PetscCall(SbOptionChoice(scope, "weights", &weights));
+  b->options.once = (PetscBool)(weights == 1);
   PetscCall(SbOptionChoice(scope, "unsettled", &unsettled));
   b->fall_back.response = b->contact.response;
   b->fall_back.may = (PetscBool)(has_multipliers(b) && unsettled == 2);

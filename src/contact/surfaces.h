@@ -75,7 +75,9 @@ typedef struct {
   PetscReal width, pressure; /* m, Pa; 0: by body */
   PetscReal stiffness;       /* factor on that of springs */
   PetscBool sticks;          /* friction has multipliers, so that pairs stick */
+  PetscReal slip_speed;      /* of smooth friction in time steps, m/s; 0: by the step's speed */
   PetscReal settled;         /* tolerance of multipliers, over the width; 0: by default */
+  PetscBool once;            /* of the barrier: what pairs share counts once */
   PetscBool self, pairs;     /* between bodies: self-contact; columns for each pair of bodies */
   PetscBool verify;
   SbContactSearch search;

@@ -7,6 +7,10 @@
   von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
   reaction:          residual without constraints at prescribed unknowns, the force of the support
   on the body contact force:     of obstacles and other bodies on the body
+  contact pressure:  F . n / |A . n|, F the force of contact on a vertex, A the area vector of a
+  third
+                     of the facets around, where they are now, n the direction of the gap, so that
+                     only the side of a ridge that touches counts; without a gap that of A
   contact gap:       along the normal: a vertex minus gap times normal is the point of contact
   mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
   pressure:          the law's -lambda theta, theta: its measure of the change of volume
@@ -66,6 +70,95 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
     PetscCall(SbPointsValues(run, out, x, values));
   }
   PetscCall(VecDestroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The area vectors of nodes, m^2: of a third of each facet around a corner, where it is now, on the
+   nodes of the corner; with P2 a twelfth, and a quarter in the middle of its sides. Collective. */
+static PetscErrorCode find_areas(SbSpace s, Vec U, Vec A)
+{
+  const PetscReal *u;
+  PetscReal *area;
+  SbFacet *facet;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetSetFacets(s, -1, &n, &facet));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(VecSet(A, 0.));
+  PetscCall(VecGetArray(A, &area));
+  for (PetscInt i = 0; i < n; i++) {
+    const SbFacet *f = &facet[i];
+    const SbElement element = SbSpaceCellElement(s, f->cell);
+    const PetscBool quadratic = (PetscBool)(s->edge_node && s->edge_node[6 * f->cell] >= 0);
+    PetscReal x[3][3], side[2][3], normal[3];
+
+    for (int k = 0; k < 3; k++) {
+      const PetscReal *w = element->ops.vertex[f->corner[k]];
+
+      for (int c = 0; c < 3; c++) {
+        x[k][c] = s->mesh->x[3 * f->vertex[k] + c];
+        for (int a = 0; a < 4; a++)
+          x[k][c] += w[a] * u[3 * s->cell_node[4 * f->cell + a] + c];
+      }
+    }
+    SbSubtract(x[1], x[0], side[0]);
+    SbSubtract(x[2], x[0], side[1]);
+    SbCross(side[0], side[1], normal);
+    for (int a = 0; a < 10; a++) {
+      const PetscInt node = a < 4 || quadratic ? SbSpaceCellNode(s, f->cell, a) : -1;
+      PetscReal part = 0.;
+
+      if (node < 0 || node >= s->nnode_owned)
+        continue;
+      if (a < 4)
+        for (int k = 0; k < 3; k++)
+          part += element->ops.vertex[f->corner[k]][a] / (quadratic ? 12. : 3.);
+      else if (SbTetEdge[a - 4][0] != f->face && SbTetEdge[a - 4][1] != f->face)
+        part = 0.25;
+      for (int c = 0; c < 3; c++)
+        area[3 * node + c] += 0.5 * part * normal[c];
+    }
+  }
+  PetscCall(VecRestoreArray(A, &area));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCall(PetscFree(facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode contact_pressure(const SbField *f, SbRun run, const SbStep *step,
+                                       PetscReal *values)
+{
+  const SbOutput out = (SbOutput)run->monitors.output;
+  const SbContactSet *contacts = &run->model->contacts;
+  const PetscInt n = out->point.nowned;
+  PetscReal *force, *area, *gap;
+  Vec x;
+
+  PetscFunctionBeginUser;
+  (void)f;
+  PetscCall(PetscMalloc3(3 * n, &force, 3 * n, &area, 3 * n, &gap));
+  PetscCall(VecDuplicate(step->U, &x));
+  PetscCall(SbContactSetForce(contacts, step->t, step->U, x));
+  PetscCall(SbPointsForces(run, out, PETSC_FALSE, x, force));
+  PetscCall(SbContactSetGap(contacts, step->t, step->U, x));
+  PetscCall(SbPointsValues(run, out, x, gap));
+  PetscCall(find_areas(run->model->space, step->U, x));
+  PetscCall(SbPointsForces(run, out, PETSC_FALSE, x, area));
+  PetscCall(VecDestroy(&x));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *F = force + 3 * i;
+    const PetscReal *A = area + 3 * i;
+    PetscReal N[3] = {gap[3 * i], gap[3 * i + 1], gap[3 * i + 2]};
+    PetscReal face;
+
+    for (int k = 0; k < 3 && SbDot3(gap + 3 * i, gap + 3 * i) == 0.; k++)
+      N[k] = -A[k];
+    (void)SbNormalise(N);
+    face = PetscAbsReal(SbDot3(A, N));
+    values[i] = face > 0. ? SbDot3(F, N) / face : 0.;
+  }
+  PetscCall(PetscFree3(force, area, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,6 +295,8 @@ static const SbField table[] = {
    .help = "acceleration, state of the integrator"},
   {"reaction", "N", 3, .compute = reaction, .help = "force of a support on the body"},
   {"contact_force", "N", 3, .compute = contact, .help = "force of contact on the body"},
+  {"contact_pressure", "Pa", 1, .compute = contact_pressure,
+   .help = "normal force of contact per area of the surface around a vertex"},
   {"contact_gap", "m", 3, .compute = contact,
    .help = "from the nearest point of what it may touch, along the normal there; 0: nothing near"},
   {"nodal_stress", "Pa", 6, .compute = nodal, .of_stress = stress,
@@ -307,7 +402,8 @@ PetscErrorCode SbFieldAddNodal(const SbField *f, SbRun run, const SbStep *step, 
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
-  const PetscBool forces = (PetscBool)(f->compute == reaction || !strcmp(f->name, "contact_force"));
+  const PetscBool forces = (PetscBool)(f->compute == reaction || f->compute == contact_pressure ||
+                                       !strcmp(f->name, "contact_force"));
 
   PetscFunctionBeginUser;
   PetscCheck(f->compute != space_error || run->monitors.cell_error, PETSC_COMM_WORLD,

@@ -1,6 +1,6 @@
 // @ranks 1
 /* The barrier of a pair: its derivatives by differences, with the radius of an obstacle, for
-   parallel edges, a half-space and a bowl. */
+   parallel edges, a half-space and a bowl; without what other pairs count too. */
 #include "../../src/contact/pairs.h"
 #include "pair_reference.h"
 
@@ -76,6 +76,76 @@ static void check_crossing(void)
   }
 }
 
+/* What pairs share counts once: over a fan of triangles, and across a row of edges, the energy of a
+   point or an edge at a height does not depend on where it is, though up to six features are as
+   near; without, it does. */
+static void check_once(void)
+{
+  PetscReal X[24], x[24];
+  PetscReal b[3];
+  struct _p_SbContactSurface mesh = {.nbody_vertex = 8, .nvertex = 8, .X = X};
+
+  for (int gap = 1; gap < 10; gap++) {
+    const PetscReal height = 0.05 * gap * width;
+
+    SbBarrier(height, width, pressure, 0.7, b);
+    for (int i = 0; i < 20; i++) {
+      PetscReal sum[2] = {0., 0.};
+
+      /* vertices: the point, the middle of the fan, six around */
+      for (int k = 0; k < 24; k++)
+        x[k] = 0.;
+      x[0] = 0.02 * i * (gap % 3);
+      x[1] = -0.03 * i;
+      x[2] = height;
+      for (int k = 0; k < 6; k++) {
+        x[6 + 3 * k] = 3. * PetscCosReal(PETSC_PI / 3. * k);
+        x[7 + 3 * k] = 3. * PetscSinReal(PETSC_PI / 3. * k);
+      }
+      for (int once = 0; once < 2; once++) {
+        for (int k = 0; k < 6; k++) {
+          SbContactPair pair = {
+            .kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2 + k, 2 + (k + 1) % 6}, .area = 0.7};
+          PetscReal gradient[12];
+
+          if (once) {
+            pair.share[0] = pair.share[2] = 0.5;
+            pair.share[3] = 1. / 6.;
+          }
+          sum[once] += energy_at(&mesh, &pair, x, gradient);
+        }
+      }
+      SB_CHECK_NEAR(sum[1], b[0], 1e-12 * b[0], "a point over a fan");
+      SB_CHECK(i || sum[0] > 5.99 * b[0], "of six triangles %g instead of %g", sum[0], b[0]);
+    }
+    for (int i = -10; i <= 10; i++) {
+      PetscReal sum = 0.;
+
+      /* vertices: the edge, and a row of three */
+      for (int k = 0; k < 24; k++)
+        X[k] = x[k] = 0.;
+      x[0] = -2.;
+      x[3] = 2.;
+      x[2] = x[5] = height;
+      x[1] = x[4] = 0.05 * i;
+      x[7] = -2.;
+      x[13] = 2.;
+      for (int k = 0; k < 15; k++)
+        X[k] = x[k];
+      for (int k = 0; k < 2; k++) {
+        const SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE,
+                                    .v = {0, 1, 2 + k, 3 + k},
+                                    .area = 0.7,
+                                    .share = {0., 0., k ? 0.5 : 0., k ? 0. : 0.5}};
+        PetscReal gradient[12];
+
+        sum += energy_at(&mesh, &pair, x, gradient);
+      }
+      SB_CHECK_NEAR(sum, b[0], 1e-12 * b[0], "an edge across a row of edges");
+    }
+  }
+}
+
 /* Gradient, Hessian and projected Hessian against central differences, for the motion of the first
    nv vertices, which belong to bodies. */
 static void check_pair(SbContactSurface m, const SbContactPair *pair, PetscReal x[12], int nv,
@@ -133,10 +203,11 @@ int main(int argc, char **argv)
   PetscReal x[12], X[12], u[3], n[3];
   struct _p_SbContactSurface mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2, 3}, .area = 0.7};
-  PetscInt tried[7] = {0};
+  PetscInt tried[9] = {0};
 
   check_function();
   check_crossing();
+  check_once();
   for (int i = 0; i < NRANDOM; i++) {
     for (int k = 0; k < 12; k++)
       X[k] = x[k] = pair_random();
@@ -148,6 +219,16 @@ int main(int argc, char **argv)
     check_pair(&mesh, &pair, x, 4, &tried[0]);
     pair.kind = SB_PAIR_EDGE_EDGE;
     check_pair(&mesh, &pair, x, 4, &tried[1]);
+
+    /* what other pairs count too is taken off */
+    for (int k = 0; k < 6; k++)
+      pair.share[k] = k < 3 ? 0.5 : 0.2;
+    pair.kind = SB_PAIR_VERTEX_TRIANGLE;
+    check_pair(&mesh, &pair, x, 4, &tried[7]);
+    pair.kind = SB_PAIR_EDGE_EDGE;
+    check_pair(&mesh, &pair, x, 4, &tried[8]);
+    for (int k = 0; k < 6; k++)
+      pair.share[k] = 0.;
 
     /* nearly parallel edges at a small distance */
     for (int k = 0; k < 3; k++) {
@@ -166,6 +247,11 @@ int main(int argc, char **argv)
       x[6 + k] -= 0.01 * pair_random();
     }
     check_pair(&mesh, &pair, x, 4, &tried[5]);
+    pair.share[0] = pair.share[3] = 0.8;
+    pair.share[1] = 0.5;
+    check_pair(&mesh, &pair, x, 4, &tried[8]);
+    for (int k = 0; k < 6; k++)
+      pair.share[k] = 0.;
 
     /* the same with one edge of a capsule */
     mesh.nbody_vertex = 2;
@@ -185,7 +271,7 @@ int main(int argc, char **argv)
     mesh.radius = 1.;
     check_pair(&mesh, &pair, x, 1, &tried[4]);
   }
-  for (int k = 0; k < 7; k++)
+  for (int k = 0; k < 9; k++)
     SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
   SB_TEST_END();
 }

@@ -109,9 +109,15 @@ static void check_held(SbContactSurface m, SbContactSurface w, const PetscReal x
 
     SB_CHECK(m->number[m->edge[2 * e]] == w->edge[2 * k] &&
                m->number[m->edge[2 * e + 1]] == w->edge[2 * k + 1] &&
-               m->edge_area[e] == w->edge_area[k],
+               m->edge_area[e] == w->edge_area[k] && m->edge_share[2 * e] == w->edge_share[2 * k] &&
+               m->edge_share[2 * e + 1] == w->edge_share[2 * k + 1],
              "edge %d is not that of its owner", (int)k);
   }
+  for (PetscInt t = 0; t < m->ntriangle; t++)
+    for (int i = 0; i < 6; i++)
+      SB_CHECK(m->share[6 * t + i] == w->share[6 * m->triangle_number[t] + i] &&
+                 m->share[6 * t + i] > 0.,
+               "triangle %d has another part of its sides", (int)m->triangle_number[t]);
 }
 
 /* States of a row of boxes, and what a rank holds in the first of them. */

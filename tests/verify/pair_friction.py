@@ -1,9 +1,10 @@
 """Friction of all responses between bodies: what sticks does not creep, what slides has Coulomb's acceleration.
 
 A block on a slope of 30 degrees, tan 0.577, in time and static: it rests with a coefficient of 0.7 and slides with 0.5. Smoothed
-friction creeps by 1e-4 m/s there. Under a millionth of the weight as well. At rest a step takes one Newton iteration. The same on 1, 2 and 3 ranks to 1e-7 of its path, and after restarts while it sticks and slides.
+friction creeps by 1e-4 m/s there. Under a millionth of the weight as well. At rest a step takes one Newton iteration, and nothing moves by 1e-9 m in 100 s. The same on 1, 2 and 3 ranks to 1e-7 of its path, and after restarts while it sticks and slides.
 """
 import csv
+import math
 import subprocess
 import sys
 
@@ -15,17 +16,28 @@ BLOCKS = ("-bodies a,b -body_a_mesh box:0.4,0.2,0.05:6,3,1 -body_b_mesh box:0.1,
           + "".join(f"-body_{k}_material stable_neohookean -body_{k}_young 1e6 -body_{k}_poisson 0.3 -body_{k}_density 1000 " for k in "ab")
           + "-effects g,hold,meet -effect_g_type gravity -effect_g_vector 4.905,0,-8.4957 -effect_hold_type fixed -effect_hold_on a.zmin "
           "-effect_meet_type contact -effect_meet_verify yes -output_fields none -probes p -probe_p_on b -quiet -reproducible ")
+PLANE = ("-bodies b -body_b_mesh box:0.1,0.1,0.05:3,3,2 -body_b_translate 0.05,0.05,0.00015 -body_b_material stable_neohookean -body_b_young 1e6 "
+         "-body_b_poisson 0.3 -body_b_density 1000 -effects g,meet -effect_g_type gravity -effect_meet_type contact "
+         "-effect_meet_obstacle plane:0,0,1,0 -output_fields none -probes p -probe_p_on b -quiet -reproducible ")
+GRIP = ("-bodies b,l,r -body_b_mesh box:0.05,0.05,0.05:3 -body_b_young 5e4 -body_l_mesh box:0.02,0.04,0.06:2,3,4 -body_l_translate -0.0205,0.005,-0.005 "
+        "-body_r_mesh box:0.02,0.04,0.06:2,3,4 -body_r_translate 0.0505,0.005,-0.005 -body_l_young 2e7 -body_r_young 2e7 "
+        + "".join(f"-body_{k}_material stable_neohookean -body_{k}_poisson 0.4 -body_{k}_density 1000 " for k in "blr")
+        + "-effects g,l,r,meet -effect_g_type gravity -effect_l_type prescribed_displacement -effect_l_on l.xmin "
+        "-effect_l_displacement 0.004*ramp(t/0.3);0;0 -effect_r_type prescribed_displacement -effect_r_on r.xmax "
+        "-effect_r_displacement -0.004*ramp(t/0.3);0;0 -effect_meet_type contact -output_fields none -probes p -probe_p_on b -quiet -reproducible ")
 STEPS = "-time euler_implicit -ts_dt 0.005 "
 TIGHT = "-snes_rtol 1e-10 -snes_stol 0 -ksp_rtol 1e-10 -effect_meet_multiplier_tolerance 1e-9 "
 G = (4.905, 8.4957)  # along the slope and into it, m/s^2
 
 
-def run(name, response, friction, more, ranks=1, code=0):
-    command = [*MPI, str(ranks), SUPPLE, *(BLOCKS + more).split(), "-effect_meet_response", response,
+def run(name, response, friction, more, ranks=1, code=0, base=BLOCKS):
+    command = [*MPI, str(ranks), SUPPLE, *(base + more).split(), "-effect_meet_response", response,
                "-effect_meet_friction", str(friction), "-output_dir", str(OUT / name)]
     result = subprocess.run(command, capture_output=True, text=True)
     if result.returncode != code:
         sys.exit(f"{name}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
+    if code:
+        return None, result.stdout + result.stderr
     with open(OUT / name / "history.csv", newline="") as f:
         names, _, *rows = csv.reader(f)
     found = {key: numpy.array([float(row[k]) for row in rows]) for k, key in enumerate(names)}
@@ -99,9 +111,34 @@ def check_loss():
 
 
 def check_smooth():
-    """The smoothed friction that creeps is there as well."""
+    """The smoothed friction that creeps is there as well, below the speed that is given."""
     found, _ = run("smooth", "barrier", 0.7, STEPS + "-ts_max_time 0.2 -effect_meet_sticking smooth")
     check(1e-6 < speed(found) < 1e-3, f"smooth: speed {speed(found):.3g} m/s")
+    for slip in 1e-3, 1e-5:
+        found, _ = run(f"smooth-{slip}", "barrier", 0.7, STEPS + f"-ts_max_time 0.3 -effect_meet_sticking smooth -effect_meet_slip_speed {slip}")
+        v = speed(found)
+        print(f"  smooth, slip speed {slip} m/s: {v:.2e} m/s")
+        check(0.2 * slip < v < slip, f"smooth-{slip}: speed {v:.3g} m/s")
+    _, text = run("smooth-error", "barrier", 0.7, STEPS + "-effect_meet_slip_speed 1e-3", code=1)
+    check("-effect_meet_slip_speed" in text, f"smooth-error: {text}")
+
+
+def check_hold():
+    """What sticks stays for 100 s: blocks on half-spaces of 30 and 44 degrees and on a slope with a coefficient of 1, and one in a grip."""
+    for angle in 30, 44:
+        slope = f"-effect_g_vector {9.81 * math.sin(math.radians(angle))},0,{-9.81 * math.cos(math.radians(angle))} "
+        more = "-time euler_implicit -ts_dt 0.01 -ts_max_time 100 " + slope
+        held = "-time euler_implicit -ts_dt 0.01 -ts_max_time 100 "
+        scenes = [(f"hold-plane-{angle}", PLANE, more)]
+        if angle == 44:
+            scenes += [("hold-44", BLOCKS, more), ("hold-grip", GRIP, held)]
+        for name, base, options in scenes:
+            found, _ = run(name, "barrier", 0.5 if base == GRIP else 1, options, base=base)
+            rest = found["time"] >= 3
+            drift = max(abs(found[key][rest] - found[key][rest][0]).max() for key in ("p_ux", "p_uy", "p_uz"))
+            print(f"  {name}: moves by {drift:.1e} m in {found['time'][-1] - 3:.0f} s")
+            check(found["time"][-1] > 99.9 and found["meet_contacts"][-1] > 0, f"{name}: ends at {found['time'][-1]} s")
+            check(drift < 1e-9, f"{name}: it moves by {drift:.3g} m")
 
 
 def check_static():
@@ -147,6 +184,7 @@ check_light()
 check_stiff()
 check_loss()
 check_smooth()
+check_hold()
 check_static()
 check_ranks()
 check_restart()
