@@ -126,6 +126,8 @@ static Verdict verdict_of_class(const char *klass, const char *name, size_t size
   const char *key;
   PetscBool read;
   const size_t n = instance_of(klass, name, &read);
+  PetscInt ntype = 0;
+  char types[512] = "";
   Verdict verdict = WRONG;
 
   // option for all bodies: "default_young"
@@ -161,12 +163,13 @@ static Verdict verdict_of_class(const char *klass, const char *name, size_t size
       SbFormat(size, text, "%s %.*s", klass, (int)n, instance);
     else if (own)
       SbFormat(size, text, "%s", r->row->help);
-    else
-      SbFormat(size, text, "it is for type %s, and the %s %.*s has another one", r->type, klass,
-               (int)n, instance);
     if (own || !read)
-      break;
+      return verdict;
+    SbAppend(sizeof(types), types, "%s%s", ntype++ ? ", " : "", r->type);
   }
+  if (ntype)
+    SbFormat(size, text, "it is for type%s %s, and the %s %.*s has another one",
+             ntype > 1 ? "s" : "", types, klass, (int)n, instance);
   return verdict;
 }
 

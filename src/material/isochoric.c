@@ -401,10 +401,8 @@ SB_KERNEL void SbIsochoricPressure(const struct _p_SbMaterial *m, const SbPack F
 PetscErrorCode SbIsochoricSetFromOptions(SbMaterial m, const SbScope *scope, PetscReal mu,
                                          const char *formula)
 {
-  const PetscBool body = (PetscBool)!strcmp(scope->klass, "body");
   SbIsochoric *law = (SbIsochoric *)m->data;
-  PetscBool bulk, poisson, own;
-  PetscBool common = PETSC_FALSE;
+  PetscBool bulk, poisson;
   PetscReal value = 0;
   char first[3 * SB_NAME_MAX], second[3 * SB_NAME_MAX];
   SbScope all;
@@ -416,22 +414,27 @@ PetscErrorCode SbIsochoricSetFromOptions(SbMaterial m, const SbScope *scope, Pet
              scope->type, formula, (double)mu);
   PetscCall(SbOptionChoice(scope, "volumetric", &law->volumetric));
 
-  /* a bulk modulus of the body goes before a Poisson's ratio of all bodies */
-  SbOptionName(scope, "bulk", sizeof(first), first);
-  SbOptionName(scope, "poisson", sizeof(second), second);
+  /* which one is given; that of the body goes before one of all bodies */
   PetscCall(SbOptionGiven(scope, "bulk", &bulk));
   PetscCall(SbOptionGiven(scope, "poisson", &poisson));
-  SbScopeSet(&all, scope->klass, scope->type, SB_OPTION_DEFAULT);
-  if (body)
-    PetscCall(SbOptionGiven(&all, "poisson", &common));
-  PetscCall(PetscOptionsHasName(NULL, NULL, second, &own));
+  SbOptionName(scope, "bulk", sizeof(first), first);
+  SbOptionName(scope, "poisson", sizeof(second), second);
   PetscCheck(bulk || poisson, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s or %s must be given: the material law %s takes the resistance to a change of "
              "volume as a bulk modulus, Pa, or by Poisson's ratio, in (-1, 0.5)",
              first, second, scope->type);
-  PetscCheck(!bulk || !poisson || (common && !own), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s and %s both give the resistance to a change of volume: leave one of them out",
-             first, second);
+  if (bulk && poisson) {
+    PetscCall(PetscOptionsHasName(NULL, NULL, first, &bulk));
+    PetscCall(PetscOptionsHasName(NULL, NULL, second, &poisson));
+    if (!bulk && !poisson) {
+      SbScopeSet(&all, scope->klass, scope->type, SB_OPTION_DEFAULT);
+      SbOptionName(&all, "bulk", sizeof(first), first);
+      SbOptionName(&all, "poisson", sizeof(second), second);
+    }
+    PetscCheck(bulk != poisson, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s and %s both give the resistance to a change of volume: leave one of them out",
+               first, second);
+  }
   PetscCall(SbOptionReal(scope, bulk ? "bulk" : "poisson", &value));
   if (bulk) {
     SbMaterialSetLame(m, value - 2. / 3. * mu, mu);

@@ -2,6 +2,7 @@
 one and on three ranks; a run taken up from a checkpoint is the run that was not interrupted, bit for bit; the ledger estimates its errors; the options that were used are written, and run again.
 """
 import csv
+import json
 import shutil
 import subprocess
 import sys
@@ -21,15 +22,15 @@ RUNS = {"static": "-time static -static_steps 3 -snes_rtol 1e-11 ",
 UNLIKE = ("newton", "linear", "rejected")  # what solving took is not compared
 
 
-def run(ranks, folder, options):
+def run(ranks, folder, options, code=0):
     shutil.rmtree(OUT / folder, ignore_errors=True)
-    return again(ranks, folder, options)
+    return again(ranks, folder, options, code)
 
 
-def again(ranks, folder, options):
+def again(ranks, folder, options, code=0):
     command = [*MPI, str(ranks), SUPPLE, *options.split(), "-output_dir", str(OUT / folder)]
     result = subprocess.run(command, capture_output=True, text=True)
-    if result.returncode:
+    if result.returncode != code:
         sys.exit(f"{folder}: exit code {result.returncode}\n{' '.join(command)}\n{result.stdout}{result.stderr}")
     return result.stdout + result.stderr
 
@@ -100,6 +101,25 @@ def check_view():
         sys.exit("scenario.opts gives another run")
 
 
+def check_resistance():
+    """The bulk modulus or Poisson's ratio of a body goes before that of all; of both alike the error names what was given."""
+    bar = ("-bodies a -body_a_mesh box:1,1,1:1 -body_a_material ogden -body_a_mu 1e5 -body_a_alpha 2 -effects hold -effect_hold_type fixed "
+           "-effect_hold_on zmin -time static -output_fields none ")
+    for options, poisson in (("-body_a_poisson 0.4 -body_default_bulk 1e6", 0.4), ("-body_a_bulk 1e6 -body_default_poisson 0.4", 0.4516129)):
+        run(1, "resistance", bar + options)
+        found = json.loads((OUT / "resistance" / "run.json").read_text())["bodies"][0]["poisson"]
+        if abs(found - poisson) > 1e-6:
+            sys.exit(f"{options}: Poisson's ratio {found}, not {poisson}")
+    for options, words in (("-body_default_poisson 0.4 -body_default_bulk 1e6", "-body_default_bulk and -body_default_poisson both"),
+                           ("-body_a_poisson 0.4 -body_a_bulk 1e6", "-body_a_bulk and -body_a_poisson both")):
+        text = run(1, "resistance", bar + options, 1)
+        if words not in text:
+            sys.exit(f"{options}: {text}")
+    text = run(1, "resistance", bar.replace("ogden -body_a_mu 1e5 -body_a_alpha 2", "neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_bulk 1e6"))
+    if "it is for types mooney_rivlin, " not in text or "ogden" not in text:
+        sys.exit(f"an option of other laws: {text}")
+
+
 def check_warnings():
     """Unstable constants, with mode and stretch; a modulus that nothing reads; linear tets that lock by a bulk modulus; of copies once."""
     cube = ("-bodies a -body_a_mesh box:0.1,0.1,0.1:1 -body_a_copies grid:2,1,1,0.3,0,0 -body_a_material mooney_rivlin -body_a_c10 1e5 -body_a_c01 {0} "
@@ -129,6 +149,7 @@ def main():
         check_restart(element)
         check_ledger(element)
     check_view()
+    check_resistance()
     check_warnings()
     check_inclusion()
     print("4 elements, static and dynamic: 1 and 3 ranks, restart, ledger")
