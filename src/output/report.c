@@ -321,7 +321,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   if (run->counters.turned)
     entry("",
           "%" PetscInt_FMT " load steps were cut, in which supports would turn by more than 30 "
-          "degrees, or cells turned by more than 90 (-static_adapt)",
+          "degrees, cells turned by more than 90, or that ended in an unstable equilibrium "
+          "(-static_adapt)",
           run->counters.turned);
   if (run->stability.nunstable)
     entry("", "%" PetscInt_FMT " of %" PetscInt_FMT " equilibria examined are unstable",

@@ -420,6 +420,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   PetscBool last = (PetscBool)(factor == 1.);
   PetscBool known = PETSC_FALSE;
   PetscBool unstable = PETSC_FALSE;
+  PetscBool again;
   PetscBool ok;
   Path p = {.run = run, .negative = -1};
 
@@ -475,7 +476,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     }
     if (!last)
       PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
-    PetscCall(SbRunCheckStable(run, p.factor, last, &unstable));
+    PetscCall(SbRunCheckStable(run, p.factor, last, PETSC_FALSE, &again, &unstable));
     last = (PetscBool)(last || clock->stopped || unstable);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     factor = p.factor;

@@ -341,14 +341,15 @@ static PetscErrorCode describe(SbRun run, PetscReal factor, const SbInertia *fou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, PetscBool *stop)
+PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, PetscBool may_cut,
+                                PetscBool *again, PetscBool *stop)
 {
   SbRunStability *st = &run->stability;
   SbInertia found;
   Vec mode;
 
   PetscFunctionBeginUser;
-  *stop = PETSC_FALSE;
+  *stop = *again = PETSC_FALSE;
   if (st->action == SB_UNSTABLE_IGNORE || run->model->linear || run->model->contacts.nexact ||
       !run->counters.newton_step)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -360,6 +361,12 @@ PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, Pet
   /* forces without a potential: the symmetric part decides only where it is definite */
   if (run->solve.nonsymmetric.U && found.negative)
     found = (SbInertia){0};
+  *again = (PetscBool)(may_cut && found.negative && !st->warned);
+  if (*again) {
+    PetscCall(VecDestroy(&mode));
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_STABILITY], 0, 0, 0, 0));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   st->nknown += found.known;
   st->nunknown += !found.known;
   if (found.negative) {

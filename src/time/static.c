@@ -410,7 +410,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     const SbSolvedStep end = {factor, next - factor, run->state.U, .U = X, .solved = PETSC_TRUE};
     const SbAttempt attempt = {end, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE;
-    PetscBool found, easy, unstable;
+    PetscBool found, easy, unstable, may_cut, again;
     PetscBool far = PETSC_FALSE;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure
@@ -452,17 +452,28 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->clock.stop_reason[0] = 0;
 
-    /* the new equilibrium, and its growth of displacement with the load, relative to the slowest
-       step */
-    PetscCall(VecAXPY(run->state.U, -1., X));
-    PetscCall(VecNorm(run->state.U, NORM_2, &rate));
+    /* the new equilibrium, X is the old one; halve a step that ends in an unstable one: a long step
+       may find it far from the stable one that the loads lead to */
+    PetscCall(VecSwap(X, run->state.U));
+    may_cut = (PetscBool)(follow && jumps < CUTS && 0.5 * length >= least);
+    PetscCall(SbRunCheckStable(run, next, (PetscBool)(next >= 1.), may_cut, &again, &unstable));
+    if (again) {
+      PetscCall(VecSwap(X, run->state.U));
+      run->counters.rejected++;
+      run->counters.turned++;
+      jumps++;
+      length *= 0.5;
+      continue;
+    }
+
+    /* its growth of displacement with the load, relative to the slowest step */
+    PetscCall(VecAXPY(X, -1., run->state.U));
+    PetscCall(VecNorm(X, NORM_2, &rate));
     rate /= next - factor;
     if (slowest == 0. || (rate < slowest && run->counters.newton_step))
       slowest = rate;
     if (slowest > 0. && run->counters.newton_step)
       run->solve.softening = rate / slowest;
-    PetscCall(VecCopy(X, run->state.U));
-    PetscCall(SbRunCheckStable(run, next, (PetscBool)(next >= 1.), &unstable));
 
     /* re-meshing, effects and monitors */
     run->monitors.post_step.dt = next - factor;

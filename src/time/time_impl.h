@@ -139,9 +139,11 @@ PetscErrorCode SbRunCutTurn(SbRun run, PetscReal from, PetscReal least, PetscRea
    Collective. */
 PetscErrorCode SbRunTurned(SbRun run, Vec U0, Vec U1, PetscReal *share);
 /* stability.c, after a static solve, before the step is accepted: warns if the equilibrium
-   run->state.U at this load factor is unstable. stop: the run has to end after this step, with
+   run->state.U at this load factor is unstable, unless the step can be cut and the one before was
+   stable: again, a shorter one is to be tried. stop: the run has to end after this step, with
    run->stability.text. Collective. */
-PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, PetscBool *stop);
+PetscErrorCode SbRunCheckStable(SbRun run, PetscReal factor, PetscBool last, PetscBool may_cut,
+                                PetscBool *again, PetscBool *stop);
 /* arc_length.c: equilibrium path with the load factor as an unknown. Collective. Check: after the
    solver is set up; PETSC_ERR_USER_INPUT for contact, and solvers for definite matrices only. */
 PetscErrorCode SbArcLengthCheck(SbRun run);
