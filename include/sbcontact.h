@@ -42,9 +42,10 @@ typedef struct {
 
 /* How far bodies go in a direction, one by one. */
 typedef struct {
-  PetscInt n;      /* number of bodies */
-  PetscReal *part; /* [n] fraction of the direction that is free of collisions */
-  PetscInt *group; /* [n] a body that it touches, or itself; SbBodyStepsJoin() */
+  PetscInt n;         /* number of bodies */
+  PetscReal *part;    /* [n] fraction of the direction that is free of collisions */
+  PetscInt *group;    /* [n] a body that it touches, or itself; SbBodyStepsJoin() */
+  PetscBool *touches; /* [n] it touches another one or an obstacle */
 } SbBodySteps;
 
 /* How bodies that overlap when a static run begins are parted. */
@@ -277,6 +278,7 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
   BodySteps - the same by bodies: Y of each body becomes the fraction of it that is free of
              collisions with the motions of all; bodies that touch each other keep a common one.
              MaxStep of the new Y may be below 1: a body that is held up is in another one's way.
+             alone[nbody]: what touches nothing, and is not held up.
   Gradient - F += scale times the gradient of the energy at U, N; free_only: not where prescribed.
              energy: J, or NULL.
   Hessian  - its blocks, and R as the operation `hessian` says, zero at prescribed unknowns.
@@ -286,7 +288,7 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
 void SbContactSetAdvance(const SbContactSet *contacts, PetscReal progress);
 PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, PetscReal *part,
                                    PetscInt *nactive);
-PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y);
+PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y, PetscBool alone[]);
 PetscErrorCode SbContactSetGradient(const SbContactSet *contacts, Vec U, PetscReal scale,
                                     PetscBool free_only, PetscReal *energy, Vec F);
 PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContactHessian kind,

@@ -164,8 +164,9 @@ typedef struct {
   PetscReal barrier_weight; /* of barrier contact's forces, those at X, in the residual */
   PetscBool single;         /* one linear solve per step instead of Newton's method */
   PetscBool fast;           /* -contact_quality fast: a limited number of iterations; */
-  Vec left; /* then what its direction had beyond the solution, m; owned; else NULL; and */
-  PetscReal longest_left; /* the largest displacement of it in the last step, m */
+  Vec left;         /* then what its direction had beyond the solution, m; owned; else NULL; and */
+  PetscBool *alone; /* [nbody] then what touches nothing in the last iteration; owned; else NULL */
+  PetscReal longest_left; /* the largest displacement of it in the last step, m; 0: it was solved */
 
   /* attempts that are not accepted */
   PetscBool reject_inverted;   /* -time_inverted reject */

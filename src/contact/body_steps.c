@@ -17,6 +17,10 @@ static PetscInt group_of(PetscInt group[], PetscInt b)
 
 void SbBodyStepsJoin(SbBodySteps *bodies, PetscInt one, PetscInt two)
 {
+  if (one < bodies->n)
+    bodies->touches[one] = PETSC_TRUE;
+  if (two < bodies->n)
+    bodies->touches[two] = PETSC_TRUE;
   if (one >= bodies->n || two >= bodies->n)
     return;
   one = group_of(bodies->group, one);
@@ -38,8 +42,11 @@ static PetscErrorCode merge(MPI_Comm comm, SbBodySteps *bodies)
     PetscCallMPI(
       MPI_Allgather(bodies->group, (PetscMPIInt)n, MPIU_INT, all, (PetscMPIInt)n, MPIU_INT, comm));
     for (PetscInt k = 0; k < size * n; k++)
-      SbBodyStepsJoin(bodies, k % n, all[k]);
+      if (all[k] != k % n)
+        SbBodyStepsJoin(bodies, k % n, all[k]);
     PetscCall(PetscFree(all));
+    PetscCallMPI(
+      MPI_Allreduce(MPI_IN_PLACE, bodies->touches, (PetscMPIInt)n, SB_MPI_BOOL, MPI_LOR, comm));
     PetscCallMPI(
       MPI_Allreduce(MPI_IN_PLACE, bodies->part, (PetscMPIInt)n, MPIU_REAL, MPI_MIN, comm));
   }
@@ -53,10 +60,10 @@ static PetscErrorCode merge(MPI_Comm comm, SbBodySteps *bodies)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y)
+PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y, PetscBool alone[])
 {
   const SbSpace s = contacts->space;
-  SbBodySteps bodies = {.n = s->mesh->nbody};
+  SbBodySteps bodies = {.n = s->mesh->nbody, .touches = alone};
   const PetscReal *u0, *u1;
   PetscScalar *y;
   Vec next;
@@ -66,6 +73,7 @@ PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y)
   for (PetscInt b = 0; b < bodies.n; b++) {
     bodies.part[b] = 1.;
     bodies.group[b] = b;
+    bodies.touches[b] = PETSC_FALSE;
   }
   PetscCall(VecDuplicate(X, &next));
   PetscCall(VecWAXPY(next, -1., Y, X));
@@ -87,6 +95,8 @@ PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y)
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     y[i] *= bodies.part[s->node_body[i / 3]];
   PetscCall(VecRestoreArray(Y, &y));
+  for (PetscInt b = 0; b < bodies.n; b++)
+    alone[b] = (PetscBool)(!bodies.touches[b] && bodies.part[b] == 1.);
   PetscCall(PetscFree2(bodies.part, bodies.group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

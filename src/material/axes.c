@@ -92,16 +92,27 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
 static PetscErrorCode evaluate(const SbFibres f, int i, const PetscReal x[3],
                                const PetscReal *given, PetscReal a[3])
 {
+  const char *field = given && f->field[i][0] ? "_field" : "";
+  PetscReal largest = 0;
+
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) {
     a[k] = given ? given[3 * i + k] : 0;
     if (!given)
       PetscCall(SbFormulaEval(f->direction[3 * i + k], 0., x, &a[k]));
+    PetscCheck(!PetscIsInfOrNanReal(a[k]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s%s is not finite at (%.4g, %.4g, %.4g) m: it must have a direction at the centre "
+               "of every tet",
+               f->option[i], field, (double)x[0], (double)x[1], (double)x[2]);
+    largest = PetscMax(largest, PetscAbsReal(a[k]));
   }
-  PetscCheck(SbNormalise(a) > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s is a vector of length 0 at (%.4g, %.4g, %.4g) m: it must have a direction at the "
-             "centre of every tet",
-             f->option[i], (double)x[0], (double)x[1], (double)x[2]);
+  PetscCheck(largest > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s%s is a vector of length 0 at (%.4g, %.4g, %.4g) m: it must have a direction at "
+             "the centre of every tet",
+             f->option[i], field, (double)x[0], (double)x[1], (double)x[2]);
+  for (int k = 0; k < 3; k++) /* squares of any length are finite */
+    a[k] /= largest;
+  (void)SbNormalise(a);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

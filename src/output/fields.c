@@ -152,11 +152,14 @@ static PetscErrorCode contact_pressure(const SbField *f, SbRun run, const SbStep
     PetscReal N[3] = {gap[3 * i], gap[3 * i + 1], gap[3 * i + 2]};
     PetscReal face;
 
+    /* the normal, along the gap, where that is 0 along the force */
     for (int k = 0; k < 3 && SbDot3(gap + 3 * i, gap + 3 * i) == 0.; k++)
-      N[k] = -A[k];
+      N[k] = F[k];
     (void)SbNormalise(N);
-    face = PetscAbsReal(SbDot3(A, N));
-    values[i] = face > 0. ? SbDot3(F, N) / face : 0.;
+
+    /* against the outward area, also where the surface is inside the other one */
+    face = SbDot3(A, N);
+    values[i] = face != 0. ? -SbDot3(F, N) / face : 0.;
   }
   PetscCall(PetscFree3(force, area, gap));
   PetscFunctionReturn(PETSC_SUCCESS);

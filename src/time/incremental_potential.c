@@ -142,8 +142,10 @@ static PetscErrorCode max_step(void *ctx, Vec X, Vec Y, PetscReal *part, PetscIn
 
 static PetscErrorCode body_steps(void *ctx, Vec X, Vec Y)
 {
+  const SbRun run = ((SbPotential)ctx)->run;
+
   PetscFunctionBeginUser;
-  PetscCall(SbContactSetBodySteps(&((SbPotential)ctx)->run->model->contacts, X, Y));
+  PetscCall(SbContactSetBodySteps(&run->model->contacts, X, Y, run->solve.alone));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,6 +290,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
     PetscCall(PetscOptionsGetInt(NULL, NULL, "-snes_max_it", &q->problem.iterations, NULL));
     PetscCall(VecDuplicate(run->state.U, &run->solve.left));
     PetscCall(VecZeroEntries(run->solve.left));
+    PetscCall(PetscCalloc1(m->nbody, &run->solve.alone));
     q->problem.left = run->solve.left;
   }
 

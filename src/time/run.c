@@ -389,6 +389,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   if (r->monitors.output_destroy)
     PetscCall(r->monitors.output_destroy(r));
   PetscCall(PetscFree(r->solve.fallbacks));
+  PetscCall(PetscFree(r->solve.alone));
   PetscCall(SbPotentialDestroy(&r->solve.potential));
   if (!r->solve.ts)
     PetscCall(SNESDestroy(&r->solve.snes));

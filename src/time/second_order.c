@@ -268,39 +268,67 @@ static PetscErrorCode is_finite(TS ts, PetscBool *ok)
 }
 
 /*
-  A step that ended after one iteration: its velocity keeps what was left of the displacement, so
-  that bodies which a collision holds up lose time, not speed. All of it, w = left / h, unless that
-  makes energy. With the predictor X0 + h V0, E = |V - V0|^2 / 2 + psi at X0 + h V (norms by mass,
-  psi of strain, contact and loads): kinetic energy may be |V0|^2 / 2 less the change of psi, which
-  is |V1 - V0|^2 / 2 less the change of E from X0 to X1.
+  A step that ended before it was solved: its velocity keeps what was left of the displacement, w =
+  left / h, so that bodies which a collision holds up lose time, not speed. Bodies that touch
+  nothing keep all of it, the others as much as makes no energy, and lose what they have too much.
+  With the predictor X0 + h V0, E = |V - V0|^2 / 2 + psi at X0 + h V (norms by mass, psi of strain,
+  contact and loads): kinetic energy may be |V0|^2 / 2 less the change of psi, which is |V1 - V0|^2
+  / 2 less the change of E from X0 to X1.
 */
 static PetscErrorCode carry_over(SecondOrder *so, PetscReal h)
 {
+  enum {
+    CHANGED,
+    ALONE,
+    KINETIC,
+    ALONG,
+    MORE,
+    NSUM
+  };
   const SbRun run = so->run;
-  const Vec w = run->solve.left;
-  PetscReal change, allowed, kinetic, along, more, room, root;
+  const SbSpace s = run->model->space;
+  PetscReal sum[NSUM] = {0.}; /* twice energies, J */
+  PetscReal change, room;
+  PetscReal part = 0.;
+  PetscReal factor = 1.;
+  const PetscScalar *mass, *v0;
+  PetscScalar *v, *w;
 
   PetscFunctionBeginUser;
-  PetscCall(VecNorm(w, NORM_INFINITY, &run->solve.longest_left));
-  if (run->solve.longest_left == 0.)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecScale(w, 1. / h));
-  PetscCall(VecPointwiseMult(so->work, run->state.mass, so->A1)); /* (V1 - V0) / h */
-  PetscCall(VecDot(so->A1, so->work, &allowed));
-  PetscCall(VecPointwiseMult(so->work, run->state.mass, so->V1));
-  PetscCall(VecDot(so->V1, so->work, &kinetic));
-  PetscCall(VecDot(w, so->work, &along));
-  PetscCall(VecPointwiseMult(so->work, run->state.mass, w));
-  PetscCall(VecDot(w, so->work, &more));
+  PetscCall(VecNorm(run->solve.left, NORM_INFINITY, &run->solve.longest_left));
+  PetscCall(VecScale(run->solve.left, 1. / h));
+  PetscCall(VecGetArrayRead(run->state.mass, &mass));
+  PetscCall(VecGetArrayRead(so->V0, &v0));
+  PetscCall(VecGetArray(so->V1, &v));
+  PetscCall(VecGetArray(run->solve.left, &w));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    sum[CHANGED] += mass[i] * PetscSqr(v[i] - v0[i]);
+    if (run->solve.alone[s->node_body[i / 3]]) {
+      v[i] += w[i];
+      sum[ALONE] += mass[i] * PetscSqr(v[i]);
+      continue;
+    }
+    sum[KINETIC] += mass[i] * PetscSqr(v[i]);
+    sum[ALONG] += mass[i] * v[i] * w[i];
+    sum[MORE] += mass[i] * PetscSqr(w[i]);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, NSUM, MPIU_REAL, MPI_SUM, s->comm));
 
-  /* the largest part <= 1 with kinetic + 2 part along + part^2 more <= allowed, twice the
-     energies */
+  /* the largest part <= 1 of w, or a smaller factor of v, within what kinetic energy may be */
   PetscCall(SbNewtonChange(run->solve.snes, &change));
-  allowed = PetscSqr(h) * allowed - 2. * change;
-  room = PetscMax(0., allowed - kinetic);
-  root = PetscSqrtReal(PetscSqr(along) + more * room);
-  if (more > 0.)
-    PetscCall(VecAXPY(so->V1, PetscMin(1., (root - along) / more), w));
+  room = sum[CHANGED] - 2. * change - sum[ALONE] - sum[KINETIC];
+  if (room < 0. && sum[KINETIC] > 0.)
+    factor = PetscSqrtReal(PetscMax(0., 1. + room / sum[KINETIC]));
+  else if (sum[MORE] > 0.)
+    part = PetscMin(1., (PetscSqrtReal(PetscSqr(sum[ALONG]) + sum[MORE] * room) - sum[ALONG]) /
+                          sum[MORE]);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    if (!run->solve.alone[s->node_body[i / 3]] && mass[i] > 0.)
+      v[i] = factor * v[i] + part * w[i];
+  PetscCall(VecRestoreArray(run->solve.left, &w));
+  PetscCall(VecRestoreArray(so->V1, &v));
+  PetscCall(VecRestoreArrayRead(so->V0, &v0));
+  PetscCall(VecRestoreArrayRead(run->state.mass, &mass));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,7 +346,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, PetscBool 
     PetscCall(end_state(ts, so->X1));
   PetscCall(is_finite(ts, ok));
   *ok = (PetscBool)(*ok && reason > 0 && !unsettled[0]);
-  if (*ok && run->solve.left)
+  run->solve.longest_left = 0.;
+  if (*ok && run->solve.left && reason == SNES_CONVERGED_ITS)
     PetscCall(carry_over(so, h));
   if (*ok && so->set.separate) {
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */

@@ -452,16 +452,16 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->clock.stop_reason[0] = 0;
 
-    /* the new equilibrium, X is the old one; halve a step that ends in an unstable one: a long step
-       may find it far from the stable one that the loads lead to */
+    /* the new equilibrium, X is the old one; with contact, halve a step that ends in an unstable
+       one: a long step may find it far from the stable one that the loads lead to */
     PetscCall(VecSwap(X, run->state.U));
-    may_cut = (PetscBool)(follow && jumps < CUTS && 0.5 * length >= least);
+    may_cut =
+      (PetscBool)(follow && contact && 0.5 * length >= PetscMax(least, nominal / (1 << CUTS)));
     PetscCall(SbRunCheckStable(run, next, (PetscBool)(next >= 1.), may_cut, &again, &unstable));
     if (again) {
       PetscCall(VecSwap(X, run->state.U));
       run->counters.rejected++;
       run->counters.turned++;
-      jumps++;
       length *= 0.5;
       continue;
     }

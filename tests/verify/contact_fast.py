@@ -75,6 +75,19 @@ def check_heap():
     check(fast["newton"].sum() < 0.6 * exact["newton"].sum(), "heap: as many iterations as with solved steps")
 
 
+def check_lone():
+    """Beside blocks of very different stiffness that land on each other, one in free fall is late, but not slow."""
+    names, young = "abcde", ("1e4", "1e5", "1e6", "1e7", "1e5")
+    places = ("0,0,0.05", "0.01,0.01,0.13", "0,0.02,0.21", "0.02,0,0.29", "1,0,5")
+    bodies = "".join(BODY.format(name, "0.06,0.06,0.06:2", place).replace("1e5", stiff) for name, stiff, place in zip(names, young, places))
+    run("lone", "-bodies a,b,c,d,e " + bodies + "-effects gravity,floor,meet -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+        "-effect_meet_type contact -ts_dt 0.0166666666 -ts_max_time 0.6 -contact_quality fast -ksp_rtol 1e-10")
+    found = history("lone")
+    off = abs(found["e_momentum_z"] / 0.216 + 9.81 * found["time"]).max()
+    check(off < 1e-6, f"lone: the speed of a free fall is {off} m/s off")
+    check(found["total"].max() < 1e-6, f"lone: energy {found['total'].max()} J was made")
+
+
 def check_ranks():
     options = HEAP + "-contact_quality fast -ksp_rtol 1e-12 -ts_max_time "
     run("ranks-1", options + "0.3")
@@ -102,5 +115,6 @@ def check_refusals():
 
 check_impact()
 check_heap()
+check_lone()
 check_ranks()
 check_refusals()
