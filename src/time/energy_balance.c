@@ -105,8 +105,13 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&
       -e->integrator_loss > GIVEN * run->state.energy_most + rounding(m)) {
+    const char *advice = ", or -time genalpha or euler_implicit, which damp";
     char names[256];
 
+    if (run->solve.fast)
+      advice = ", or -contact_quality exact, which solves them";
+    else if (run->solve.preset == SB_TIME_EULER_IMPLICIT)
+      advice = "";
     run->monitors.warned_gain = PETSC_TRUE;
     SbEffectsWithoutPotential(m->neffect, m->effect, sizeof(names), names);
     if (names[0])
@@ -122,8 +127,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
       PetscCall(SbWarning(
         m->comm,
         "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
-        "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
-        (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
+        "steps of %g s; try a shorter -ts_dt%s",
+        (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt,
+        advice));
   }
   run->state.damping_power = power;
   PetscCall(VecDestroy(&run->state.loads));
