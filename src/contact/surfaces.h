@@ -275,8 +275,7 @@ static inline PetscBool counts_spring(const Surfaces *b, const Spring *spring)
   return (PetscBool)b->surface->own[spring->at.v[k]];
 }
 
-/* Makes e, with its Contact, an effect of surfaces in contact; by_auto: its response was chosen.
-   Not collective. */
+/* Makes e, with its Contact, an effect of surfaces in contact. Not collective. */
 PetscErrorCode SbSurfacesCreate(SbEffect e, const SbScope *scope);
 /* Positions at the local displacements u; pairs with gaps below the width, ordered by number.
    Collective. */

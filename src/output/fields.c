@@ -7,10 +7,9 @@
   von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
   reaction:          residual without constraints at prescribed unknowns, the force of the support
   on the body contact force:     of obstacles and other bodies on the body
-  contact pressure:  F . n / |A . n|, F the force of contact on a vertex, A the area vector of a
-  third
-                     of the facets around, where they are now, n the direction of the gap, so that
-                     only the side of a ridge that touches counts; without a gap that of A
+  contact pressure:  -F . n / A . n, F the force of contact on a vertex, A the outward area of the
+                     facets around it, n along the gap, or along F where that is 0: only the side of
+                     a ridge that touches counts
   contact gap:       along the normal: a vertex minus gap times normal is the point of contact
   mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
   pressure:          the law's -lambda theta, theta: its measure of the change of volume
