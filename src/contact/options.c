@@ -7,9 +7,8 @@
 
   Response `auto` is the same for all effects of a scene, as Newton's method has one potential and
   one set of constraints: `barrier`, which has no active set that could fail to settle, unless the
-  scene needs what it lacks. Where it is exact, safe and cheaper, it is `projected`: without
-  friction in static runs against half-spaces and bowls, where the surface is outside whenever its
-  vertices are, and where -snes_type ksponly asks for one linear solve a step there.
+  scene needs what it lacks, or -snes_type ksponly asks for one linear solve a step against
+  half-spaces and bowls, where the surface is outside whenever its vertices are.
 */
 #include "surfaces.h"
 #include "nodes.h"
@@ -40,7 +39,7 @@ static const SbOption rows[] = {
   {"response", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|projected|multiplier|augmented|penalty|barrier",
    "how contact is enforced. auto: barrier; projected with -snes_type ksponly where all obstacles "
-   "are half-spaces or bowls, and where -time or an option needs it. projected: active set, "
+   "are half-spaces or bowls, and where -time, -mass or an option needs it. projected: active set, "
    "constraints eliminated by solving in their null space; "
    "multiplier: Lagrange multipliers; "
    "augmented: "
@@ -181,6 +180,25 @@ static PetscErrorCode add_wishes(const char *name, Wishes *wishes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether `barrier` goes with -time and -mass, where the program has them. */
+static PetscErrorCode integrator_has_barrier(PetscBool *has)
+{
+  PetscBool consistent = PETSC_FALSE;
+  int time;
+
+  PetscFunctionBeginUser;
+  *has = PETSC_TRUE;
+  if (!SbOptionFind(&SbRunScope, "time"))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
+  if (SbOptionFind(&SbRunScope, "mass"))
+    PetscCall(SbOptionSecond(&SbRunScope, "mass", &consistent));
+
+  /* euler_implicit and static; newmark and genalpha */
+  *has = (PetscBool)(time == 0 || time == 6 || ((time == 1 || time == 2) && !consistent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The response of an effect; why: the reason of `auto`, NULL: the response is given; surfaces: on
    pairs of features, not of nodes with the obstacle. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfaces,
@@ -210,12 +228,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
   *surfaces = (PetscBool)(wishes.bodies || *response == BARRIER);
   if (*response != AUTO)
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (SbOptionFind(&SbRunScope, "time")) {
-    int time;
-
-    PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
-    possible = (PetscBool)(time == 0 || time == 6); /* euler_implicit, static */
-  }
+  PetscCall(integrator_has_barrier(&possible));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-snes_type", snes, sizeof(snes), NULL));
   once = (PetscBool)!strcmp(snes, SNESKSPONLY);
 
@@ -229,7 +242,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, PetscBool *surfac
       {wishes.bodies, BARRIER, "bodies meet each other"},
       {(PetscBool)(wishes.response == BARRIER), BARRIER, "the same as another effect"},
       {(PetscBool)(wishes.response != AUTO), PROJECTED, "the same as another effect"},
-      {(PetscBool)!possible, PROJECTED, "-time"},
+      {(PetscBool)!possible, PROJECTED, "-time or -mass"},
       {wishes.lacks, PROJECTED, "an option that barrier lacks"},
       {wishes.facets, BARRIER, "edges and corners may touch"},
       {once, PROJECTED, "one linear solve a step, half-spaces and bowls only"},
