@@ -106,6 +106,12 @@ PetscErrorCode SbNewtonApproach(SNES snes)
   PetscBool is_free;
 
   PetscFunctionBeginUser;
+
+  /* the solution of the last solve, which its iterations led to */
+  if (p->warm_start) {
+    PetscCall((*b->advance)(p->ctx, 1.));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(guess_is_free(snes, &is_free));
   if (is_free)
     PetscFunctionReturn(PETSC_SUCCESS);
