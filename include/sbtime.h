@@ -262,6 +262,7 @@ typedef struct {
   PetscBool warned_short; /* of much shorter steps */
   PetscBool warned_jumps; /* of a penalty on jumps that has not settled */
   PetscBool warned_gain;  /* of an unstable integrator */
+  PetscBool warned_way;   /* of a step that is long beside a body that meets something */
 
   void *output;                                /* data of src/output; NULL without output */
   PetscErrorCode (*output_destroy)(SbRun run); /* frees it, in SbRunDestroy(); NULL: none */

@@ -136,6 +136,7 @@ PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool wa
     PetscCall(SbModelStepSpeed(m, step->t, step->dt, step->U0, run->state.V, &speed));
     PetscCall(
       SbContactSetBeginStep(&m->contacts, step->t, step->dt, speed, step->U0, run->state.V));
+    PetscCall(SbRunWarnLongWay(run, step));
   }
   PetscCall(SbPotentialBegin(run->solve.potential, step, warm));
   if (!warm)

@@ -190,6 +190,10 @@ PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool wa
    step, it ends after the first solve with SNES_CONVERGED_ITERATING: to be repeated with the
    fraction run->clock.time_of_impact of its length. */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
+/* Warns, once, of a body that would go farther than its size in the step and meets something on the
+   way. Collective. */
+PetscErrorCode SbRunWarnLongWay(SbRun run, const SbSolvedStep *step);
+
 /* Warns, once, that the user's absolute tolerance `option` is above `norm`, N, of `what`, so that
    the run begins without an iteration; norm: of a solve that ended so, above rounding where there
    is something to solve. Collective. */
