@@ -84,6 +84,8 @@ static const Part parts[] = {
   {"material", "isochoric_neohookean", "-body_bar_material isochoric_neohookean", NULL, NULL,
    PETSC_TRUE},
   {"material", "stable_neohookean", "-body_bar_material stable_neohookean", NULL, NULL, PETSC_TRUE},
+  {"material", "holmes_mow", "-body_bar_material holmes_mow -body_bar_beta 0.5", NULL, NULL,
+   PETSC_TRUE},
   {"material", "mooney_rivlin",
    "-body_bar_material mooney_rivlin -body_bar_c10 7e3 -body_bar_c01 2e3", NULL, NULL, PETSC_TRUE},
   {"material", "yeoh", "-body_bar_material yeoh -body_bar_c1 9e3 -body_bar_c2 -200 -body_bar_c3 10",

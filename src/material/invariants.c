@@ -101,3 +101,34 @@ void SbInvariantTangent(const struct _p_SbMaterial *m, const SbPack F[9], const 
   else
     plain(F, (const SbPack *)D, a, b, q, C);
 }
+
+SB_KERNEL void SbLogVolume(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack theta)
+{
+  (void)m;
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9];
+
+    SbPackGet(9, F, l, f);
+    theta[l] = SbVolumeOf(f).log;
+  }
+}
+
+/* D = F^-T */
+void SbLogVolumeGradient(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9])
+{
+  (void)m;
+  SbInverseTransposed(F, D);
+}
+
+/* d^2 theta/dF_(ij)(kl) = -D_il D_kj; twists have the eigenvalues 1 / (s_i s_j), flips -1 / (s_i
+   s_j), stretches -1 / s_i^2. */
+SB_KERNEL void SbLogVolumeHessian(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                  const SbPack p, SbPack C[restrict 81])
+{
+  SbPack H[81];
+
+  SbInvariantTangent(m, F, NULL, NULL, NULL, p, H);
+  for (int k = 0; k < 81; k++)
+    for (int l = 0; l < SB_BATCH; l++)
+      C[k][l] += H[k][l];
+}

@@ -42,3 +42,9 @@ void SbInverseTransposed(const SbPack F[9], SbPack D[9]);
 void SbInvariantTangent(const struct _p_SbMaterial *m, const SbPack F[9], const PetscReal *of_I,
                         const PetscReal *of_FD, const PetscReal *of_DD, const SbPack q,
                         SbPack C[81]);
+
+/* The dilatation theta = ln J and its derivatives (SbMaterialOps); no numbers for J <= 0. */
+void SbLogVolume(const struct _p_SbMaterial *m, const SbPack F[9], SbPack theta);
+void SbLogVolumeGradient(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9]);
+void SbLogVolumeHessian(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                        SbPack C[81]);

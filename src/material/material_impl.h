@@ -13,6 +13,7 @@
   LAW(SbMaterialNeoHookean)            \
   LAW(SbMaterialIsochoricNeoHookean)   \
   LAW(SbMaterialStableNeoHookean)      \
+  LAW(SbMaterialHolmesMow)             \
   LAW(SbMaterialMooneyRivlin)          \
   LAW(SbMaterialYeoh)                  \
   LAW(SbMaterialOgden)                 \

@@ -56,26 +56,6 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbP
   }
 }
 
-SB_KERNEL static void dilatation_neohookean(const struct _p_SbMaterial *m,
-                                            const SbPack F[restrict 9], SbPack theta)
-{
-  (void)m;
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9];
-
-    SbPackGet(9, F, l, f);
-    theta[l] = SbVolumeOf(f).log;
-  }
-}
-
-/* D = F^-T */
-static void dilatation_gradient_neohookean(const struct _p_SbMaterial *m, const SbPack F[9],
-                                           SbPack D[9])
-{
-  (void)m;
-  SbInverseTransposed(F, D);
-}
-
 SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                          SbPack C[restrict 81])
 {
@@ -83,27 +63,13 @@ SB_KERNEL static void tangent_neohookean(const struct _p_SbMaterial *m, const Sb
   const PetscReal lambda = m->rest->lambda;
   SbPack of_I, of_DD, q;
 
-  dilatation_neohookean(m, F, q);
+  SbLogVolume(m, F, q);
   for (int l = 0; l < SB_BATCH; l++) {
     of_I[l] = mu;
     of_DD[l] = lambda;
     q[l] = lambda * q[l] - mu;
   }
   SbInvariantTangent(m, F, of_I, NULL, of_DD, q, C);
-}
-
-/* d^2 theta/dF_(ij)(kl) = -D_il D_kj; twists have the eigenvalues 1 / (s_i s_j), flips -1 / (s_i
-   s_j), stretches -1 / s_i^2. */
-SB_KERNEL static void dilatation_hessian_neohookean(const struct _p_SbMaterial *m,
-                                                    const SbPack F[restrict 9], const SbPack p,
-                                                    SbPack C[restrict 81])
-{
-  SbPack H[81];
-
-  SbInvariantTangent(m, F, NULL, NULL, NULL, p, H);
-  for (int k = 0; k < 81; k++)
-    for (int l = 0; l < SB_BATCH; l++)
-      C[k][l] += H[k][l];
 }
 
 /* With lambda < 0 the energy would fall without bound as J falls to zero. */
@@ -128,7 +94,7 @@ const SbMaterialType SbMaterialNeoHookean = {
           .energy = energy_neohookean,
           .stress = stress_neohookean,
           .tangent = tangent_neohookean,
-          .dilatation = dilatation_neohookean,
-          .dilatation_gradient = dilatation_gradient_neohookean,
-          .dilatation_hessian = dilatation_hessian_neohookean},
+          .dilatation = SbLogVolume,
+          .dilatation_gradient = SbLogVolumeGradient,
+          .dilatation_hessian = SbLogVolumeHessian},
 };
