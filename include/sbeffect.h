@@ -85,7 +85,8 @@ typedef struct {
   SbEffectOps ops;
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
-  SbEffectPointForce, SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping;
+  SbEffectPointForce, SbEffectFoundation, SbEffectFixed, SbEffectPrescribedDisplacement,
+  SbEffectDamping;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];
@@ -102,6 +103,7 @@ struct _p_SbEffect {
     until; /* s (or load factor): it acts at times t with from < t <= until; all by default */
   PetscBool dynamic;      /* the run has inertia; known from set-up on */
   PetscBool no_potential; /* its force depends on the path: its work on a closed one is not zero */
+  PetscBool holds;        /* its springs may hold a body that nothing else holds */
   PetscBool prescribed;   /* it prescribes the nodes of its sets in all directions */
   PetscInt nstate;        /* numbers in a record of save() */
   PetscBool by_node;      /* the first of them is a node's original number. Default PETSC_FALSE */

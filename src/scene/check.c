@@ -130,7 +130,7 @@ static PetscErrorCode check_stability(SbModel model, const SbMaterial material, 
   char text[512] = "";
 
   PetscFunctionBeginUser;
-  if (!material->type->own_moduli)
+  if (!material->type->own_moduli && !material->type->limited)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int mode = 0; mode < 3; mode++) {
     for (int tension = 0; tension < 2; tension++) {
@@ -186,7 +186,7 @@ PetscErrorCode SbSceneCheck(SbModel model)
     PetscCall(check_materials(model, i));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained =
-      (PetscBool)(model->effect[e]->ops.prescribe ||
+      (PetscBool)(model->effect[e]->ops.prescribe || model->effect[e]->holds ||
                   (SbEffectHasPotential(model->effect[e]) && model->effect[e]->contact->springs));
   for (PetscInt i = 0; i < model->nbody; i++) {
     if (strncmp(model->body[i].mesh, "box:", 4))
@@ -199,7 +199,7 @@ PetscErrorCode SbSceneCheck(SbModel model)
   PetscCheck(
     constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
     "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
-    "type fixed or prescribed_displacement");
+    "type fixed, prescribed_displacement or foundation");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,15 +8,10 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {&SbEffectGravity,
-                                                &SbEffectBodyForce,
-                                                &SbEffectTraction,
-                                                &SbEffectPressure,
-                                                &SbEffectPointForce,
-                                                &SbEffectFixed,
-                                                &SbEffectPrescribedDisplacement,
-                                                &SbEffectDamping,
-                                                &SbEffectContact};
+  static const SbEffectType *const effects[] = {
+    &SbEffectGravity,    &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
+    &SbEffectFoundation, &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
+    &SbEffectDamping,    &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;

@@ -52,6 +52,7 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectTraction));
   PetscCall(SbEffectRegister(&SbEffectPressure));
   PetscCall(SbEffectRegister(&SbEffectPointForce));
+  PetscCall(SbEffectRegister(&SbEffectFoundation));
   PetscCall(SbEffectRegister(&SbEffectFixed));
   PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
   PetscCall(SbEffectRegister(&SbEffectDamping));
