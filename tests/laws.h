@@ -95,6 +95,12 @@ static inline const char *law_moduli(const char *law, const char *name, double E
   return text;
 }
 
+/* Whether a law does not split shape from volume and is unstable near nu = 1/2: lambda > 2 mu. */
+static inline PetscBool law_is_compressible(const char *law)
+{
+  return (PetscBool)!strcmp(law, "holmes_mow");
+}
+
 /* SbMaterialCreateElastic() for any law. The caller destroys the material. Not collective. */
 static inline PetscErrorCode law_create(const char *law, PetscReal E, PetscReal nu,
                                         PetscReal density, SbMaterial *m)

@@ -131,6 +131,9 @@ int main(int argc, char *argv[])
   PetscCall(PetscRandomSeed(random));
   n = SbMaterialTypes(laws);
   for (PetscInt i = 0; i < n; i++) {
+    /* its energy of the shape depends on lambda */
+    if (law_is_compressible(laws[i]))
+      continue;
     PetscCall(test_energy(laws[i], random));
     PetscCall(test_small(laws[i], random));
   }
