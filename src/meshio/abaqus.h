@@ -73,8 +73,9 @@ PetscErrorCode SbAbaqusReals(SbAbaqus *a, const char *what, int n, PetscReal x[]
 /* Finds or creates the set of this name, of the current part or instance. */
 PetscErrorCode SbAbaqusSet(SbAbaqus *a, PetscBool of_nodes, const char *name, PetscInt *set);
 
-/* abaqus_include.c: puts the files that the one in im->scan refers to into its text */
-PetscErrorCode SbAbaqusExpand(SbImport *import, const char *path);
+/* The file that a keyword line refers to: *INCLUDE, or the data of *NODE and *ELEMENT with INPUT,
+   which follow it. A relative name counts from the folder of the first file. */
+PetscErrorCode SbAbaqusIncluded(SbScan *scan, const char *line, SbIncludeFile *file);
 
 /* abaqus_generate.c: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY; known false: another keyword */
 PetscErrorCode SbAbaqusGenerate(SbAbaqus *a, PetscBool *known);

@@ -147,3 +147,39 @@ PetscErrorCode SbAbaqusSet(SbAbaqus *a, PetscBool of_nodes, const char *name, Pe
   PetscCall(SbAbaqusPrefixedSet(a, of_nodes, a->prefix, name, set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbAbaqusIncluded(SbScan *s, const char *line, SbIncludeFile *file)
+{
+  const size_t word = *line == '*' ? strcspn(line, ", \t\r\n") : 0;
+  const char *p = line;
+  const char *end = file->end;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  file->whole = (PetscBool)(word == 8 && !strncasecmp(line, "*INCLUDE", 8));
+  if (!file->whole && !(word == 5 && !strncasecmp(line, "*NODE", 5)) &&
+      !(word == 8 && !strncasecmp(line, "*ELEMENT", 8)))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  while ((p = (const char *)memchr(p, ',', (size_t)(end - p))) != NULL) {
+    size_t n = 0;
+
+    for (p++; p < end && isspace((unsigned char)*p); p++)
+      continue;
+    if (end - p < 6 || strncasecmp(p, "INPUT", 5) != 0)
+      continue;
+    for (p += 5; p < end && isspace((unsigned char)*p); p++)
+      continue;
+    if (p >= end || *p != '=')
+      continue;
+    for (p++; p < end && isspace((unsigned char)*p); p++)
+      continue;
+    for (; p < end && *p != ',' && n + 1 < sizeof(file->name); p++)
+      if (*p != '"')
+        file->name[n++] = *p;
+    while (n && isspace((unsigned char)file->name[n - 1]))
+      n--;
+    file->name[n] = 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -711,7 +711,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  PetscCall(SbAbaqusExpand(im, path));
+  PetscCall(SbImportExpand(im, path, PETSC_FALSE, SbAbaqusIncluded));
   a.instances = has_instances(s);
   PetscCall(begin_model(&a));
   do {

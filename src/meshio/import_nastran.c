@@ -11,9 +11,9 @@
   Read: GRID, solid, shell and line elements with their property, SPC, SPC1 and SET1 as sets of
   nodes. Property N is the group volume_N, surface_N or curve_N, or has its name from a comment
   (ANSA, HyperMesh, Femap, Patran). Lines before BEGIN BULK and after ENDDATA, and other entries,
-  are skipped. Points in rectangular, cylindrical and spherical systems (CORD1, CORD2) become those
-  of the basic one, once all systems and points are known. Errors: INCLUDE, replication (=), points
-  on curves, superelements.
+  are skipped. INCLUDE is followed everywhere, from the folder of the file that has it. Points in
+  rectangular, cylindrical and spherical systems (CORD1, CORD2) become those of the basic one, once
+  all systems and points are known. Errors: replication (=), points on curves, superelements.
 
   Elements may precede their points: everything is collected first and converted at the end.
 */
@@ -726,8 +726,6 @@ static PetscErrorCode read_entry(Nastran *b)
     PetscCall(read_list(b, "spc", 1));
   if (!strcasecmp(name, "SET1"))
     PetscCall(read_list(b, "set", 0));
-  if (!strncasecmp(name, "INCLUDE", 7))
-    SB_SCAN_ERROR(b->scan, "INCLUDE is not followed; put all into one file");
   for (int k = 0; k < (int)PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
     if (!strcasecmp(name, kinds[k].name))
       PetscCall(read_element(b, k));
@@ -739,6 +737,54 @@ static PetscErrorCode read_entry(Nastran *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* INCLUDE 'file', in quotes of either kind, of which the name may go on in the next lines, or
+   without. */
+static PetscErrorCode included(SbScan *s, const char *line, SbIncludeFile *file)
+{
+  const char *p = line + strspn(line, " \t");
+  char quote = 0;
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  file->stop = (PetscBool)!strncasecmp(p, "ENDDATA", 7);
+  if (strncasecmp(p, "INCLUDE", 7) != 0 || !strchr(" \t\r\n,='\"", p[7]))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  file->whole = PETSC_TRUE;
+  p += 7;
+  p += strspn(p, " \t");
+  p += *p == ',' || *p == '=';
+  p += strspn(p, " \t");
+  if (*p == '\'' || *p == '"')
+    quote = *p++;
+
+  // blanks at the beginning and end of each of its lines do not count
+  for (const char *word = p; p < s->end && *p != quote; p++) {
+    if (*p == '\n' || (!quote && *p == '$')) {
+      while (n && isspace((unsigned char)file->name[n - 1]))
+        n--;
+      if (!quote)
+        break;
+      word = p + 1;
+    } else if (p > word || !isspace((unsigned char)*p)) {
+      if (n + 1 >= sizeof(file->name) || !*p)
+        SB_SCAN_ERROR(s, "the name of the file after INCLUDE has no end within %zu characters",
+                      sizeof(file->name) - 1);
+      file->name[n++] = *p;
+    } else
+      word = p + 1;
+  }
+  if (quote && p >= s->end)
+    SB_SCAN_ERROR(s, "the name of the file after INCLUDE begins with %c and does not end", quote);
+  while (n && isspace((unsigned char)file->name[n - 1]))
+    n--;
+  file->name[n] = 0;
+  if (!n)
+    SB_SCAN_ERROR(s, "INCLUDE names no file");
+  p = p < s->end ? (const char *)memchr(p, '\n', (size_t)(s->end - p)) : NULL;
+  file->end = p ? p + 1 : s->end;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 {
   Nastran b = {.scan = &im->scan,
@@ -746,6 +792,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, b.scan));
+  PetscCall(SbImportExpand(im, path, PETSC_TRUE, included));
 
   // after the line BEGIN BULK, or from the start of a file without that line
   for (const char *p = b.scan->data, *end; p; p = end ? end + 1 : NULL) {
@@ -762,6 +809,15 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
     if (!b.nfield.n || !strncasecmp(b.field[0].word, "ENDDATA", 7))
       break;
     PetscCall(read_entry(&b));
+  }
+
+  // an included file that ends all of them was meant to stand alone
+  if (b.nfield.n && SbScanWhere(b.scan) != im->where) {
+    char word[WORD];
+
+    if (peek(&b, word))
+      SB_SCAN_ERROR(b.scan, "ENDDATA ends the file that includes this one, too, whose lines after "
+                            "INCLUDE would be lost; take it out");
   }
   if (!im->nvert) {
     b.scan->token = b.scan->end;

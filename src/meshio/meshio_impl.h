@@ -192,6 +192,28 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
    one. */
 PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im);
 
+/* include.c: files that are a part of another one. What a line says of that: */
+typedef struct {
+  char name[PETSC_MAX_PATH_LEN]; /* of the file; "": it names none */
+  PetscBool whole;               /* the text of the file replaces the line, else follows it */
+  PetscBool stop;                /* the lines after this one name no files */
+  const char *end;               /* behind the line, or the lines that a name needs */
+} SbIncludeFile;
+typedef PetscErrorCode (*SbIncludeLine)(SbScan *scan, const char *line, SbIncludeFile *file);
+/*
+  SbImportExpand - puts the files that the one in import->scan refers to into its text.
+
+  Not collective; rank 0. Input: path of that file; nested, whether a relative name counts from the
+  folder of the file that has it, and then of the first one, else always of the first one; line,
+  which gets every line. Errors: files within themselves, too many, or that cannot be opened.
+*/
+PetscErrorCode SbImportExpand(SbImport *import, const char *path, PetscBool nested,
+                              SbIncludeLine line);
+/* Path of a file that another one in `folder` ("" or with a slash at its end) names; scratch. */
+PetscErrorCode SbImportBeside(SbImport *import, const char *folder, const char *name, char **path);
+/* Folder of a file, "" or with a slash at its end; scratch. */
+PetscErrorCode SbImportFolder(SbImport *import, const char *path, char **folder);
+
 /* write_gmsh.c, write_h5.c: one file */
 extern const char
   *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */

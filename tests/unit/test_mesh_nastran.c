@@ -1,6 +1,7 @@
 // Nastran bulk data: continuations by their mark, coordinate systems of points, entries that change
 // nodes or elements.
 // @ranks 1
+#include <sys/stat.h>
 #include "mesh_test.h"
 #include "../file.h"
 
@@ -129,11 +130,85 @@ static PetscErrorCode test_refused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mesh in several files and folders; messages name the one that is wrong, and its line. */
+static PetscErrorCode test_include(void)
+{
+  static const char *const files[][2] = {
+    {"main.bdf", "SOL 101\n$ INCLUDE 'not.bdf'\nINCLUDE 'case.txt'\nBEGIN BULK\n"
+                 "include 'sub/\n   mesh.bdf  ' $ in two lines\nSPC1,1,123,1,2\nENDDATA\n"
+                 "INCLUDE 'behind.bdf'\n"},
+    {"case.txt", "SUBCASE 1\n"},
+    {"sub/mesh.bdf",
+     "INCLUDE nodes.bdf $ beside this one\nCTETRA,1,7,1,2,3,4\nINCLUDE \"set.bdf\"\n"
+     "INCLUDE '..\\case.bdf'\n"},
+    {"sub/nodes.bdf", GRIDS},
+    {"set.bdf", "SET1,5,1,2,3"}, /* not there beside mesh.bdf */
+    {"case.bdf", "$ Femap Property 7 : liver\n"},
+    {"wrong.bdf", GRIDS "INCLUDE\n 'wrong.inc'\n"},
+    {"deep.bdf", GRIDS "INCLUDE 'wrong.inc'\nCTETRA,1,7,1,2,3,4\n"},
+    {"wrong.inc", "$\nGRID,9,,1.,one,1.\n"},
+    {"after.bdf", "INCLUDE 'three.inc'\n" GRIDS "CTETRA,1,7,1,2,3,9\n"},
+    {"three.inc", "$\n$\n$\n"},
+    {"two.bdf", "$\nINCLUDE 'thr\nee.inc'\n" GRIDS "CTETRA,1,7,1,2,3,9\n"},
+    {"loop.bdf", "INCLUDE 'sub/loop.inc'\n"},
+    {"sub/loop.inc", "$\nINCLUDE '../sub/../loop.bdf'\n"},
+    {"none.bdf", GRIDS "INCLUDE 'none.inc'\n"},
+    {"open.bdf", GRIDS "INCLUDE 'none.inc\n"},
+    {"ends.bdf", "INCLUDE 'ends.inc'\nCTETRA,1,7,1,2,3,4\n"},
+    {"ends.inc", GRIDS "ENDDATA\n"},
+    {"0.bdf", "INCLUDE '1.bdf'\n"},
+    {"1.bdf", "INCLUDE '2.bdf'\n"},
+    {"2.bdf", "INCLUDE '3.bdf'\n"},
+    {"3.bdf", "INCLUDE '4.bdf'\n"},
+    {"4.bdf", "INCLUDE '5.bdf'\n"},
+    {"5.bdf", "INCLUDE '6.bdf'\n"},
+    {"6.bdf", "INCLUDE '7.bdf'\n"},
+    {"7.bdf", "INCLUDE '8.bdf'\n"},
+    {"8.bdf", "INCLUDE '9.bdf'\n"},
+    {"9.bdf", "$\nINCLUDE '10.bdf'\n"},
+    {"10.bdf", GRIDS},
+  };
+  static const struct {
+    const char *name, *words;
+    PetscErrorCode code;
+  } bad[] = {{"wrong.bdf", "wrong.bdf|line 5|INCLUDE", PETSC_ERR_FILE_UNEXPECTED},
+             {"deep.bdf", "wrong.inc line 2|'one'", PETSC_ERR_FILE_UNEXPECTED},
+             {"after.bdf", "after.bdf line 6|node 9", PETSC_ERR_FILE_UNEXPECTED},
+             {"two.bdf", "two.bdf line 8|node 9", PETSC_ERR_FILE_UNEXPECTED},
+             {"loop.bdf", "loop.inc line 2|itself", PETSC_ERR_FILE_UNEXPECTED},
+             {"none.bdf", "none.inc", PETSC_ERR_FILE_OPEN},
+             {"open.bdf", "open.bdf|line 5|does not end", PETSC_ERR_FILE_UNEXPECTED},
+             {"ends.bdf", "ends.inc line 5|ENDDATA", PETSC_ERR_FILE_UNEXPECTED},
+             {"0.bdf", "9.bdf line 2|10", PETSC_ERR_FILE_UNEXPECTED}};
+  char path[600];
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/sub", folder);
+  SB_CHECK(!mkdir(path, 0700), "no folder %s", path);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(files); k++) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, files[k][0]);
+    PetscCall(test_file_put(path, files[k][1]));
+  }
+  (void)snprintf(path, sizeof(path), "%s/main.bdf", folder);
+  PetscCall(test_import(path, &im));
+  SB_CHECK(im.nvert == 4 && test_count(&im, 3, "liver") == 1 && test_count(&im, 0, "spc_1") == 2 &&
+             test_count(&im, 0, "set_5") == 3,
+           "%d nodes, %d tets", (int)im.nvert, (int)im.item[3].n);
+  PetscCall(SbImportDestroy(&im));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(bad); k++) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, bad[k].name);
+    SB_CHECK_ERROR(test_mesh_use(path), bad[k].code, bad[k].words);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(folder));
   PetscCall(test_read());
   PetscCall(test_refused());
+  PetscCall(test_include());
   SB_TEST_END();
 }
