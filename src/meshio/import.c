@@ -103,7 +103,7 @@ static const struct {
   {".med", SbImportRead_MED},       {".exo", SbImportRead_Exodus},
   {".e", SbImportRead_Exodus},      {".ex2", SbImportRead_Exodus},
   {".g", SbImportRead_Exodus},      {".gen", SbImportRead_Exodus},
-  {".cgns", SbImportRead_CGNS},
+  {".cgns", SbImportRead_CGNS},     {".pvtu", SbImportRead_VTU},
 };
 
 /* What the first lines of a file say of its format, whatever its name: the reader, or none. */
@@ -116,6 +116,7 @@ static const struct {
   {"$NOD", "gmsh", PETSC_FALSE, SbImportRead_Gmsh},
   {"# vtk DataFile", "VTK (legacy)", PETSC_FALSE, SbImportRead_VTK},
   {"type=\"UnstructuredGrid\"", "VTK (XML)", PETSC_TRUE, SbImportRead_VTU},
+  {"type=\"PUnstructuredGrid\"", "VTK (XML)", PETSC_TRUE, SbImportRead_VTU},
   {"MeshVersionFormatted", "Medit", PETSC_FALSE, SbImportRead_Medit},
   {"mesh3d", "Netgen", PETSC_FALSE, SbImportRead_Netgen},
   {"\x89HDF\r\n", "HDF5", PETSC_FALSE, SbImportRead_H5},

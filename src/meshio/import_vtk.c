@@ -203,6 +203,9 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
 
     PetscCall(read_array(v, "data of cells", 3 * ntuple, type, &value));
     PetscCall(SbImportKeep(v->im, (PetscInt)ntuple, NULL, 0, value));
+  } else if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && SbVtkIsGhost(name)) {
+    PetscCall(read_array(v, "data of cells", ntuple, type, &grid->ghost));
+    SbVtkGhostMarks(name, grid->ncell, grid->ghost);
   } else if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell &&
              grid->narray < SB_VTK_ARRAYS) {
     const int a = grid->narray++;

@@ -1,6 +1,6 @@
 /*
-  import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file
-  formats").
+  import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu, and of the files that list
+  several of them, .pvtu (VTK User's Guide, "XML file formats").
 
   Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw
   bytes or base64. A binary array begins with its length or, if compressed by zlib, with the number
@@ -8,9 +8,11 @@
   separately.
 
   Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.c.
-  Several pieces are one grid, cut by the program that wrote it: points of different pieces at the
-  same position are one, and arrays are kept that all pieces have. Errors: ghost cells, which are in
-  two pieces; other compressors, volume cells other than 4- and 10-node tets.
+  Several pieces, in one file or listed, are one grid, cut by the program that wrote it: points of
+  different pieces are one where they have the same global number (PointData GlobalIds,
+  GlobalNodeId, GlobalPointIds), or, where not all pieces have such numbers, the same position to
+  the last bit; points of one piece stay apart. Arrays are kept that all pieces have. Errors: other
+  compressors, volume cells other than 4- and 10-node tets.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -27,10 +29,22 @@ typedef struct {
   const char *open, *close;
 } Tag;
 
+/* A piece: its points, of which each may have a number, and its cells. */
+typedef struct {
+  SbVtkGrid grid;
+  int64_t npoint;
+  double *x;      /* [npoint][3] */
+  double *global; /* [npoint], or NULL */
+  double *vector; /* [ncell][3] the array that SbImportWants(), or NULL */
+} Piece;
+
 typedef struct {
   SbScan *scan;
   SbImport *im;
-  SbVtkGrid grid;
+  Piece all;         /* the pieces so far */
+  SbCount npiece;    /* pieces with points or cells */
+  int64_t *start;    /* [npiece] first point of each */
+  int64_t ndeclared; /* pieces, empty ones too */
   PetscBool big_endian, zlib;
   int header;              /* bytes of a length field: 4 or 8 */
   const char *xml_end;     /* end of the XML part */
@@ -324,7 +338,8 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends n numbers to an array of `have` ones, of indices (or ends) that `base` comes before. */
+/* Appends n numbers, + base, to an array of `have` ones; NULL when it is not there, in one of
+   both. */
 static PetscErrorCode append(Vtu *v, int64_t have, int64_t n, const double from[], double base,
                              double **to)
 {
@@ -344,10 +359,45 @@ static int find_array(const SbVtkGrid *grid, const char *name)
   return -1;
 }
 
-/* Reads the piece v->piece into a grid of its own, with its points. */
-static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, double **x)
+/* Numbers of the points of the piece that no other point of the whole grid has, if it says so. */
+static PetscErrorCode read_global(Vtu *v, Piece *one)
+{
+  static const char *const names[] = {"GlobalNodeId", "GlobalPointIds", "GlobalIds"};
+  char wanted[64], found[64];
+  Tag tag;
+  const char *from, *end;
+
+  PetscFunctionBeginUser;
+  if (!find_element(v->piece.open, v->piece.close, "PointData", &tag) || tag.close[-2] == '/')
+    PetscFunctionReturn(PETSC_SUCCESS);
+  attribute(tag, "GlobalIds", sizeof(wanted), wanted);
+  PetscCall(content(v, "PointData", &from, &end));
+  for (; find_element(from, end, "DataArray", &tag) && !one->global; from = tag.close) {
+    PetscBool take;
+
+    attribute(tag, "Name", sizeof(found), found);
+    take = (PetscBool)(found[0] && !strcmp(found, wanted));
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(names) && !wanted[0]; k++)
+      take = (PetscBool)(take || !strcmp(found, names[k]));
+    if (!take)
+      continue;
+    PetscCall(read_array(v, tag, one->npoint, &one->global));
+    for (int64_t i = 0; i < one->npoint; i++) {
+      v->scan->token = tag.open;
+      if (!(fabs(one->global[i]) < 1e15) || one->global[i] != PetscFloorReal(one->global[i]))
+        SB_SCAN_ERROR(v->scan, "the array '%s' of the points has %g, which is no number of a point",
+                      found, one->global[i]);
+      one->global[i] += 0.; // no -0
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the piece v->piece; an empty one is not looked at. */
+static PetscErrorCode read_piece(Vtu *v, Piece *one)
 {
   SbScan *s = v->scan;
+  SbVtkGrid *grid = &one->grid;
   const Tag piece = v->piece;
   Tag tag;
   const char *from, *end;
@@ -357,11 +407,13 @@ static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, doubl
   char value[64], found[64];
 
   PetscFunctionBeginUser;
-  PetscCall(attribute_number(v, piece, "NumberOfPoints", npoint));
+  PetscCall(attribute_number(v, piece, "NumberOfPoints", &one->npoint));
   PetscCall(attribute_number(v, piece, "NumberOfCells", &ncell));
-  if (*npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
+  if (one->npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
     SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number",
-                  (long long)*npoint, (long long)ncell);
+                  (long long)one->npoint, (long long)ncell);
+  if (!one->npoint && !ncell)
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   // the only array of the element Points
   PetscCall(content(v, "Points", &from, &end));
@@ -371,7 +423,8 @@ static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, doubl
   PetscCall(attribute_number(v, tag, "NumberOfComponents", &ncomponent));
   if (ncomponent != 3)
     SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
-  PetscCall(read_array(v, tag, 3 * *npoint, x));
+  PetscCall(read_array(v, tag, 3 * one->npoint, &one->x));
+  PetscCall(read_global(v, one));
 
   // cell types, end offsets of cells, then the connectivity
   grid->ncell = (PetscInt)ncell;
@@ -388,155 +441,224 @@ static PetscErrorCode read_piece(Vtu *v, SbVtkGrid *grid, int64_t *npoint, doubl
   // cell data with one number per cell; other arrays are skipped
   if (find_element(piece.open, piece.close, "CellData", &tag) && tag.close[-2] != '/') {
     PetscCall(content(v, "CellData", &from, &end));
-    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS;
-         from = tag.close) {
+    for (; find_element(from, end, "DataArray", &tag); from = tag.close) {
       const int a = grid->narray;
 
       attribute(tag, "NumberOfComponents", sizeof(value), value);
       attribute(tag, "Name", sizeof(found), found);
-      if (!strcmp(value, "3") && SbImportWants(v->im, found)) {
-        double *vector = NULL;
-
-        PetscCall(read_array(v, tag, 3 * grid->ncell, &vector));
-        PetscCall(SbImportKeep(v->im, (PetscInt)grid->ncell, NULL, 0, vector));
-      }
-      if (value[0] && strcmp(value, "1") != 0)
+      if (!strcmp(value, "3") && SbImportWants(v->im, found))
+        PetscCall(read_array(v, tag, 3 * ncell, &one->vector));
+      if ((value[0] && strcmp(value, "1") != 0) || !strcmp(found, "GlobalCellIds") ||
+          !strcmp(found, "GlobalElementId"))
         continue;
       attribute(tag, "type", sizeof(value), value);
-      if (!strcmp(value, "String") || !strcmp(value, "Bit")) {
-        attribute(tag, "Name", sizeof(found), found);
+      if (!strcmp(value, "String") || !strcmp(value, "Bit"))
         PetscCall(SbImportSkip(v->im, "array %.32s of type %.8s", found, value));
-        continue;
+      else if (SbVtkIsGhost(found)) {
+        PetscCall(read_array(v, tag, ncell, &grid->ghost));
+        SbVtkGhostMarks(found, grid->ncell, grid->ghost);
+      } else if (a < SB_VTK_ARRAYS) {
+        grid->narray++;
+        attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
+        PetscCall(read_array(v, tag, ncell, &grid->array[a].value));
       }
-      grid->narray++;
-      attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
-      PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points of different pieces at the same position become one: x[n][3], and the indices in
-   `connect`. */
-static PetscErrorCode join_points(Vtu *v, int64_t *n, double x[])
+/* Appends a piece to those before: indices go on behind their points, arrays only where all have
+   them. */
+static PetscErrorCode append_piece(Vtu *v, Piece *one)
 {
-  PetscInt *map, *at;
-  PetscReal *y;
-  PetscInt kept = 0;
+  Piece *all = &v->all;
+  SbVtkGrid *grid = &all->grid;
+  const SbVtkGrid *its = &one->grid;
+  const double shift = (double)all->npoint;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(*n, &map, *n, &at, 3 * *n, &y));
-  for (int64_t i = 0; i < 3 * *n; i++)
-    y[i] = x[i];
-  PetscCall(SbWeld((PetscInt)*n, y, 0., PETSC_TRUE, map));
-  for (PetscInt i = 0; i < *n; i++) {
-    if (map[i] == i) {
-      for (int k = 0; k < 3; k++)
-        x[3 * kept + k] = x[3 * i + k];
-      at[i] = kept++;
-    } else
-      at[i] = at[map[i]];
+  PetscCall(SbImportGrow(v->im, &v->npiece, sizeof(*v->start), &v->start));
+  v->start[v->npiece.n - 1] = all->npoint;
+  if (v->npiece.n == 1) {
+    *all = *one;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (int64_t i = 0; i < v->grid.nconnect; i++) {
-    const double point = v->grid.connect[i];
+  if (all->npoint + one->npoint > PETSC_MAX_INT / 8 || grid->ncell + its->ncell > PETSC_MAX_INT / 8)
+    SB_SCAN_ERROR(v->scan, "%lld points are more than this build can number",
+                  (long long)(all->npoint + one->npoint));
+  for (int64_t i = 0; i < its->nconnect; i++)
+    if (!(its->connect[i] >= 0 && its->connect[i] < (double)one->npoint))
+      SB_SCAN_ERROR(v->scan, "a cell uses point %g; the points of the piece are 0 to %lld",
+                    its->connect[i], (long long)one->npoint - 1);
+  PetscCall(append(v, 3 * all->npoint, 3 * one->npoint, one->x, 0., &all->x));
+  PetscCall(append(v, grid->nconnect, its->nconnect, its->connect, shift, &grid->connect));
+  PetscCall(append(v, grid->ncell, its->ncell, its->end, (double)grid->nconnect, &grid->end));
+  PetscCall(append(v, grid->ncell, its->ncell, its->type, 0., &grid->type));
 
-    if (point >= 0 && point < (double)*n && point == PetscFloorReal(point))
-      v->grid.connect[i] = (double)at[(PetscInt)point];
+  // numbers of points, and marks of ghost cells, which a piece without them does not have
+  if (one->global && all->global)
+    PetscCall(append(v, all->npoint, one->npoint, one->global, 0., &all->global));
+  else
+    all->global = NULL;
+  if (one->vector && all->vector)
+    PetscCall(
+      append(v, 3 * (int64_t)grid->ncell, 3 * (int64_t)its->ncell, one->vector, 0., &all->vector));
+  else
+    all->vector = NULL;
+  if (one->grid.ghost || grid->ghost) {
+    double *none = NULL;
+
+    PetscCall(
+      SbImportScratch(v->im, (size_t)PetscMax(grid->ncell, its->ncell) * sizeof(*none), &none));
+    for (PetscInt c = 0; c < PetscMax(grid->ncell, its->ncell); c++)
+      none[c] = 0;
+    if (!grid->ghost)
+      PetscCall(append(v, 0, grid->ncell, none, 0., &grid->ghost));
+    PetscCall(append(v, grid->ncell, its->ncell, its->ghost ? its->ghost : none, 0., &grid->ghost));
   }
-  *n = kept;
-  PetscCall(PetscFree3(map, at, y));
+  for (int a = 0; a < grid->narray; a++) {
+    const int from = find_array(its, grid->array[a].name);
+
+    if (from >= 0)
+      PetscCall(
+        append(v, grid->ncell, its->ncell, its->array[from].value, 0., &grid->array[a].value));
+    else {
+      PetscCall(SbImportSkip(v->im, "array %.32s, which not all pieces have", grid->array[a].name));
+      grid->array[a--] = grid->array[--grid->narray];
+    }
+  }
+  all->npoint += one->npoint;
+  grid->ncell += its->ncell;
+  grid->nconnect += its->nconnect;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads all pieces as one grid. */
-static PetscErrorCode read_pieces(Vtu *v, int64_t *npoint, double **x)
+/* A point and what it must have in common with another one, to be the same. */
+typedef struct {
+  double key[3];
+  PetscInt index, piece;
+} Point;
+
+static int compare_points(const void *a, const void *b)
+{
+  const Point *p = (const Point *)a;
+  const Point *q = (const Point *)b;
+
+  for (int k = 0; k < 3; k++)
+    if (p->key[k] != q->key[k])
+      return p->key[k] < q->key[k] ? -1 : 1;
+  return (p->index > q->index) - (p->index < q->index);
+}
+
+/* Whether points first..last, of one key, are the same; `size`: of the grid. */
+static PetscErrorCode check_same(Vtu *v, const Point *first, const Point *last, double size,
+                                 PetscBool *same)
 {
   SbScan *s = v->scan;
-  SbVtkGrid *grid = &v->grid;
-  PetscInt npiece = 0;
-  Tag tag, next;
+  const double *x = v->all.x;
+  const double *at = x + 3 * first->index;
 
   PetscFunctionBeginUser;
-  if (!find_element(s->data, v->xml_end, "Piece", &tag))
-    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
-  for (;; tag = next) {
-    SbVtkGrid one = {.ncell = 0};
-    const PetscBool more = find_element(tag.close, v->xml_end, "Piece", &next);
-    int64_t n;
-    double *y = NULL;
-
-    v->piece = (Tag){tag.open, more ? next.open : v->xml_end};
-    s->token = tag.close;
-    PetscCall(read_piece(v, &one, &n, &y));
-    if (!npiece++ && !more) {
-      *grid = one;
-      *npoint = n;
-      *x = y;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-
-    // a copy of a cell of another piece is marked by a number
-    for (int a = 0; a < one.narray; a++)
-      for (PetscInt c = 0; c < one.ncell && !strncmp(one.array[a].name, "vtkGhost", 8); c++)
-        if (one.array[a].value[c] != 0) {
-          s->token = tag.open;
-          SB_SCAN_ERROR(s,
-                        "piece %lld has ghost cells, which are in another piece, too; save the "
-                        "grid without them (ParaView: Merge Blocks, Clean to Grid)",
-                        (long long)npiece);
-        }
-
-    // appended to those before: indices go on behind their points, arrays only where all have them
-    if (*npoint + n > PETSC_MAX_INT / 8 || grid->ncell + one.ncell > PETSC_MAX_INT / 8)
-      SB_SCAN_ERROR(s, "%lld points are more than this build can number", (long long)(*npoint + n));
-    PetscCall(append(v, 3 * *npoint, 3 * n, y, 0., x));
-    PetscCall(
-      append(v, grid->nconnect, one.nconnect, one.connect, (double)*npoint, &grid->connect));
-    PetscCall(append(v, grid->ncell, one.ncell, one.end, (double)grid->nconnect, &grid->end));
-    PetscCall(append(v, grid->ncell, one.ncell, one.type, 0., &grid->type));
-    for (int a = 0; a < (npiece == 1 ? one.narray : grid->narray); a++) {
-      const int from = npiece == 1 ? a : find_array(&one, grid->array[a].name);
-
-      if (npiece == 1) {
-        grid->array[a] = one.array[a];
-        grid->narray = a + 1;
-      } else if (from >= 0)
-        PetscCall(
-          append(v, grid->ncell, one.ncell, one.array[from].value, 0., &grid->array[a].value));
-      else {
-        PetscCall(
-          SbImportSkip(v->im, "array %.32s, which not all pieces have", grid->array[a].name));
-        grid->array[a--] = grid->array[--grid->narray];
-      }
-    }
-    *npoint += n;
-    grid->ncell += one.ncell;
-    grid->nconnect += one.nconnect;
-    if (!more)
-      break;
+  *same = (PetscBool)(first->piece != last->piece);
+  for (const Point *p = first + 1; p <= last; p++) {
+    if (p->piece == p[-1].piece && v->all.global)
+      SB_SCAN_ERROR(s,
+                    "piece %lld has two points of the global number %.0f; save the grid without "
+                    "these numbers, or as one piece",
+                    (long long)p->piece + 1, p->key[0]);
+    if (p->piece == p[-1].piece && *same)
+      SB_SCAN_ERROR(s,
+                    "piece %lld has two points at (%g, %g, %g), where a point of piece %lld is, "
+                    "too: which of them is the same is not known; save the grid with GlobalNodeId, "
+                    "or as one piece",
+                    (long long)p->piece + 1, at[0], at[1], at[2],
+                    (long long)(p->piece == first->piece ? last : first)->piece + 1);
+    for (int k = 0; k < 3; k++)
+      if (!(fabs(x[3 * p->index + k] - at[k]) <= 1e-6 * size))
+        SB_SCAN_ERROR(s,
+                      "the point of global number %.0f is at (%g, %g, %g) in piece %lld, and at "
+                      "(%g, %g, %g) in piece %lld",
+                      p->key[0], at[0], at[1], at[2], (long long)first->piece + 1, x[3 * p->index],
+                      x[3 * p->index + 1], x[3 * p->index + 2], (long long)p->piece + 1);
   }
-
-  PetscCall(join_points(v, npoint, *x));
-  SbImportRemark(v->im, "%lld pieces, joined where their points are at the same positions",
-                 (long long)npiece);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
+/* Points that are in several pieces become one, and `connect` follows them. */
+static PetscErrorCode join_points(Vtu *v, PetscInt *njoined)
 {
-  SbScan *s = &im->scan;
-  Vtu vtu = {.scan = s, .im = im};
-  Vtu *v = &vtu;
+  Piece *all = &v->all;
+  const PetscInt n = (PetscInt)all->npoint;
+  Point *point = NULL;
+  PetscInt *at = NULL;
+  PetscInt piece = 0;
+  PetscInt kept = 0;
+  double size = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(*point), &point));
+  PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(*at), &at));
+  for (PetscInt i = 0; i < n; i++) {
+    while (piece + 1 < v->npiece.n && i >= v->start[piece + 1])
+      piece++;
+    point[i] = (Point){.index = i, .piece = piece};
+    for (int k = 0; k < 3; k++) {
+      const double x = all->x[3 * i + k];
+
+      if (!isfinite(x))
+        SB_SCAN_ERROR(v->scan,
+                      "coordinate of point %lld of piece %lld is not a finite number; repair the "
+                      "file",
+                      (long long)(i - v->start[piece]), (long long)piece + 1);
+      point[i].key[k] = all->global ? 0 : x + 0.; // no -0
+      size = PetscMax(size, fabs(x - all->x[k]));
+    }
+    if (all->global)
+      point[i].key[0] = all->global[i];
+    at[i] = i;
+  }
+  qsort(point, (size_t)n, sizeof(*point), compare_points);
+  for (PetscInt i = 0, j; i < n; i = j + 1) {
+    PetscBool same;
+
+    for (j = i; j + 1 < n && !memcmp(point[j + 1].key, point[i].key, sizeof(point->key)); j++)
+      continue;
+    PetscCall(check_same(v, &point[i], &point[j], size, &same));
+    for (PetscInt k = i; same && k <= j; k++)
+      at[point[k].index] = point[i].index;
+  }
+
+  // the first of those that are the same is kept
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt same = at[i];
+
+    at[i] = same == i ? kept++ : at[same];
+    for (int k = 0; k < 3 && same == i; k++)
+      all->x[3 * at[i] + k] = all->x[3 * i + k];
+  }
+  for (int64_t i = 0; i < all->grid.nconnect; i++) {
+    const double p = all->grid.connect[i];
+
+    if (p >= 0 && p < (double)n && p == PetscFloorReal(p))
+      all->grid.connect[i] = (double)at[(PetscInt)p];
+  }
+  *njoined = n - kept;
+  all->npoint = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Finds the parts of the file v->scan, its type, byte order and compression. */
+static PetscErrorCode begin_file(Vtu *v, size_t size, char type[])
+{
+  SbScan *s = v->scan;
   Tag tag;
-  int64_t npoint = 0;
-  double *x = NULL;
   char value[64];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(im->where, path, s));
 
   // end of the XML part, beginning of the appended data
   v->xml_end = s->end;
+  v->appended = NULL;
   if (find_element(s->data, s->end, "AppendedData", &tag)) {
     v->xml_end = s->token = tag.open;
     attribute(tag, "encoding", sizeof(value), value);
@@ -547,14 +669,10 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
       SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
     v->appended++;
   }
-
-  // type, byte order and compression of the file
   if (!find_element(s->data, v->xml_end, "VTKFile", &tag))
     SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
   s->token = tag.open;
-  attribute(tag, "type", sizeof(value), value);
-  if (strcmp(value, "UnstructuredGrid"))
-    SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", value);
+  attribute(tag, "type", size, type);
   attribute(tag, "byte_order", sizeof(value), value);
   v->big_endian = (PetscBool)!strcmp(value, "BigEndian");
   attribute(tag, "header_type", sizeof(value), value);
@@ -567,9 +685,114 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
       "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
       "Save Data, Compressor Type)",
       value);
-  PetscCall(read_pieces(v, &npoint, &x));
-  PetscCall(SbVtkSetPoints((PetscInt)npoint, x, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads all pieces of the file v->scan. */
+static PetscErrorCode read_pieces(Vtu *v)
+{
+  SbScan *s = v->scan;
+  PetscBool more;
+  Tag tag, next;
+  char type[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_file(v, sizeof(type), type));
+  if (strcmp(type, "UnstructuredGrid") != 0)
+    SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", type);
+  if (!find_element(s->data, v->xml_end, "Piece", &tag))
+    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
+  do {
+    Piece one = {.npoint = 0};
+
+    more = find_element(tag.close, v->xml_end, "Piece", &next);
+    v->piece = (Tag){tag.open, more ? next.open : v->xml_end};
+    s->token = tag.close;
+    PetscCall(read_piece(v, &one));
+    v->ndeclared++;
+    if (one.npoint || one.grid.ncell)
+      PetscCall(append_piece(v, &one));
+    tag = next;
+  } while (more);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the files that a .pvtu, the file v->scan, lists. */
+static PetscErrorCode read_listed(Vtu *v, const char *path)
+{
+  SbScan *s = v->scan;
+  SbImport *im = v->im;
+  const char *from = s->data;
+  char *folder;
+  Tag tag;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportFolder(im, path, &folder));
+  for (; find_element(from, s->end, "Piece", &tag); from = tag.close) {
+    char source[PETSC_MAX_PATH_LEN];
+    char *file = NULL;
+    char *where = NULL;
+    SbScan other;
+    PetscErrorCode ierr;
+    size_t room;
+
+    s->token = tag.open;
+    attribute(tag, "Source", sizeof(source), source);
+    if (!source[0])
+      SB_SCAN_ERROR(s, "a Piece without Source=\"...\", the name of its file");
+    PetscCall(SbImportBeside(im, folder, source, &file));
+    room = sizeof(im->where) + strlen(file) + 4;
+    PetscCall(SbImportScratch(im, room, &where));
+    (void)snprintf(where, room, "%s: %s", im->where, file);
+    ierr = SbScanOpen(where, file, &other);
+    v->scan = &other;
+    if (!ierr)
+      ierr = read_pieces(v);
+    v->scan = s;
+    PetscCall(PetscFree(other.data));
+    PetscCall(ierr);
+  }
+  s->token = s->data;
+  if (!v->ndeclared)
+    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
+  v->cells_at = s->data;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
+{
+  SbScan *s = &im->scan;
+  Vtu vtu = {.scan = s, .im = im};
+  Vtu *v = &vtu;
+  PetscInt njoined = 0;
+  char type[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(im->where, path, s));
+  PetscCall(begin_file(v, sizeof(type), type));
+  if (!strcmp(type, "PUnstructuredGrid"))
+    PetscCall(read_listed(v, path));
+  else
+    PetscCall(read_pieces(v));
+  if (!v->npiece.n)
+    SB_SCAN_ERROR(s, "all pieces are empty; write the mesh again");
+  if (v->npiece.n > 1) {
+    s->token = s->data;
+    PetscCall(join_points(v, &njoined));
+  }
+  if (v->ndeclared > 1) {
+    char empty[64] = "";
+
+    if (v->ndeclared > v->npiece.n)
+      (void)snprintf(empty, sizeof(empty), " (%lld empty)", (long long)v->ndeclared - v->npiece.n);
+    SbImportRemark(im, "%lld pieces%s, %lld points of several pieces joined%s",
+                   (long long)v->ndeclared, empty, (long long)njoined,
+                   v->all.global ? " by their global numbers" : " where their positions are equal");
+  }
+  if (v->all.vector)
+    PetscCall(SbImportKeep(im, v->all.grid.ncell, NULL, 0, v->all.vector));
+  PetscCall(SbVtkSetPoints((PetscInt)v->all.npoint, v->all.x, im));
   s->token = v->cells_at;
-  PetscCall(SbVtkGridFill(&v->grid, im));
+  PetscCall(SbVtkGridFill(&v->all.grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

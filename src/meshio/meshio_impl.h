@@ -172,6 +172,7 @@ typedef struct {
   double *connect; /* [nconnect] points of the cells, from 0 */
   double *end;     /* [ncell] end of each cell in `connect` */
   double *type;    /* [ncell] VTK's cell type */
+  double *ghost;   /* [ncell] not 0: a copy of a cell of another piece, or hidden; or NULL */
   int narray;
   struct {
     char name[SB_NAME_MAX];
@@ -179,13 +180,20 @@ typedef struct {
   } array[SB_VTK_ARRAYS];
 } SbVtkGrid;
 
+/* Whether the array of this name marks ghost cells. */
+static inline PetscBool SbVtkIsGhost(const char *name)
+{
+  return (PetscBool)(!strcmp(name, "vtkGhostType") || !strcmp(name, "vtkGhostLevels"));
+}
+/* Makes such an array 1 for cells that are copies, refined elsewhere, or hidden, else 0. */
+void SbVtkGhostMarks(const char *name, PetscInt n, double mark[]);
 /*
   SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers
   become groups.
 
   The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, ...; or the only array)
-  gives the groups volume_N, surface_N, ...; another one NAME_volume_N, ... Errors of a cell name
-  import->scan.token.
+  gives the groups volume_N, surface_N, ...; another one NAME_volume_N, ... Ghost cells are left
+  out, and counted in the note. Errors of a cell name import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
 /* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid

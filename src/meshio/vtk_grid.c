@@ -36,6 +36,16 @@ PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbVtkGhostMarks(const char *name, PetscInt n, double mark[])
+{
+  /* bits of vtkDataSetAttributes::CellGhostTypes: DUPLICATECELL, REFINEDCELL, HIDDENCELL; a level
+     above 0 is a copy */
+  const unsigned left_out = strcmp(name, "vtkGhostType") ? ~0U : 1U | 8U | 32U;
+
+  for (PetscInt c = 0; c < n; c++)
+    mark[c] = mark[c] > 0 && mark[c] < 256 ? ((unsigned)mark[c] & left_out) != 0 : 0;
+}
+
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -46,6 +56,7 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   PetscInt tags;
   double *sorted;
   int regions = -1;
+  PetscInt nghost = 0;
   int type;
   int nuse = 0;
 
@@ -111,6 +122,12 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
         vert[SbGmshNode((int)k)] = (PetscInt)point;
     }
 
+    // a copy of a cell that is in another piece
+    if (grid->ghost && grid->ghost[c] != 0) {
+      nghost++;
+      continue;
+    }
+
     // a simplex, but not a polyline or several points, gets a group from each array in use
     tags = 0;
     if (SbGmshIsSimplex(type) && end - begin == SbGmshTypes[type].nnode) {
@@ -139,6 +156,8 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
     }
     PetscCall(SbImportAddElement(im, type, vert, tags, c));
   }
+  if (nghost)
+    SbImportRemark(im, "%lld ghost cells left out", (long long)nghost);
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

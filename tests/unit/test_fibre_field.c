@@ -122,7 +122,8 @@ static void fill_array(int what, PetscReal value[3 * TETS])
   }
 }
 
-static PetscErrorCode write_vtu(char path[512])
+/* In pieces of TETS / npiece tets, each with all points. */
+static PetscErrorCode write_vtu(int npiece, char path[512])
 {
   FILE *f;
 
@@ -130,15 +131,22 @@ static PetscErrorCode write_vtu(char path[512])
   PetscCall(test_file_open(".vtu", path, &f));
   if (f) {
     fprintf(f, "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" "
-               "byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"36\" "
-               "NumberOfCells=\"72\">\n<Points><DataArray type=\"Float64\" "
-               "NumberOfComponents=\"3\" format=\"ascii\">\n");
+               "byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n");
+  }
+  for (int piece = 0; f && piece < npiece; piece++) {
+    const PetscInt n = TETS / npiece;
+    const PetscInt first = piece * n;
+
+    fprintf(f,
+            "<Piece NumberOfPoints=\"36\" NumberOfCells=\"%d\">\n<Points><DataArray "
+            "type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\n",
+            (int)n);
     for (PetscInt v = 0; v < 36; v++)
       fprintf(f, "%.17g %g %g\n", 2. * (double)(v % 4) / 3., (double)(v / 4 % 3) / 2.,
               (double)(v / 12) / 2.);
     fprintf(f, "</DataArray></Points>\n<Cells><DataArray type=\"Int32\" Name=\"connectivity\" "
                "format=\"ascii\">\n");
-    for (PetscInt t = 0; t < TETS; t++) {
+    for (PetscInt t = first; t < first + n; t++) {
       const PetscInt at[3] = {t / 6 % 3, t / 18 % 2, t / 36};
       PetscInt v[4];
 
@@ -146,10 +154,10 @@ static PetscErrorCode write_vtu(char path[512])
       fprintf(f, "%d %d %d %d\n", (int)v[0], (int)v[1], (int)v[2], (int)v[3]);
     }
     fprintf(f, "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n");
-    for (PetscInt t = 0; t < TETS; t++)
+    for (PetscInt t = 0; t < n; t++)
       fprintf(f, "%d\n", (int)(4 * t + 4));
     fprintf(f, "</DataArray><DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">\n");
-    for (PetscInt t = 0; t < TETS; t++)
+    for (PetscInt t = 0; t < n; t++)
       fprintf(f, "10\n");
     fprintf(f, "</DataArray></Cells>\n<CellData>\n");
     for (int what = 0; what < 2; what++) {
@@ -160,12 +168,14 @@ static PetscErrorCode write_vtu(char path[512])
               "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"3\" "
               "format=\"ascii\">\n",
               what ? "sheet" : "fibre");
-      for (PetscInt k = 0; k < 3 * TETS; k++)
+      for (PetscInt k = 3 * first; k < 3 * (first + n); k++)
         fprintf(f, "%.17g\n", value[k]);
       fprintf(f, "</DataArray>\n");
     }
-    fprintf(f, "</CellData></Piece></UnstructuredGrid></VTKFile>\n");
+    fprintf(f, "</CellData></Piece>\n");
   }
+  if (f)
+    fprintf(f, "</UnstructuredGrid></VTKFile>\n");
   PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -288,8 +298,10 @@ static PetscErrorCode test_files(void)
   PetscCall(test_scene_close(&t));
   PetscCall(write_vtk(path));
   PetscCall(check_file(path, ""));
-  PetscCall(write_vtu(path));
-  PetscCall(check_file(path, ""));
+  for (int npiece = 1; npiece < 4; npiece++) {
+    PetscCall(write_vtu(npiece, path));
+    PetscCall(check_file(path, ""));
+  }
   PetscCall(write_gmsh(bad, PETSC_FALSE));
   PetscCall(write_h5(bad, path));
   PetscCall(check_file(path, ""));

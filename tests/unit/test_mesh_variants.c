@@ -1,6 +1,7 @@
 // Files as other programs write them, with what a mesh does not need, or their sections in another
 // order: read, and said.
 // @ranks 1
+#include <sys/stat.h>
 #include <sbsurface.h>
 #include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"
@@ -177,14 +178,128 @@ static const char *const bad[][3] = {
   {"c.unv", "a letter\n  -1 of it\n", "line 1|-1"},
   {"c.mesh", "MeshVersionFormatted 1\nDimension 3\nTetrahedra 1\n1 2 3 4 7\nEnd\n",
    "line 3|Vertices"},
-  {"c.vtu",
-   PIECES("<DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">1</DataArray>"),
-   "line 3|piece 2|ghost"},
   {"c.mesh",
    "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
    "TetrahedraP2Ordering\n1\n1 2 3 4\nEnd\n",
    "line 9|TetrahedraP2Ordering"},
 };
+
+/* A piece: its points, numbers of them or "", its tets and data of these. */
+#define GRID(body) \
+  "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>" body "</UnstructuredGrid></VTKFile>\n"
+#define PIECE(n, x, global, m, connect, ends, types, data)                                  \
+  "<Piece NumberOfPoints=\"" n "\" NumberOfCells=\"" m "\">" global                         \
+  "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">" x "</DataArray></Points>" \
+  "<Cells><DataArray type=\"Int64\" Name=\"connectivity\">" connect "</DataArray>"          \
+  "<DataArray type=\"Int64\" Name=\"offsets\">" ends "</DataArray>"                         \
+  "<DataArray type=\"UInt8\" Name=\"types\">" types "</DataArray></Cells><CellData>" data   \
+  "</CellData></Piece>"
+#define IDS(id) \
+  "<PointData><DataArray type=\"Int64\" Name=\"GlobalNodeId\">" id "</DataArray></PointData>"
+#define GHOST(g) "<DataArray type=\"UInt8\" Name=\"vtkGhostType\">" g "</DataArray>"
+#define EMPTY "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"></Piece>"
+#define FOUR "0 0 0 1 0 0 0 1 0 0 0 1 "
+#define FIRST(global, data) PIECE("4", FOUR, global, "1", "0 1 2 3", "4", "10", data)
+#define OTHER(global, data) \
+  PIECE("4", "1 1 1 -0 0 1 1 0 0 0 1 0", global, "1", "2 3 1 0", "4", "10", data)
+/* the second piece with the tet of the first one as a ghost, in another order of points */
+#define WITH_GHOST(marks)                                                                 \
+  PIECE("5", "1 1 1 0 0 1 1 0 0 0 1 0 0 0 0", "", "2", "2 3 1 0 4 2 3 1", "4 8", "10 10", \
+        GHOST(marks))
+
+/* Grids in several pieces and files: two tets of volume 1/6 and 2/6 with a common facet. */
+static PetscErrorCode test_pieces(void)
+{
+  static const struct {
+    const char *text;
+    int nvert, ntet;
+    const char *note;
+  } good[] = {
+    {PIECES("<DataArray type=\"Int32\" Name=\"g\" format=\"ascii\">1</DataArray>"), 5, 2,
+     "2 pieces, 3 points of several pieces joined where"},
+    {GRID(FIRST("", "") EMPTY OTHER("", "")), 5, 2, "3 pieces (1 empty), 3 points"},
+    {GRID(FIRST(IDS("7 1 2 3"), "") OTHER(IDS("9 3 1 2"), "")), 5, 2,
+     "3 points of several pieces joined by"},
+    /* as the numbers say, though the positions are equal */
+    {GRID(FIRST(IDS("7 1 2 3"), "") OTHER(IDS("9 4 1 2"), "")), 6, 2,
+     "2 points of several pieces joined by"},
+    /* not all pieces have numbers */
+    {GRID(FIRST(IDS("7 1 2 3"), "") OTHER("", "")), 5, 2,
+     "3 points of several pieces joined where"},
+    {GRID(FIRST("", "") WITH_GHOST("0 1")), 5, 2, "1 ghost cells"},
+    {GRID(FIRST("", GHOST("16")) WITH_GHOST("2 33")), 5, 2, "1 ghost cells"},
+    /* a file of one piece */
+    {GRID(WITH_GHOST("0 1")), 5, 1, "1 ghost cells"},
+    /* points of one piece stay apart where no other piece has one */
+    {GRID(PIECE("8", FOUR FOUR, "", "2", "0 1 2 3 4 5 6 7", "4 8", "10 10", "")
+            PIECE("4", "5 5 5 6 5 5 5 6 5 5 5 6", "", "1", "0 1 2 3", "4", "10", "")),
+     12, 3, "0 points of several pieces"},
+    {"<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><PPoints/><Piece Source=\"one.vtu\"/>"
+     "<Piece Source='parts\\other.vtu'/></PUnstructuredGrid></VTKFile>\n",
+     5, 2, "2 pieces, 3 points"},
+  };
+  static const char *const wrong[][2] = {
+    {GRID(FIRST("", "") OTHER("", "")
+            PIECE("8", FOUR FOUR, "", "2", "0 1 2 3 4 5 6 7", "4 8", "10 10", "")),
+     "piece 3|(0, 0, 0)|piece 1"},
+    {GRID(FIRST(IDS("7 1 2 2"), "") OTHER(IDS("9 3 1 2"), "")), "piece 1|number 2"},
+    {GRID(FIRST(IDS("7 1 2 3"), "") OTHER(IDS("3 9 1 2"), "")), "number 3|(1, 1, 1)"},
+    {GRID(FIRST(IDS("7 1 2 .5"), "") OTHER(IDS("3 9 1 2"), "")), "GlobalNodeId|0.5"},
+    {GRID(FIRST("", "") PIECE("4", "1 1 1 0 0 1 1 0 0 0 1 nan", "", "1", "2 3 1 0", "4", "10", "")),
+     "point 3 of piece 2"},
+    {GRID(FIRST("", "") PIECE("4", "1 1 1 0 0 1 1 0 0 0 1 0", "", "1", "2 3 1 4", "4", "10", "")),
+     "point 4"},
+    {GRID(FIRST("", "") FIRST("", "")), "0 and 1|same four nodes"},
+    {GRID(EMPTY EMPTY), "empty"},
+    {"<VTKFile type=\"PUnstructuredGrid\"><Piece Source=\"none.vtu\"/></VTKFile>\n", "none.vtu"},
+    {"<VTKFile type=\"PUnstructuredGrid\">\n<Piece NumberOfPoints=\"4\"/></VTKFile>\n",
+     "line 2|Source"},
+    {"<VTKFile type=\"PUnstructuredGrid\"></VTKFile>\n", "Piece"},
+    {"<VTKFile type=\"PUnstructuredGrid\"><Piece Source=\"bad.vtu\"/></VTKFile>\n",
+     "bad.vtu: |bad.vtu|'PUnstructuredGrid'"},
+    {"<VTKFile type=\"PUnstructuredGrid\"><Piece Source=\"cut.vtu\"/></VTKFile>\n",
+     "cut.vtu line 1|truncated"},
+  };
+  static const char *const files[][2] = {{"one.vtu", GRID(FIRST("", ""))},
+                                         {"parts/other.vtu", GRID(OTHER("", ""))},
+                                         {"cut.vtu", "<VTKFile type=\"UnstructuredGrid\"><Piece "
+                                                     "NumberOfPoints=\"1\" NumberOfCells=\"1\">"}};
+  char path[600];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/parts", folder);
+  SB_CHECK(!mkdir(path, 0700), "no folder %s", path);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(files); k++) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, files[k][0]);
+    PetscCall(test_file_put(path, files[k][1]));
+  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(good); k++) {
+    SbImport im;
+
+    (void)snprintf(path, sizeof(path), "%s/pieces.%s", folder, k % 2 ? "vtu" : "pvtu");
+    PetscCall(test_file_put(path, good[k].text));
+    PetscCall(test_import(path, &im));
+    SB_CHECK(im.nvert == good[k].nvert && im.item[3].n == good[k].ntet,
+             "pieces %d: %d vertices, %d tets", (int)k, (int)im.nvert, (int)im.item[3].n);
+    SB_CHECK(strstr(im.note, good[k].note) != NULL, "pieces %d: note '%s'", (int)k, im.note);
+    SB_CHECK(k || (test_count(&im, 3, "volume_7") == 1 && test_count(&im, 3, "volume_8") == 1),
+             "pieces lost their regions");
+    SB_CHECK(!im.ngroup || !k, "pieces %d: marks of ghosts became groups", (int)k);
+    PetscCall(SbImportDestroy(&im));
+  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(wrong); k++) {
+    PetscErrorCode code = PETSC_ERR_FILE_UNEXPECTED;
+
+    (void)snprintf(path, sizeof(path), "%s/bad.vtu", folder);
+    PetscCall(test_file_put(path, wrong[k][0]));
+    if (strstr(wrong[k][0], "none.vtu"))
+      code = PETSC_ERR_FILE_OPEN;
+    if (strstr(wrong[k][1], "same four nodes"))
+      code = PETSC_ERR_USER_INPUT;
+    SB_CHECK_ERROR(test_mesh_use(path), code, wrong[k][1]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 int main(int argc, char **argv)
 {
@@ -209,23 +324,7 @@ int main(int argc, char **argv)
              "mesh %d: note '%s'", (int)k, im.note);
     PetscCall(SbImportDestroy(&im));
   }
-  {
-    PetscReal volume = 0;
-    SbImport im;
-
-    (void)snprintf(path, sizeof(path), "%s/pieces.vtu", folder);
-    PetscCall(test_file_put(
-      path, PIECES("<DataArray type=\"Int32\" Name=\"g\" format=\"ascii\">1</DataArray>")));
-    PetscCall(test_import(path, &im));
-    for (PetscInt i = 0; i < im.item[3].n; i++)
-      volume += PetscAbsReal(SbTetDeterminant(im.x, im.item[3].vert + 4 * i));
-    SB_CHECK(im.nvert == 5 && im.item[3].n == 2 && PetscAbsReal(volume - 3) < 1e-6,
-             "pieces: %d vertices, %d tets, volume %g", (int)im.nvert, (int)im.item[3].n, volume);
-    SB_CHECK(test_count(&im, 3, "volume_7") == 1 && test_count(&im, 3, "volume_8") == 1,
-             "pieces lost their regions");
-    SB_CHECK(strstr(im.note, "2 pieces") != NULL, "pieces: note '%s'", im.note);
-    PetscCall(SbImportDestroy(&im));
-  }
+  PetscCall(test_pieces());
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(surfaces); k++) {
     const PetscReal at[3] = {0, 0, 0};
     SbTriangles t;
