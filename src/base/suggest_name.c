@@ -47,6 +47,15 @@ static PetscBool is_part(const char *word, const char *name)
   return PETSC_FALSE;
 }
 
+/* Whether one of the first n names is this one. */
+static PetscBool is_among(const char *name, PetscInt n, const char *const names[])
+{
+  for (PetscInt j = 0; j < n; j++)
+    if (names[j] && !strcmp(name, names[j]))
+      return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
 void SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                     char text[])
 {
@@ -58,23 +67,15 @@ void SbSuggestNames(const char *word, PetscInt n, const char *const names[], siz
   for (PetscInt i = 0; i < n; i++)
     if (names[i])
       best = PetscMin(best, edit_distance(word, names[i]));
-  if (best > farthest) {
-    /* a word of a longer name: hypre of cg_hypre */
-    for (PetscInt i = 0; i < n && nbest < 3; i++)
-      if (names[i] && is_part(word, names[i]))
-        SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
-    return;
-  }
-  for (PetscInt i = 0; i < n && nbest < 3; i++) {
-    PetscBool again = PETSC_FALSE;
 
-    if (!names[i] || edit_distance(word, names[i]) != best)
-      continue;
-    for (PetscInt j = 0; j < i && !again; j++)
-      again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
-    if (again)
-      continue;
-    SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
+  // the most similar names, or those of which it is a word: hypre of cg_hypre
+  for (PetscInt i = 0; i < n && nbest < 3; i++) {
+    const PetscBool takes =
+      (PetscBool)(names[i] && (best > farthest ? is_part(word, names[i])
+                                               : edit_distance(word, names[i]) == best));
+
+    if (takes && !is_among(names[i], i, names))
+      SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
   }
 }
 

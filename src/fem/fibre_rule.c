@@ -19,13 +19,19 @@
   where beta is 0. bislerp() interpolates rotations along the shortest way between any of those that
   differ by half turns about the axes, as fibres and sheets have no sign.
 
-  Where two gradients are parallel, as on the axis of a ventricle at the apex, any perpendicular
-  direction serves. Not handled: the holes of valves but the base.
+  A tet of which all vertices are on one surface has no gradient of its own: it takes the mean
+  gradient of the tets around its vertices, by volume. Errors: sets within each other between which
+  a problem is solved; tets without a gradient that their axes need, those around them included;
+  gradients that are parallel in most tets. Where they are parallel in a few, as on the axis of a
+  ventricle at the apex, any perpendicular direction serves, and a warning says how many there are.
+  Not handled: the holes of valves but the base.
 */
 #include "fem_impl.h"
 #include "sbgeometry.h"
 
-#define PARALLEL 1e-8 /* sine of the angle below which two gradients are parallel */
+#define SMALL 1e-8    /* angle and sine below which two rotations are one */
+#define PARALLEL 1e-4 /* sine of the angle below which two gradients are parallel */
+#define FLAT 1e-7     /* difference in a tet below which a solution, from 0 to 1, is constant */
 #define ACCURACY 1e-10
 
 enum {
@@ -151,8 +157,8 @@ static PetscErrorCode solve(SbMesh mesh, PetscInt body, Mat laplacian, uint64_t 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns around, to the base, to the outside. */
-static void axis(const PetscReal psi[3], const PetscReal phi[3], PetscReal Q[9])
+/* Columns around, to the base, to the outside; false where the gradients are parallel. */
+static PetscBool axis(const PetscReal psi[3], const PetscReal phi[3], PetscReal Q[9])
 {
   PetscReal e[3][3];
 
@@ -166,7 +172,8 @@ static void axis(const PetscReal psi[3], const PetscReal phi[3], PetscReal Q[9])
   const PetscReal along = SbDot3(e[1], e[2]);
   for (int k = 0; k < 3; k++)
     e[2][k] -= along * e[1][k];
-  if (SbNormalise(e[2]) < PARALLEL) {
+  const PetscBool across = (PetscBool)(SbNormalise(e[2]) >= PARALLEL);
+  if (!across) {
     const int least = PetscAbsReal(e[1][0]) < PetscAbsReal(e[1][1]) ? 0 : 1;
 
     for (int k = 0; k < 3; k++)
@@ -176,6 +183,7 @@ static void axis(const PetscReal psi[3], const PetscReal phi[3], PetscReal Q[9])
   SbCross(e[1], e[2], e[0]);
   for (int k = 0; k < 9; k++)
     Q[k] = e[k % 3][k / 3];
+  return across;
 }
 
 /* Q turned by alpha about its third column, then by beta about its first one. */
@@ -256,8 +264,8 @@ static void bislerp(PetscReal Q[9], const PetscReal to[9], PetscReal t)
   }
   const PetscReal angle = PetscAcosReal(PetscMin(best, 1.));
   const PetscReal sine = PetscSinReal(angle);
-  const PetscReal left = sine > PARALLEL ? PetscSinReal((1. - t) * angle) / sine : 1. - t;
-  const PetscReal right = sine > PARALLEL ? PetscSinReal(t * angle) / sine : t;
+  const PetscReal left = sine > SMALL ? PetscSinReal((1. - t) * angle) / sine : 1. - t;
+  const PetscReal right = sine > SMALL ? PetscSinReal(t * angle) / sine : t;
   PetscReal length = 0.;
   for (int k = 0; k < 4; k++) {
     q[k] = left * from[k] + right * b[k];
@@ -268,43 +276,179 @@ static void bislerp(PetscReal Q[9], const PetscReal to[9], PetscReal t)
   rotation(q, Q);
 }
 
-/* The axes of a tet from the values u[4] at its vertices: psi, epi, lv, rv. */
-static void rule(const PetscReal g[4][3], const PetscReal u[4][4], const PetscReal angle[4],
-                 PetscReal Q[9])
-{
-  PetscReal grad[4][3] = {{0.}};
-  PetscReal mean[4] = {0.};
-  PetscReal other[9];
+/* What a tet lacks. */
+typedef enum {
+  NOTHING,
+  ACROSS,  /* its gradients are parallel */
+  GRADIENT /* one that its axes need vanishes */
+} Lack;
 
-  for (int p = 0; p < 4; p++) {
-    for (int i = 0; i < 4; i++) {
-      mean[p] += u[p][i] / 4.;
-      for (int k = 0; k < 3; k++)
-        grad[p][k] += u[p][i] * g[i][k];
-    }
-  }
+/* The axes of a tet from the gradients and means of psi, epi, lv, rv, with numbers of unknowns
+   whose gradient vanishes as bits. */
+static Lack rule(const PetscReal grad[4][3], const PetscReal mean[4], const PetscReal angle[4],
+                 unsigned flat, PetscReal Q[9])
+{
+  PetscReal other[9];
+  PetscBool across = PETSC_TRUE;
   const PetscReal sum = mean[2] + mean[3];
   const PetscReal d = sum > 0. ? PetscMax(0., PetscMin(1., mean[3] / sum)) : 0.;
   const PetscReal out = PetscMax(0., PetscMin(1., mean[1]));
   const PetscReal inside[3] = {-grad[2][0], -grad[2][1], -grad[2][2]};
 
-  axis(grad[0], inside, Q);
+  /* the parts that epi, lv and rv have in the result */
+  const PetscReal part[4] = {1., out, (1. - out) * (1. - d), (1. - out) * d};
+  unsigned needed = 0;
+
+  for (unsigned p = 0; p < 4; p++)
+    needed |= part[p] > FLAT ? 1U << p : 0;
+  if (!axis(grad[0], inside, Q) && needed & 4U)
+    across = PETSC_FALSE;
   orient(Q, angle[0] * (1. - 2. * d), angle[2] * (1. - 2. * d));
   if (d > 0.) {
-    axis(grad[0], grad[3], other);
+    if (!axis(grad[0], grad[3], other) && needed & 8U)
+      across = PETSC_FALSE;
     orient(other, angle[0] * (1. - 2. * d), angle[2] * (1. - 2. * d));
     bislerp(Q, other, d);
   }
-  axis(grad[0], grad[1], other);
+  if (!axis(grad[0], grad[1], other) && needed & 2U)
+    across = PETSC_FALSE;
   orient(other, angle[0] * (1. - out) + angle[1] * out, angle[2] * (1. - out) + angle[3] * out);
   bislerp(Q, other, out);
+  if (needed & flat)
+    return GRADIENT;
+  return across ? NOTHING : ACROSS;
+}
+
+/* Sum over the tets around each vertex of the body of the volume times the gradient of u[nvert],
+   sum[nvert][3], ghosts too. */
+static PetscErrorCode sum_gradients(SbMesh mesh, PetscInt body, const PetscReal u[],
+                                    PetscReal sum[])
+{
+  PetscReal *all;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(sum, 3 * mesh->nvert));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    PetscReal g[4][3];
+    PetscReal grad[3] = {0., 0., 0.};
+
+    if (mesh->cell_body[c] != body)
+      continue;
+    const PetscReal V = gradients(mesh, c, g);
+    for (int i = 0; i < 12; i++)
+      grad[i % 3] += V * u[mesh->cell[4 * c + i / 3]] * g[i / 3][i % 3];
+    for (int i = 0; i < 12; i++)
+      sum[3 * mesh->cell[4 * c + i / 3] + i % 3] += grad[i % 3];
+  }
+
+  // ghosts add to their owners, and get the sums
+  PetscCall(PetscMalloc1(3 * mesh->nvert_owned, &all));
+  PetscCall(PetscArraycpy(all, sum, 3 * mesh->nvert_owned));
+  MPI_Datatype three;
+  PetscCallMPI(MPI_Type_contiguous(3, MPIU_REAL, &three));
+  PetscCallMPI(MPI_Type_commit(&three));
+  PetscCall(PetscSFReduceBegin(mesh->vert_sf, three, sum, all, MPI_SUM));
+  PetscCall(PetscSFReduceEnd(mesh->vert_sf, three, sum, all, MPI_SUM));
+  PetscCall(PetscArraycpy(sum, all, 3 * mesh->nvert_owned));
+  PetscCall(PetscSFBcastBegin(mesh->vert_sf, three, all, sum, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(mesh->vert_sf, three, all, sum, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&three));
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets between which a problem is solved, of which one has vertices that the other has not. */
+static PetscErrorCode check_sets(SbMesh mesh, PetscInt body, const uint64_t bit[], SbFibres f)
+{
+  static const int pairs[][2] = {{OUTER, INNER}, {BASE, APEX}, {OUTER, RIGHT}, {INNER, RIGHT}};
+
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(pairs); k++) {
+    const int a = pairs[k][0];
+    const int b = pairs[k][1];
+    PetscInt count[3] = {0, 0, 0}; // in a, in b, in both
+
+    if (!bit[b])
+      continue;
+    for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
+      const PetscBool in[2] = {(PetscBool)((mesh->vert_set[v] & bit[a]) != 0),
+                               (PetscBool)((mesh->vert_set[v] & bit[b]) != 0)};
+
+      if (mesh->vert_body[v] != body)
+        continue;
+      count[0] += in[0];
+      count[1] += in[1];
+      count[2] += in[0] && in[1];
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT, MPI_SUM, mesh->comm));
+    const int inner = count[2] < count[0]; // which of the two may be within the other one
+    PetscCheck(count[2] < count[inner], mesh->comm, PETSC_ERR_USER_INPUT,
+               "%s_surfaces: all %" PetscInt_FMT
+               " vertices that the set '%s' has of the body '%s' are in '%s', too, which has "
+               "%" PetscInt_FMT
+               "; the rule goes from one of these sets to the other one, so they must be apart",
+               f->option[0], count[inner], f->surface[pairs[k][inner]], mesh->body[body].name,
+               f->surface[pairs[k][!inner]], count[!inner]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Errors and a warning of tets that lack something: n[kind] of them on this rank, the first ones
+   at x[kind]. */
+static PetscErrorCode judge(SbMesh mesh, PetscInt body, SbFibres f, const PetscInt n[3],
+                            PetscReal x[3][3])
+{
+  PetscMPIInt rank, size;
+  PetscInt all[3];
+  char sets[SB_FIBRE_SURFACES * (SB_NAME_MAX + 2)] = "";
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
+  PetscCallMPI(MPI_Allreduce(n, all, 3, MPIU_INT, MPI_SUM, mesh->comm));
+  for (int i = 0; i < SB_FIBRE_SURFACES && f->surface[i][0]; i++)
+    SbAppend(sizeof(sets), sets, "%s%s", i ? ", " : "", f->surface[i]);
+  for (int kind = ACROSS; kind <= GRADIENT; kind++) {
+    PetscMPIInt first = n[kind] ? rank : size;
+
+    if (!all[kind])
+      continue;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, mesh->comm));
+    PetscCallMPI(MPI_Bcast(x[kind], 3, MPIU_REAL, first, mesh->comm));
+  }
+  PetscCheck(!all[GRADIENT], mesh->comm, PETSC_ERR_USER_INPUT,
+             "%s_surfaces: the surfaces %s of the body '%s' give %" PetscInt_FMT
+             " of %" PetscInt_FMT
+             " tets no direction, the first one at (%.4g, %.4g, %.4g) m, as a solution of the rule "
+             "does not change there; do sets overlap, or does a part touch only one of them?",
+             f->option[0], sets, mesh->body[body].name, all[GRADIENT],
+             all[NOTHING] + all[ACROSS] + all[GRADIENT], (double)x[GRADIENT][0],
+             (double)x[GRADIENT][1], (double)x[GRADIENT][2]);
+  PetscCheck(all[ACROSS] <= all[NOTHING], mesh->comm, PETSC_ERR_USER_INPUT,
+             "%s_surfaces: with the surfaces %s of the body '%s' the way to the base is that "
+             "through the wall in %" PetscInt_FMT " of %" PetscInt_FMT
+             " tets, the first one at (%.4g, %.4g, %.4g) m, so they have no direction around; are "
+             "outer and inner surface, base and apex four different sets?",
+             f->option[0], sets, mesh->body[body].name, all[ACROSS], all[NOTHING] + all[ACROSS],
+             (double)x[ACROSS][0], (double)x[ACROSS][1], (double)x[ACROSS][2]);
+  if (all[ACROSS])
+    PetscCall(SbWarning(mesh->comm,
+                        "%s_surfaces: in %" PetscInt_FMT " of %" PetscInt_FMT
+                        " tets of the body '%s', the first one at (%.4g, %.4g, %.4g) m, the way to "
+                        "the base is that through the wall; their directions are any across it",
+                        f->option[0], all[ACROSS], all[NOTHING] + all[ACROSS],
+                        mesh->body[body].name, (double)x[ACROSS][0], (double)x[ACROSS][1],
+                        (double)x[ACROSS][2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres f)
 {
   uint64_t bit[SB_FIBRE_SURFACES] = {0};
   PetscInt count[SB_FIBRE_SURFACES] = {0};
-  PetscReal *u[4];
+  PetscInt lacking[3] = {0, 0, 0};
+  PetscReal place[3][3] = {{0.}};
+  PetscReal *u[4], *sum[4];
   Mat A;
 
   PetscFunctionBeginUser;
@@ -319,8 +463,9 @@ PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres f
     PetscCheck(count[i], mesh->comm, PETSC_ERR_USER_INPUT,
                "%s_surfaces: the set '%s' has no vertex of the body '%s'", f->option[0],
                f->surface[i], mesh->body[body].name);
+  PetscCall(check_sets(mesh, body, bit, f));
   for (int p = 0; p < 4; p++)
-    PetscCall(PetscCalloc1(mesh->nvert, &u[p]));
+    PetscCall(PetscCalloc2(mesh->nvert, &u[p], 3 * mesh->nvert, &sum[p]));
   PetscCall(create_matrix(mesh, body, &A));
   PetscCall(solve(mesh, body, A, bit[BASE], bit[APEX], u[0]));
   PetscCall(solve(mesh, body, A, bit[OUTER], bit[INNER] | bit[RIGHT], u[1]));
@@ -328,21 +473,54 @@ PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres f
   if (bit[RIGHT])
     PetscCall(solve(mesh, body, A, bit[RIGHT], bit[OUTER] | bit[INNER], u[3]));
   PetscCall(MatDestroy(&A));
+  for (int p = 0; p < (bit[RIGHT] ? 4 : 3); p++)
+    PetscCall(sum_gradients(mesh, body, u[p], sum[p]));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
-    PetscReal g[4][3], value[4][4], Q[9];
+    const PetscInt *v = mesh->cell + 4 * c;
+    PetscReal g[4][3], Q[9];
+    PetscReal grad[4][3] = {{0.}};
+    PetscReal mean[4] = {0.};
+    PetscReal size = 0.;
+    unsigned flat = 0;
 
     if (mesh->cell_body[c] != body || mesh->cell_material[c] != k)
       continue;
-    (void)gradients(mesh, c, g);
-    for (int i = 0; i < 16; i++)
-      value[i / 4][i % 4] = u[i / 4][mesh->cell[4 * c + i % 4]];
-    rule((const PetscReal(*)[3])g, (const PetscReal(*)[4])value, f->angle, Q);
+    const PetscReal V = gradients(mesh, c, g);
+    for (int i = 0; i < 4; i++)
+      size = PetscMax(size, PetscSqrtReal(SbDot3(g[i], g[i])));
+    for (int p = 0; p < 4; p++) {
+      PetscReal low = u[p][v[0]];
+      PetscReal high = low;
+
+      for (int i = 0; i < 4; i++) {
+        low = PetscMin(low, u[p][v[i]]);
+        high = PetscMax(high, u[p][v[i]]);
+        mean[p] += u[p][v[i]] / 4.;
+        for (int j = 0; j < 3; j++)
+          grad[p][j] += u[p][v[i]] * g[i][j];
+      }
+      if (high - low > FLAT)
+        continue;
+
+      // of the tets around it, as long as the gradient of a change by 1 in this one
+      for (int j = 0; j < 3; j++)
+        grad[p][j] = (sum[p][3 * v[0] + j] + sum[p][3 * v[1] + j] + sum[p][3 * v[2] + j] +
+                      sum[p][3 * v[3] + j]) /
+                     V;
+      if (SbDot3(grad[p], grad[p]) <= PetscSqr(FLAT * size))
+        flat |= 1U << p;
+    }
+    const Lack lack =
+      rule((const PetscReal(*)[3])grad, mean, f->angle, bit[RIGHT] ? flat : flat & 7U, Q);
+    if (c < mesh->ncell_owned && !lacking[lack]++)
+      SbCellCentre(mesh, c, place[lack]);
     for (int e = 0; e < 3; e++) {
       mesh->direction[6 * c + e] = Q[3 * e];
       mesh->direction[6 * c + 3 + e] = Q[3 * e + 2];
     }
   }
   for (int p = 0; p < 4; p++)
-    PetscCall(PetscFree(u[p]));
+    PetscCall(PetscFree2(u[p], sum[p]));
+  PetscCall(judge(mesh, body, f, lacking, place));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

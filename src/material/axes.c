@@ -21,11 +21,35 @@ PetscErrorCode SbFibresDestroy(SbFibres *fibres)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Error if an option is given that another one leaves without effect: for the instance itself, or
+   both for all bodies. */
+static PetscErrorCode check_unused(const SbScope *scope, const char *key, const char *instead)
+{
+  char name[2][3 * SB_NAME_MAX];
+  PetscBool own[2];
+  SbScope all;
+
+  PetscFunctionBeginUser;
+  SbOptionName(scope, key, sizeof(name[0]), name[0]);
+  SbOptionName(scope, instead, sizeof(name[1]), name[1]);
+  for (int i = 0; i < 2; i++)
+    PetscCall(PetscOptionsHasName(NULL, NULL, name[i], &own[i]));
+  if (!own[0] && !own[1] && !strcmp(scope->klass, "body")) {
+    SbScopeSet(&all, scope->klass, scope->type, SB_OPTION_DEFAULT);
+    SbOptionName(&all, key, sizeof(name[0]), name[0]);
+    SbOptionName(&all, instead, sizeof(name[1]), name[1]);
+    PetscCall(PetscOptionsHasName(NULL, NULL, name[0], &own[0]));
+  }
+  PetscCheck(!own[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s and %s both give directions: leave one of them out", name[0], name[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The surfaces of the rule and its angles, if there is one. */
 static PetscErrorCode read_rule(SbFibres f, const SbScope *scope)
 {
   char(*names)[SB_NAME_MAX];
-  char option[3 * SB_NAME_MAX];
+  char option[3 * SB_NAME_MAX], angle[3 * SB_NAME_MAX];
   PetscInt n;
 
   PetscFunctionBeginUser;
@@ -42,6 +66,16 @@ static PetscErrorCode read_rule(SbFibres f, const SbScope *scope)
   for (PetscInt i = 0; i < n; i++)
     PetscCall(PetscStrncpy(f->surface[i], names[i], sizeof(f->surface[i])));
   PetscCall(PetscFree(names));
+  if (!n) {
+    PetscBool angles;
+
+    SbOptionName(scope, "fibre_angles", sizeof(angle), angle);
+    PetscCall(PetscOptionsHasName(NULL, NULL, angle, &angles));
+    PetscCheck(!angles, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s is of the rule, which needs surfaces: give %s, too, or leave it out", angle,
+               option);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbOptionReals(scope, "fibre_angles", f->angle));
   for (int i = 0; i < 4; i++)
     f->angle[i] *= PETSC_PI / 180;
@@ -51,14 +85,22 @@ static PetscErrorCode read_rule(SbFibres f, const SbScope *scope)
 PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
 {
   static const char *const key[2] = {"fibre", "sheet"};
+  static const char *const field[2] = {"fibre_field", "sheet_field"};
   PetscBool given = PETSC_FALSE;
   SbFibres f;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));
   m->fibres = f;
+  PetscCall(SbOptionString(scope, "fibre_field", sizeof(f->field[0]), f->field[0]));
+  PetscCall(SbOptionString(scope, "sheet_field", sizeof(f->field[1]), f->field[1]));
+  PetscCall(read_rule(f, scope));
   for (int i = 0; i < 2; i++) {
     SbOptionName(scope, key[i], sizeof(f->option[i]), f->option[i]);
+    if (f->surface[0][0] || f->field[i][0]) {
+      PetscCall(check_unused(scope, key[i], f->surface[0][0] ? "fibre_surfaces" : field[i]));
+      continue;
+    }
     PetscCall(SbOptionFormulas(scope, key[i], f->direction + 3 * i));
     for (int k = 0; k < 3; k++)
       PetscCheck(!SbFormulaUses(f->direction[3 * i + k], 't'), PETSC_COMM_SELF, PETSC_ERR_USER,
@@ -67,16 +109,13 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
   }
 
   /* 0,0,0, as scenario.opts has it, is none */
-  for (int k = 3; k < 6; k++) {
+  for (int k = 3; k < 6 && f->direction[k]; k++) {
     PetscReal value = 1;
 
     if (!SbFormulaUses(f->direction[k], 'x'))
       PetscCall(SbFormulaEval(f->direction[k], 0., NULL, &value));
     given = (PetscBool)(given || value != 0);
   }
-  PetscCall(SbOptionString(scope, "fibre_field", sizeof(f->field[0]), f->field[0]));
-  PetscCall(SbOptionString(scope, "sheet_field", sizeof(f->field[1]), f->field[1]));
-  PetscCall(read_rule(f, scope));
   given = (PetscBool)(given || f->field[1][0] || f->surface[0][0]);
   PetscCheck(given || !sheet, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s must be given: with these constants the law %s has directions in the plane of "

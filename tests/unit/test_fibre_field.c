@@ -401,11 +401,87 @@ static PetscErrorCode test_two(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets and options that would give any directions, or be without effect. */
+static PetscErrorCode test_rule_faults(void)
+{
+  static const struct {
+    const char *options, *words;
+    PetscErrorCode code;
+  } bad[] = {
+    {"-body_a_fibre_surfaces xmax,xmax,zmax,zmin", "-body_a_fibre_surfaces|'xmax'|'a'|25 ",
+     PETSC_ERR_USER_INPUT},
+    /* one within another one */
+    {"-sets o -set_o_at box:-1,-1,-1,2,2,2 -body_a_fibre_surfaces o,xmin,zmax,zmin",
+     "-body_a_fibre_surfaces|'xmin'|'a'|'o'", PETSC_ERR_USER_INPUT},
+    {"-sets o -set_o_at box:-1,-1,0.9,2,2,2 -body_a_fibre_surfaces xmax,xmin,o,zmax",
+     "'zmax'|'a'|'o'", PETSC_ERR_USER_INPUT},
+    {"-body_a_fibre_surfaces xmax,xmin,zmax,zmin,xmin", "'xmin'|'a'", PETSC_ERR_USER_INPUT},
+    /* the way to the base is that through the wall */
+    {"-body_a_fibre_surfaces zmax,zmin,zmax,zmin", "'a'|zmax, zmin, zmax, zmin|384 of 384",
+     PETSC_ERR_USER_INPUT},
+    /* half of the block is within a set */
+    {"-sets o -set_o_at box:0.4,-1,-1,2,2,2 -body_a_fibre_surfaces o,xmin,zmax,zmin",
+     "'a'|o, xmin, zmax, zmin| of 384 tets no direction", PETSC_ERR_USER_INPUT},
+    {"-body_a_fibre_angles 1,2,3,4", "-body_a_fibre_angles|-body_a_fibre_surfaces", PETSC_ERR_USER},
+    {"-body_a_fibre_surfaces xmax,xmin,zmax,zmin -body_a_fibre 1,0,0",
+     "-body_a_fibre |-body_a_fibre_surfaces", PETSC_ERR_USER},
+    {"-body_a_fibre_surfaces xmax,xmin,zmax,zmin -body_a_sheet 1,0,0",
+     "-body_a_sheet |-body_a_fibre_surfaces", PETSC_ERR_USER},
+    {"-body_default_fibre_surfaces xmax,xmin,zmax,zmin -body_default_fibre 1,0,0",
+     "-body_default_fibre |-body_default_fibre_surfaces", PETSC_ERR_USER},
+    {"-body_a_fibre_field f -body_a_fibre 1,0,0", "-body_a_fibre |-body_a_fibre_field",
+     PETSC_ERR_USER},
+  };
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(bad); k++) {
+    SB_CHECK_ERROR(test_open(&t, "-bodies a -body_a_mesh box:1,1,1:4 %s %s", bad[k].options, LAW),
+                   bad[k].code, bad[k].words);
+    PetscCall(test_scene_close(&t));
+  }
+
+  /* what holds for all bodies does not meet a body with a rule of its own */
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,1,1:4 -body_a_fibre_surfaces "
+                      "xmax,xmin,zmax,zmin -body_default_fibre 1,0,0 %s",
+                      LAW));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last layer of tets has all vertices in the outer set, and goes by those beside it: sheets are
+   through the wall. */
+static PetscErrorCode test_layer(void)
+{
+  PetscReal least = 1.;
+  PetscReal *value;
+  PetscInt n = 0;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,1,1:4 -sets o -set_o_at box:0.7,-1,-1,2,2,2 "
+                      "-body_a_fibre_surfaces o,xmin,zmax,zmin -body_a_fibre_angles 0,0,0,0 %s",
+                      LAW));
+  const SbMesh mesh = t.model->mesh;
+  PetscCall(PetscMalloc1(3 * mesh->ncell_owned, &value));
+  SbSpaceCellAxis(t.model->space, 1, value);
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++, n++)
+    least = PetscMin(least, PetscAbsReal(value[3 * c]));
+  SB_CHECK(!n || least > 1. - 1e-6, "a sheet is not through the wall: %g", (double)least);
+  PetscCall(PetscFree(value));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_files());
   PetscCall(test_rule());
   PetscCall(test_two());
+  PetscCall(test_layer());
+  PetscCall(test_rule_faults());
   SB_TEST_END();
 }

@@ -466,6 +466,16 @@ static PetscErrorCode test_nearest(void)
   SbSuggestNames("contact", 5, names, sizeof(text), text);
   SB_CHECK(!text[0], "'%s'", text);
 
+  /* a name that is there twice is said once */
+  {
+    const char *const twice[] = {"cg_hypre", "gravity", "cg_hypre", "gravity", "cg_hypre"};
+
+    SbSuggestNames("gravty", 5, twice, sizeof(text), text);
+    SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
+    SbSuggestNames("hypre", 5, twice, sizeof(text), text);
+    SB_CHECK(!strcmp(text, "cg_hypre"), "'%s'", text);
+  }
+
   /* a word of a name, where none is alike */
   SbSuggestNames("hypre", 4, solvers, sizeof(text), text);
   SB_CHECK(!strcmp(text, "cg_hypre"), "'%s'", text);
