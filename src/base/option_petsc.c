@@ -11,21 +11,31 @@
 #include "option.h"
 
 /* Ranges as in the table of options; `alone`: only without a prefix, since inner solvers of
-   multigrid may do nothing. */
+   multigrid may do nothing; `unlimited`: -1 is no limit. */
 static const struct {
   const char *key, *range, *what;
-  PetscBool alone;
+  PetscBool alone, unlimited;
 } ranges[] = {
-  {"snes_rtol", "[0, 1)", "a part of the first residual", PETSC_FALSE},
-  {"snes_stol", "[0, 1)", "the length of a step over that of the solution", PETSC_FALSE},
-  {"snes_atol", "[0, inf)", "a residual, N", PETSC_FALSE},
-  {"snes_max_it", "[1, inf)", "a number of iterations", PETSC_FALSE},
-  {"ksp_rtol", "[0, 1)", "a part of the right-hand side", PETSC_FALSE},
-  {"ksp_atol", "[0, inf)", "a residual", PETSC_FALSE},
-  {"ksp_divtol", "(1, inf]", "a multiple of the right-hand side", PETSC_FALSE},
-  {"ksp_max_it", "[1, inf)", "a number of iterations", PETSC_TRUE},
-  {"ts_rtol", "[0, 1)", "a part of the solution", PETSC_FALSE},
-  {"ts_atol", "[0, inf)", "an error of a step", PETSC_FALSE},
+  {"snes_rtol", "[0, 1)", "a part of the first residual", PETSC_FALSE, PETSC_FALSE},
+  {"snes_stol", "[0, 1)", "the length of a step over that of the solution", PETSC_FALSE,
+   PETSC_FALSE},
+  {"snes_atol", "[0, inf)", "a residual, N", PETSC_FALSE, PETSC_FALSE},
+  {"snes_max_it", "[1, inf)", "a number of iterations", PETSC_FALSE, PETSC_FALSE},
+  {"ksp_rtol", "[0, 1)", "a part of the right-hand side", PETSC_FALSE, PETSC_FALSE},
+  {"ksp_atol", "[0, inf)", "a residual", PETSC_FALSE, PETSC_FALSE},
+  {"ksp_divtol", "(1, inf]", "a multiple of the right-hand side", PETSC_FALSE, PETSC_FALSE},
+  {"snes_divergence_tolerance", "(1, inf]", "a multiple of the first residual", PETSC_FALSE,
+   PETSC_TRUE},
+  {"snes_max_funcs", "[1, inf)", "a number of evaluations", PETSC_FALSE, PETSC_TRUE},
+  {"snes_linesearch_damping", "(0, 1]", "a part of a step", PETSC_FALSE, PETSC_FALSE},
+  {"snes_linesearch_max_it", "[1, inf)", "a number of iterations", PETSC_FALSE, PETSC_FALSE},
+  {"ksp_gmres_restart", "[1, inf)", "a number of directions", PETSC_FALSE, PETSC_FALSE},
+  {"ksp_max_it", "[1, inf)", "a number of iterations", PETSC_TRUE, PETSC_FALSE},
+  {"ts_rtol", "[0, 1)", "a part of the solution", PETSC_FALSE, PETSC_FALSE},
+  {"ts_atol", "[0, inf)", "an error of a step", PETSC_FALSE, PETSC_FALSE},
+  {"ts_adapt_safety", "(0, 1]", "a part of the next step", PETSC_FALSE, PETSC_FALSE},
+  {"ts_adapt_dt_min", "[0, inf)", "a time step, s", PETSC_FALSE, PETSC_FALSE},
+  {"ts_adapt_dt_max", "(0, inf]", "a time step, s", PETSC_FALSE, PETSC_FALSE},
 };
 
 /* Packages that PETSc may have, for suggestions. */
@@ -109,7 +119,8 @@ PetscErrorCode SbOptionsCheckPetsc(void)
     if (end == value)
       continue;
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(ranges); k++)
-      PetscCheck(!has_key(name, ranges[k].key, ranges[k].alone) || is_in(x, ranges[k].range),
+      PetscCheck(!has_key(name, ranges[k].key, ranges[k].alone) || is_in(x, ranges[k].range) ||
+                   (ranges[k].unlimited && x == -1.),
                  PETSC_COMM_SELF, PETSC_ERR_USER, "-%s %s is not in %s: it is %s", name, value,
                  ranges[k].range, ranges[k].what);
   }

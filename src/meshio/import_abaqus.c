@@ -634,7 +634,7 @@ static PetscBool has_instances(const SbScan *s)
     if (!strncasecmp(p, "*INSTANCE", 9))
       return PETSC_TRUE;
     p = (const char *)memchr(p, '\n', (size_t)(s->end - p));
-    p += p ? 1 : 0;
+    p = p ? p + 1 : NULL;
   }
   return PETSC_FALSE;
 }

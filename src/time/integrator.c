@@ -279,6 +279,7 @@ static PetscErrorCode set_tolerance(SbRun run)
   const SbModel m = run->model;
   const SbSpace s = m->space;
   PetscReal(*middle)[4], size = 0.;
+  PetscReal atol = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(m->nbody, &middle));
@@ -291,7 +292,13 @@ static PetscErrorCode set_tolerance(SbRun run)
   }
   PetscCall(PetscFree(middle));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &size, 1, MPIU_REAL, MPI_MAX, m->comm));
-  PetscCall(TSSetTolerances(run->solve.ts, ALLOWED * PetscSqrtReal(size), NULL, 0., NULL));
+  size = PetscSqrtReal(size);
+  PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_atol", &atol, NULL));
+  PetscCheck(atol <= size, m->comm, PETSC_ERR_USER_INPUT,
+             "-ts_atol %g m allows a step an error beyond the radius of the largest body, %.4g m, "
+             "so any step is accepted: give less (%.1g m without the option)",
+             (double)atol, (double)size, (double)(ALLOWED * size));
+  PetscCall(TSSetTolerances(run->solve.ts, ALLOWED * size, NULL, 0., NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

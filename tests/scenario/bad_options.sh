@@ -145,6 +145,11 @@ error 1 "-ksp_rtol 3|[0, 1)" bar.opts -ksp_rtol 3
 error 1 "-ksp_atol -1|[0, inf)" bar.opts -ksp_atol -1
 error 1 "-ksp_max_it 0|[1, inf)" bar.opts -ksp_max_it 0
 error 1 "-ksp_divtol 0.1|(1, inf]" bar.opts -ksp_divtol 0.1
+error 1 "-snes_divergence_tolerance 0.5|(1, inf]" bar.opts -snes_divergence_tolerance 0.5
+error 1 "-snes_linesearch_damping 0|(0, 1]" bar.opts -snes_linesearch_damping 0
+error 1 "-ksp_gmres_restart 0|[1, inf)" bar.opts -ksp_gmres_restart 0
+error 2 "-ts_atol 1e+09 m" bar.opts -ts_atol 1e9
+error 1 "-ts_adapt_safety 2|(0, 1]" bar.opts -ts_adapt_safety 2
 error 2 "-mg_levels_ksp_rtol 1|[0, 1)" bar.opts -mg_levels_ksp_rtol 1
 error 1 "-ts_rtol 1.5|[0, 1)" bar.opts -ts_rtol 1.5
 error 1 "-pc_factor_mat_solver_type mumsp|did you mean mumps?" bar.opts -pc_factor_mat_solver_type mumsp

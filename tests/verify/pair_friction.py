@@ -122,6 +122,11 @@ def check_smooth():
     _, text = run("smooth-error", "barrier", 0.7, STEPS + "-effect_meet_slip_speed 1e-3", code=1)
     check("-effect_meet_slip_speed" in text, f"smooth-error: {text}")
 
+    # a slip in a step that positions cannot hold, or as long as a body
+    for slip in ("1e-30", "1e3"):
+        _, text = run(f"smooth-{slip}", "barrier", 0.7, STEPS + f"-effect_meet_sticking smooth -effect_meet_slip_speed {slip}", code=1)
+        check("-effect_meet_slip_speed" in text and "smallest body" in text, f"smooth-{slip}: {text}")
+
 
 def check_hold():
     """What sticks stays for 100 s: blocks on half-spaces of 30 and 44 degrees and on a slope with a coefficient of 1, and one in a grip."""
