@@ -221,6 +221,7 @@ static PetscErrorCode find_impacts_nodes(SbContact contact, SbSpace space, Petsc
 static PetscErrorCode start_nodes(SbContact contact, SbSpace space, const PetscReal u[])
 {
   Nodes *c = (Nodes *)contact;
+  const PetscReal touching = contact->effect->dynamic ? 0. : NODE_TOLERANCE * c->size;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->n; i++) {
@@ -233,17 +234,17 @@ static PetscErrorCode start_nodes(SbContact contact, SbSpace space, const PetscR
     for (int k = 0; k < 3; k++)
       touch->friction.now[k] = u[3 * touch->node + k];
 
-    /* constraints: nodes that penetrate, or would at their speed of approach; springs: those that
-       push */
+    /* constraints: nodes that penetrate, or would at their speed of approach, in static runs also
+       those that touch, as nothing else may hold the body; springs: those that push, or touch */
     if (exact(c)) {
       const PetscBool comes =
         (PetscBool)(touch->approach > 0 &&
                     c->contact.bounce.dt * touch->approach * (1 + EARLY) >= touch->gap0);
 
-      if (touch->gap < 0 || comes)
+      if (touch->gap < touching || comes)
         SbNodeEnter(c, touch);
     } else if (c->held) {
-      if (spring(touch, touch->gap) > 0)
+      if (spring(touch, touch->gap) > 0 || (touch->gap < touching && !touch->spring.idle))
         SbNodeEnter(c, touch);
       else
         touch->on = PETSC_FALSE;

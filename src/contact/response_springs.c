@@ -55,10 +55,12 @@ PetscErrorCode SbEffectForce_Springs(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rotation of the normal is neglected. */
+/* The rotation of the normal is neglected. Springs that touch without force resist in static runs,
+   as nothing else may hold the body: at that place both slopes are right. */
 PetscErrorCode SbEffectTangent_Springs(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Nodes *c = (const Nodes *)e->data;
+  const PetscReal touching = e->dynamic ? 0. : NODE_TOLERANCE * c->size;
   SbPose pose;
 
   PetscFunctionBeginUser;
@@ -68,7 +70,9 @@ PetscErrorCode SbEffectTangent_Springs(SbEffect e, SbSpace space, const SbStage 
     PetscReal x[3], n[3], block[9];
 
     place(space, touch->node, stage->u, x);
-    if (SbNodeNormalForce(c, &pose, touch, x, n) <= 0)
+    if (SbNodeNormalForce(c, &pose, touch, x, n) <= 0 &&
+        (c->held || touch->spring.idle || touch->lambda != 0. ||
+         SbNodeGap(c, &pose, x, n) - touch->rest > touching))
       continue;
     for (int k = 0; k < 9; k++)
       block[k] = stage->shift_k * touch->spring.stiff * n[k / 3] * n[k % 3];
