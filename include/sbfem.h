@@ -269,6 +269,9 @@ PetscReal SbSpaceVolume(SbSpace space, PetscInt body, const PetscReal u[]);
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
+/* Whether no unknown of any rank is free: algebraic multigrid finds nothing to coarsen. Collective.
+ */
+PetscErrorCode SbSpaceAllPrescribed(SbSpace space, PetscBool *all);
 /* Writes the prescribed displacements of the last evaluation (fixed_value) into u[nnode_owned][3],
    m, and projects it onto exact constraints. Not collective. */
 void SbSpaceSetPrescribed(SbSpace space, PetscScalar u[]);

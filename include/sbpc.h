@@ -21,6 +21,9 @@
   a negative number.
 */
 PetscErrorCode SbPCTwoLevelCreate(SbSpace space, PC pc);
+/* Jacobi's method, which is exact there, in place of PETSc's algebraic multigrid where no unknown
+   of the space is free: it fails without anything to coarsen. Collective. */
+PetscErrorCode SbPCMultigridAvoid(SbSpace space, PC pc);
 
 /* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed:
    false for other preconditioners and failures, or when that is done already. Collective. */

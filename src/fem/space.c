@@ -465,3 +465,13 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace s)
     PetscCall(SbJumpFindWalls(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpaceAllPrescribed(SbSpace s, PetscBool *all)
+{
+  PetscFunctionBeginUser;
+  *all = PETSC_TRUE;
+  for (PetscInt i = 0; i < s->nnode_owned && *all; i++)
+    *all = (PetscBool)(s->fixed[i] == 7);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, all, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

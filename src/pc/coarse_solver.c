@@ -32,6 +32,20 @@ PetscErrorCode SbPCMultigridSet(PC pc, PetscReal threshold)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbPCMultigridAvoid(SbSpace s, PC pc)
+{
+  PetscBool gamg, all;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCGAMG, &gamg));
+  if (!gamg)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceAllPrescribed(s, &all));
+  if (all)
+    PetscCall(PCSetType(pc, PCJACOBI));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fills v with rigid-body mode m of the bodies; zero at prescribed unknowns of nodes. */
 static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {

@@ -354,6 +354,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   PetscCall(KSPGetPC(v->coarse, &pc));
   PetscCall(SbPCMultigridSet(pc, WEAK));
   PetscCall(KSPSetFromOptions(v->coarse));
+  PetscCall(SbPCMultigridAvoid(lower, pc));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -271,6 +271,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
     PetscCall(PCSetOperators(pc, P, P));
     PetscCall(PCSetFromOptions(pc));
   }
+  PetscCall(SbPCMultigridAvoid(s, pc));
   PetscCall(SbPCCheckPivots(pc));
   PetscCall(SbPCAllowEmptyBlocks(pc));
 
