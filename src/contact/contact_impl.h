@@ -83,6 +83,16 @@ typedef struct {
   PetscBool said; /* that a body is too soft for it */
 } SbRestitution;
 
+/* How often an elastic wave crosses a body in dt, by its Young's modulus, density and volume. */
+PetscReal SbRestitutionCrossings(SbSpace space, PetscInt body, PetscReal dt);
+/*
+  SbRestitutionWarnSoft - warns, once, of an impact of a body that is not stiff within a step.
+
+  Collective. Input: the fewest crossings in dt of bodies of this rank that hit something, and which
+  body that is; infinity: none does.
+*/
+PetscErrorCode SbRestitutionWarnSoft(SbEffect effect, SbRestitution *bounce, SbSpace space,
+                                     PetscReal dt, PetscReal crossings, PetscInt body);
 /* Gap at the end of the step to which a rebounding point is constrained, m; 0: no rebound. */
 static inline PetscReal SbRestitutionGap(const SbRestitution *r, PetscReal gap0, PetscReal speed)
 {

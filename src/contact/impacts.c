@@ -23,9 +23,6 @@
 #define REST 0.999 /* of the width: a smaller gap is contact */
 #define KEEP 0.01  /* tolerance of the impact's position, over the gap above the width */
 
-#define CROSSINGS \
-  10. /* of a body by waves in a step: with less than this an impact with e = 1 loses more than 6 % */
-
 /* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
 static PetscReal meets(const Surfaces *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)
@@ -88,42 +85,21 @@ static PetscBool find_spring(const Surfaces *b, const SbContactPair *pair, const
 static PetscErrorCode warn_of_soft(Surfaces *b, PetscReal dt)
 {
   const SbSpace s = b->surface->space;
-  const SbEffect e = b->contact.base.effect;
-  struct {
-    double crossings;
-    int body;
-  } least = {PETSC_INFINITY, 0};
+  PetscReal least = PETSC_INFINITY;
+  PetscInt which = 0;
 
   PetscFunctionBeginUser;
-  if (b->contact.bounce.said)
-    PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = b->springs.n - b->springs.nbounce; i < b->springs.n; i++) {
     for (PetscInt k = 0; k < b->springs.spring[i].at.n; k++) {
       const PetscInt body = b->surface->part[b->springs.spring[i].at.v[k]];
-      PetscReal crossings;
+      const PetscReal crossings =
+        body < s->mesh->nbody ? SbRestitutionCrossings(s, body, dt) : PETSC_INFINITY;
 
-      if (body >= s->mesh->nbody)
-        continue;
-      crossings =
-        PetscSqrtReal(SbMaterialYoungModulus(s->material[body]) / s->material[body]->density) * dt /
-        PetscCbrtReal(s->mesh->body[body].volume);
-      if (crossings >= least.crossings)
-        continue;
-      least.crossings = crossings;
-      least.body = (int)body;
+      which = crossings < least ? body : which;
+      least = PetscMin(least, crossings);
     }
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
-  if (least.crossings >= CROSSINGS)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  b->contact.bounce.said = PETSC_TRUE;
-  PetscCall(SbWarning(
-    s->comm,
-    "effect %s: restitution is for bodies that are stiff within a step, which elastic waves cross "
-    "%g times or more; they cross body %s %.2g times in %g s: it rebounds more slowly, the rest is "
-    "vibrations that -time euler_implicit dissipates; a longer -ts_dt, or without restitution a "
-    "shorter one that resolves the impact; said once",
-    e->name, CROSSINGS, s->mesh->body[least.body].name, least.crossings, (double)dt));
+  PetscCall(SbRestitutionWarnSoft(b->contact.base.effect, &b->contact.bounce, s, dt, least, which));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

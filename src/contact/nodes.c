@@ -190,11 +190,20 @@ static PetscErrorCode begin_step_nodes(SbContact contact, SbSpace space, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a node would reach the obstacle in this step at its speed of approach. */
+static PetscBool comes(const Nodes *c, const ContactNode *touch)
+{
+  return (PetscBool)(touch->approach > 0 &&
+                     c->contact.bounce.dt * touch->approach * (1 + EARLY) >= touch->gap0);
+}
+
 /* Restitution: speeds of approach of nodes that were separated. */
 static PetscErrorCode find_impacts_nodes(SbContact contact, SbSpace space, PetscReal dt,
                                          const PetscReal u0[], const PetscReal v0[])
 {
   Nodes *c = (Nodes *)contact;
+  PetscReal least = PETSC_INFINITY;
+  PetscInt which = 0;
 
   PetscFunctionBeginUser;
   c->contact.bounce.left = 1;
@@ -213,7 +222,15 @@ static PetscErrorCode find_impacts_nodes(SbContact contact, SbSpace space, Petsc
     for (int k = 0; k < 3; k++)
       v -= n[k] * (v0[3 * touch->node + k] - (x1[k] - x0[k]) / dt);
     touch->approach = PetscMax(0, v);
+    if (comes(c, touch)) {
+      const PetscInt body = space->node_body[touch->node];
+      const PetscReal crossings = SbRestitutionCrossings(space, body, dt);
+
+      which = crossings < least ? body : which;
+      least = PetscMin(least, crossings);
+    }
   }
+  PetscCall(SbRestitutionWarnSoft(contact->effect, &c->contact.bounce, space, dt, least, which));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,11 +254,7 @@ static PetscErrorCode start_nodes(SbContact contact, SbSpace space, const PetscR
     /* constraints: nodes that penetrate, or would at their speed of approach, in static runs also
        those that touch, as nothing else may hold the body; springs: those that push, or touch */
     if (exact(c)) {
-      const PetscBool comes =
-        (PetscBool)(touch->approach > 0 &&
-                    c->contact.bounce.dt * touch->approach * (1 + EARLY) >= touch->gap0);
-
-      if (touch->gap < touching || comes)
+      if (touch->gap < touching || comes(c, touch))
         SbNodeEnter(c, touch);
     } else if (c->held) {
       if (spring(touch, touch->gap) > 0 || (touch->gap < touching && !touch->spring.idle))

@@ -31,6 +31,8 @@
 #define STEEP \
   2.1 /* factor on the excess 1 - most / W: a stiff body's W / D grows with the root of e */
 #define ROUND 1e-9 /* relative tolerance of W <= D */
+#define CROSSINGS \
+  10. /* of a body by waves in a step: with less than this an impact with e = 1 loses more than 6 % */
 
 /* Kinetic energy of the velocity V, J, over all ranks. */
 static PetscErrorCode kinetic_energy(SbSpace s, Vec V, PetscReal *energy)
@@ -114,5 +116,38 @@ PetscErrorCode SbContactSetCheckRestitution(SbContactSet *contacts, Vec U, Petsc
   PetscCall(PetscInfo(NULL, "bounces do %g J, %g J may be: coefficients reduced to %g of them\n",
                       (double)W, (double)most, (double)contacts->bounce.left));
   *again = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbRestitutionCrossings(SbSpace s, PetscInt body, PetscReal dt)
+{
+  const SbMaterial m = s->material[body];
+
+  return PetscSqrtReal(SbMaterialYoungModulus(m) / m->density) * dt /
+         PetscCbrtReal(s->mesh->body[body].volume);
+}
+
+PetscErrorCode SbRestitutionWarnSoft(SbEffect e, SbRestitution *bounce, SbSpace s, PetscReal dt,
+                                     PetscReal crossings, PetscInt body)
+{
+  struct {
+    double crossings;
+    int body;
+  } least = {crossings, (int)body};
+
+  PetscFunctionBeginUser;
+  if (bounce->said)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
+  if (least.crossings >= CROSSINGS)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  bounce->said = PETSC_TRUE;
+  PetscCall(SbWarning(
+    s->comm,
+    "effect %s: restitution is for bodies that are stiff within a step, which elastic waves cross "
+    "%g times or more; they cross body %s %.2g times in %g s: it rebounds more slowly, the rest is "
+    "vibrations that -time euler_implicit dissipates; a longer -ts_dt, or without restitution a "
+    "shorter one that resolves the impact; said once",
+    e->name, CROSSINGS, s->mesh->body[least.body].name, least.crossings, (double)dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
