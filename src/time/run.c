@@ -369,6 +369,10 @@ PetscErrorCode SbRunSolve(SbRun run)
 PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
+
+  PetscFunctionBeginUser;
+  if (!r)
+    PetscFunctionReturn(PETSC_SUCCESS);
   Vec *const vectors[] = {&r->solve.R,
                           &r->solve.left,
                           &r->solve.nonsymmetric.U,
@@ -382,10 +386,6 @@ PetscErrorCode SbRunDestroy(SbRun *run)
                           &r->state.previous,
                           &r->state.path,
                           &r->state.mass};
-
-  PetscFunctionBeginUser;
-  if (!r)
-    PetscFunctionReturn(PETSC_SUCCESS);
   if (r->monitors.output_destroy)
     PetscCall(r->monitors.output_destroy(r));
   PetscCall(PetscFree(r->solve.fallbacks));
