@@ -8,14 +8,6 @@
 #include "sbgeometry.h"
 #include "sbmeshio.h"
 
-void SbCellCentre(SbMesh mesh, PetscInt cell, PetscReal x[3])
-{
-  for (int k = 0; k < 3; k++)
-    x[k] = 0.;
-  for (int k = 0; k < 12; k++)
-    x[k % 3] += mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3] / 4.;
-}
-
 /* Direction i, 0: fibre, 1: sheet, of the cells of material k of a body. */
 static PetscErrorCode from_field(SbMesh mesh, PetscInt body, PetscInt k, SbFibres f, int i)
 {

@@ -42,6 +42,14 @@ enum {
   RIGHT
 };
 
+void SbCellCentre(SbMesh mesh, PetscInt cell, PetscReal x[3])
+{
+  for (int k = 0; k < 3; k++)
+    x[k] = 0.;
+  for (int k = 0; k < 12; k++)
+    x[k % 3] += mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3] / 4.;
+}
+
 /* Volume of a tet, and the gradients of its four basis functions. */
 static PetscReal gradients(SbMesh mesh, PetscInt cell, PetscReal g[4][3])
 {

@@ -52,8 +52,13 @@ static PetscErrorCode set_from_options(SbMaterial m, const SbScope *scope)
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "a", &law->a));
   PetscCall(SbOptionReal(scope, "b", &law->b));
-  for (int i = 0; i < 6; i++)
-    PetscCall(SbOptionReal(scope, key[i / 2][i % 2], &law->of[i / 2][i % 2]));
+
+  // without a stiffness its exponent is not read, so that it is said to be unused
+  for (int i = 0; i < 3; i++) {
+    PetscCall(SbOptionReal(scope, key[i][0], &law->of[i][0]));
+    if (law->of[i][0] > 0)
+      PetscCall(SbOptionReal(scope, key[i][1], &law->of[i][1]));
+  }
   law->fibrous.isochoric.shape = shape_ho;
   law->fibrous.fibre = fibre_ho;
   PetscCall(SbFibresRead(m, scope, (PetscBool)(law->of[1][0] > 0 || law->of[2][0] > 0)));

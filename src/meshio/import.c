@@ -195,6 +195,7 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
   char known[512] = "";
   char node[PETSC_MAX_PATH_LEN + 8];
+  char step[SB_IMPORT_OPTION_MAX];
   const char *dot = strrchr(body->mesh, '.');
   SbReader read = strncmp(body->mesh, "box:", 4) ? NULL : SbImportRead_Box;
   PetscBool tetgen = PETSC_TRUE;
@@ -222,6 +223,11 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
     read = SbImportRead_TetGen;
   if (read != SbImportRead_Box && read != SbImportRead_TetGen)
     PetscCall(check_contents(body, im, &read));
+  PetscCheck(!im->step || read == SbImportRead_H5 || read == SbImportRead_Xdmf, PETSC_COMM_SELF,
+             PETSC_ERR_USER_INPUT,
+             "%s: %s %lld is of the files of a run, .h5 and .xmf: this mesh has no steps",
+             im->where, SbImportOption(im, body->name[0] ? "mesh_step" : "step", step),
+             (long long)im->step);
   PetscCall((*read)(body->mesh, im));
   given = im->nmiddle.n;
   PetscCall(SbImportMiddles(im, NULL, &largest));

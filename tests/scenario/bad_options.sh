@@ -147,6 +147,7 @@ error 1 "-ksp_max_it 0|[1, inf)" bar.opts -ksp_max_it 0
 error 1 "-ksp_divtol 0.1|(1, inf]" bar.opts -ksp_divtol 0.1
 error 1 "-snes_divergence_tolerance 0.5|(1, inf]" bar.opts -snes_divergence_tolerance 0.5
 error 1 "-snes_linesearch_damping 0|(0, 1]" bar.opts -snes_linesearch_damping 0
+error 2 "-body_bar_mesh_step 3" bar.opts -body_bar_mesh_step 3
 error 1 "-ksp_gmres_restart 0|[1, inf)" bar.opts -ksp_gmres_restart 0
 error 2 "-ts_atol 1e+09 m" bar.opts -ts_atol 1e9
 error 1 "-ts_adapt_safety 2|(0, 1]" bar.opts -ts_adapt_safety 2
@@ -182,6 +183,8 @@ unused() { # RANKS OPTION ARGUMENT...
 unused 1 -static_steps -static_steps 3
 unused 2 -saddle_solver -saddle_solver direct
 unused 1 -time_spectral_radius -time newmark -time_spectral_radius 0.3
+"$supple" bar.opts -quiet -output_dir unused -body_bar_material holzapfel_ogden -body_bar_a 1e4 -body_bar_b 1 -body_bar_b_f 3 >out.txt 2>err.txt
+check "an exponent without its stiffness: $(cat err.txt)" test "$(grep -c "^supple: warning: -body_bar_b_f is unused" err.txt)" = 1
 unused 1 -effect_pull_displacement -effect_pull_displacement 1          # of another type
 unused 1 -body_bar_tangent -body_bar_material linear -body_bar_tangent warped
 unused 2 "-effect_pull_[a-z]* and 2 more" -effects gravity,hold              # left out by the command line
