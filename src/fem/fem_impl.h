@@ -113,8 +113,8 @@ void SbWallMatrix(const SbWall *wall, PetscReal K[3][3]);
    docs/reference/theory.md. */
 #define SB_FOLLOW 4.
 
-/* fibre_rule.c: centre of a straight tet at rest, m; and SbMesh.direction of the cells of material k
-   of a body by the rule of surfaces; collective. */
+/* fibre_rule.c: centre of a straight tet at rest, m; and SbMesh.direction of the cells of material
+   k of a body by the rule of surfaces; collective. */
 void SbCellCentre(SbMesh mesh, PetscInt cell, PetscReal x[3]);
 PetscErrorCode SbFibresByRule(SbMesh mesh, PetscInt body, PetscInt k, SbFibres fibres);
 

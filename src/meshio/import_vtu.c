@@ -539,15 +539,21 @@ typedef struct {
   PetscInt index, piece;
 } Point;
 
+static int compare_keys(const Point *p, const Point *q)
+{
+  for (int k = 0; k < 3; k++)
+    if (p->key[k] != q->key[k])
+      return p->key[k] < q->key[k] ? -1 : 1;
+  return 0;
+}
+
 static int compare_points(const void *a, const void *b)
 {
   const Point *p = (const Point *)a;
   const Point *q = (const Point *)b;
+  const int order = compare_keys(p, q);
 
-  for (int k = 0; k < 3; k++)
-    if (p->key[k] != q->key[k])
-      return p->key[k] < q->key[k] ? -1 : 1;
-  return (p->index > q->index) - (p->index < q->index);
+  return order ? order : (p->index > q->index) - (p->index < q->index);
 }
 
 /* Whether points first..last, of one key, are the same; `size`: of the grid. */
@@ -621,7 +627,7 @@ static PetscErrorCode join_points(Vtu *v, PetscInt *njoined)
   for (PetscInt i = 0, j; i < n; i = j + 1) {
     PetscBool same;
 
-    for (j = i; j + 1 < n && !memcmp(point[j + 1].key, point[i].key, sizeof(point->key)); j++)
+    for (j = i; j + 1 < n && !compare_keys(&point[j + 1], &point[i]); j++)
       continue;
     PetscCall(check_same(v, &point[i], &point[j], size, &same));
     for (PetscInt k = i; same && k <= j; k++)
