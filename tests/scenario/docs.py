@@ -144,7 +144,7 @@ def main():
                 if words[0] == "make":
                     for word in words[1:]:
                         check(f"{page.name}: {line}: no such target", "=" in word or word.startswith("-") or word in targets or word.startswith(("meshes/", "build/tests/", "bin/")))
-                elif guide and words[0].startswith(("bin/", ".venv/", "scripts/mpi", "scripts/render")):
+                elif guide and words[0].startswith(("bin/", ".venv/", "scripts/mpi", "scripts/render", "scripts/fit")):
                     run(page, line)
                     nrun += 1
                 elif words[0].startswith(("build/", "bin/")):

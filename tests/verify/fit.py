@@ -1,0 +1,224 @@
+"""Fits of laws to tests of materials: the closed forms of python/supple/laws.py beside the program's stresses and its warning of instability; constants that synthetic tests
+give back; Treloar's rubber and the brain of the guide; errors of tables; scripts/fit, whose options the program runs.
+
+@cpu 120
+"""
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+
+from output_common import OUT, SUPPLE
+
+sys.path.insert(0, str(Path("python").resolve()))
+from supple import Run, RunError
+from supple.fitting import Fit, Points, fit, read_points
+from supple.laws import Law
+
+OUT.mkdir(parents=True, exist_ok=True)
+POISSON = 0.499995  # K/mu = 1e5: the closed forms are those of its limit, to a part in 1e4 at these stretches
+
+# A cube for each mode, whose state is uniform: stretches by planes that slide, shear by all of its surface.
+CUBES = {"uniaxial": (1.5, ""), "compression": (0.8, ""), "equibiaxial": (1.3, "y"), "planar": (1.6, "y"), "shear": (0.7, "")}
+SOFT = {"uniaxial": (1.06, ""), "compression": (0.95, ""), "equibiaxial": (1.04, "y"), "planar": (1.05, "y"), "shear": (0.1, "")}
+LAWS = [
+    (Law("isochoric_neohookean", mu=4e5), CUBES), (Law("neohookean", mu=4e5), CUBES), (Law("stable_neohookean", mu=4e5), CUBES),
+    (Law("mooney_rivlin", c10=2e5, c01=5e4, c20=3e3, c11=500, c02=600, c30=40, c21=30, c12=20, c03=10), CUBES), (Law("yeoh", c1=2e5, c2=-2e3, c3=60), CUBES),
+    (Law("gent", mu=4e5, jm=20), CUBES), (Law("arruda_boyce", mu=3e5, lambda_m=2.8), CUBES), (Law("ogden", mu=[0.63e6, 0.0012e6, -0.01e6], alpha=[1.3, 5, -2]), CUBES),
+    (Law("ogden", mu=[-150.0], alpha=[-19.0]), SOFT)]
+
+
+def check(condition, text):
+    if not condition:
+        sys.exit(text)
+
+
+def refused(function, *words):
+    try:
+        function()
+    except RunError as e:
+        check(all(word in str(e) for word in words), f"'{e}' does not name {words}")
+        return
+    sys.exit(f"no error that names {words}")
+
+
+def run(folder, options):
+    done = subprocess.run([SUPPLE, *options, "-time", "static", "-output_dir", str(OUT / folder), "-output_overwrite", "-solver", "direct", "-quiet"], capture_output=True, text=True)
+    check(done.returncode == 0, f"{folder}: exit code {done.returncode}\n{' '.join(options)}\n{done.stdout}{done.stderr}")
+    return Run(OUT / folder), done.stdout + done.stderr
+
+
+def moved(name, on, letter, distance):
+    return ["-effect_" + name + "_type", "prescribed_displacement", f"-effect_{name}_on", on, f"-effect_{name}_components", letter,
+            f"-effect_{name}_displacement", ";".join(str(distance) if c == letter else "0" for c in "xyz")]
+
+
+def cubes(law_lines, states):
+    """Options of the cubes, all of the law of `law_lines`, which name the body `default`."""
+    options, effects = [*law_lines], []
+    for k, (mode, (x, held)) in enumerate(states.items()):
+        options += [f"-body_{mode}_mesh", "box:1,1,1:2", f"-body_{mode}_translate", f"{3 * k},0,0"]
+        if mode == "shear":
+            on = ",".join(f"{mode}.{side}" for side in ("ymin", "ymax", "xmin", "xmax", "zmin", "zmax"))
+            options += [f"-effect_{mode}_type", "prescribed_displacement", f"-effect_{mode}_on", on, f"-effect_{mode}_displacement", f"{x}*y;0;0"]
+            effects.append(mode)
+            continue
+        for letter in "xyz":
+            options += [f"-effect_{mode}{letter}_type", "fixed", f"-effect_{mode}{letter}_on", f"{mode}.{letter}min", f"-effect_{mode}{letter}_components", letter]
+            effects.append(mode + letter)
+        for letter in "x" + held:
+            options += moved(f"{mode}{letter}move", f"{mode}.{letter}max", letter, 0 if (mode, letter) == ("planar", "y") else round(x - 1, 12))
+            effects.append(f"{mode}{letter}move")
+    return ["-bodies", ",".join(states), "-effects", ",".join(effects), "-static_steps", "4", "-snes_rtol", "1e-10", "-output_fields", "displacement,stress", *options]
+
+
+def check_program():
+    """The nominal stress of each law and mode: that of the program's Cauchy stress, P = J sigma F^-T."""
+    for k, (law, states) in enumerate(LAWS):
+        found, _ = run(f"law{k}", cubes(" ".join(law.option_lines("default", POISSON)).split(), states))
+        mesh, stress = found.mesh(), found.field("stress").astype(float)
+        place = mesh.x[mesh.cells].mean(axis=1)[:, 0] // 3
+        for n, (mode, (x, _)) in enumerate(states.items()):
+            cauchy = stress[place == n][:, 1 if mode == "shear" else 0]
+            expected = float(law.nominal_stress(mode, [x])[0]) * (1 if mode == "shear" else x)
+            check(len(cauchy) == 40 or len(cauchy) == 48, f"{len(cauchy)} tets of a cube")
+            check(numpy.abs(cauchy - expected).max() < 2e-4 * abs(expected), f"{law.family.name} {mode} {x}: {cauchy.min()} to {cauchy.max()} by the program, {expected} by the closed form")
+        found.close()
+
+
+def check_published():
+    """The numbers of docs/reference/materials.md; the shear modulus at rest is the slope of simple shear."""
+    law = Law("ogden", mu=[0.63, 0.0012, -0.01], alpha=[1.3, 5, -2])
+    for mode, x, stress in ("uniaxial", [1.39, 3.02, 6.4], [0.3399, 0.8854, 3.0933]), ("equibiaxial", [1.31, 3.43], [0.4663, 1.4738]), ("planar", [1.87, 4.96], [0.6426, 1.7785]):
+        check(numpy.abs(law.nominal_stress(mode, x) - stress).max() < 6e-5, f"Ogden's table, {mode}: {law.nominal_stress(mode, x)}")
+    for law, _ in LAWS:
+        slope = float(law.nominal_stress("shear", [1e-6])[0]) / 1e-6
+        check(abs(slope / law.shear_modulus - 1) < 1e-9, f"{law.family.name}: shear modulus {law.shear_modulus}, slope {slope}")
+
+
+def check_stability():
+    """The program's warning names the stretch where the range of the fit ends, within one of its 200 steps."""
+    law = Law("yeoh", c1=3e5, c2=-2e4, c3=80)
+    _, text = run("unstable", cubes(" ".join(law.option_lines("default")).split(), {"uniaxial": (1.01, "")}))
+    for mode in ("uniaxial", "planar"):
+        low, high = law.stable(mode, 0.3, 3.0)
+        for word, value in ("beyond", high), ("below", low):
+            named = re.search(rf"{mode} \w+ {word} the stretch ([\d.]+)", text)
+            check(named and abs(math.log(float(named[1]) / value)) < math.log(3) / 200 + 0.005, f"{mode} {word}: {value}; the program says {text}")
+    stable = Law("ogden", mu=[4e5, -1e4], alpha=[2, -2])
+    check(stable.stable("equibiaxial", 0.3, 3) == (0.3, 3.0) and stable.rising("shear", 0, 2.6) == (0.0, 2.6), "a law that is stable everywhere")
+    # a gent has no numbers beyond its limit of stretch, l^2 + 2/l - 3 = jm
+    check(2.2 < Law("gent", mu=1, jm=3).stable("uniaxial", 0.3, 3)[1] < 2.26, "the limit of gent")
+
+
+def synthetic(law, states=None):
+    x = states or {"uniaxial": numpy.linspace(1.1, 2.5, 8), "compression": numpy.linspace(0.5, 0.9, 5), "equibiaxial": numpy.linspace(1.1, 2, 6),
+                   "planar": numpy.linspace(1.1, 2.2, 6), "shear": numpy.linspace(0.1, 1, 5)}
+    return Points(*map(numpy.concatenate, zip(*[([mode] * len(v), v, law.nominal_stress(mode, v)) for mode, v in x.items()])))
+
+
+def check_recovered():
+    """Points of a law give its constants back, by each kind of error."""
+    nine = Law("mooney_rivlin", c10=2e5, c01=5e4, c20=3e3, c11=500, c02=600, c30=40, c21=30, c12=20, c03=10)
+    cases = [(law, None) for law, states in LAWS if states is CUBES and law.family.name not in ("mooney_rivlin", "ogden")] + [
+        (nine, 9), (Law("ogden", mu=[3e5, -2e4], alpha=[1.7, -2.5]), 2), (Law("ogden", mu=[0.63e6, 0.0012e6, -0.01e6], alpha=[1.3, 5, -2]), 3)]
+    for n, (law, terms) in enumerate(cases):
+        found = fit(synthetic(law), law.family.name, terms, ("relative", "mode", "absolute")[n % 3]).law
+        for key, value in law.constants.items():
+            a, b = numpy.sort(numpy.atleast_1d(value)), numpy.sort(numpy.atleast_1d(found.constants[key]))
+            check(a.shape == b.shape and numpy.allclose(a, b, rtol=1e-3), f"{law.family.name} {key}: {b}, expected {a}")
+    # weights: points of weight 0 do not count
+    points = synthetic(Law("neohookean", mu=5.0))
+    points.stress[3], points.weight[3] = 99.0, 0
+    check(abs(fit(points, "neohookean").law.shear_modulus - 5) < 1e-9, "weights")
+    # terms that are to be stable are, where the free ones are not
+    brain = read_points(["docs/data/brain_corona_radiata.csv"], "kPa")
+    free, stable = (fit(brain, "mooney_rivlin", 2, stable=s) for s in (False, True))
+    whole = lambda found: all(row["stable"] == (row["low"], row["high"]) for row in found.ranges.values())
+    check(min(stable.law.scale) >= 0 > min(free.law.scale) and whole(stable) and not whole(free), f"{free.law}; {stable.law}")
+
+
+def check_examples():
+    """Treloar's rubber: three terms of Ogden's law come closer than his own constants of 1972, and are like them. The brain: no neo-Hookean, one term of Ogden's law with a
+    large negative exponent."""
+    rubber = read_points(["docs/data/treloar.csv"], "MPa")
+    check(len(rubber) == 53 and rubber.stress.max() == 6.3e6, "Treloar's points")
+    own = Fit(Law("ogden", mu=[0.63e6, 0.0012e6, -0.01e6], alpha=[1.3, 5, -2]), rubber)
+    found = {terms: fit(rubber, "ogden", terms) for terms in (1, 3)}
+    neo = fit(rubber, "isochoric_neohookean")
+    percent = lambda a: a.errors["all"]["percent"]
+    check(own.errors["all"]["R2"] > 0.98 and percent(found[3]) < percent(own) < 8, f"Ogden: {percent(own)} % with his constants, {percent(found[3])} % fitted")
+    check(percent(neo) > 3 * percent(found[3]) and percent(found[1]) > 3 * percent(found[3]), f"neo-Hookean {percent(neo)} %")
+    alpha, published = numpy.sort(found[3].law.shape), numpy.array([-2, 1.3, 5])
+    check(numpy.abs(alpha - published).max() < 0.6 and abs(found[3].law.shear_modulus / 0.4225e6 - 1) < 0.1, f"alpha {alpha}, shear modulus {found[3].law.shear_modulus}")
+    # exponents of both tissues: those of the cortex are nearer to -19
+    for name, low, high in ("corona_radiata", -24.5, -22.5), ("cortex", -21.5, -18):
+        brain = read_points([f"docs/data/brain_{name}.csv"], "kPa")
+        for errors in ("relative", "mode", "absolute"):
+            one = fit(brain, "ogden", 1, errors)
+            check(low < one.law.shape[0] < high and one.errors["all"]["R2"] > 0.97, f"{name}, {errors} errors: {one.law}")
+        neo, one = fit(brain, "isochoric_neohookean"), fit(brain, "ogden", 1)
+        check(percent(neo) > 2 * percent(one) and neo.errors["compression"]["of_largest"] > 0.25, f"{name}: neo-Hookean {neo.errors}")
+
+
+def table(text, name="bad.csv"):
+    (OUT / name).write_text(text)
+    return OUT / name
+
+
+def check_tables():
+    """Files of several modes and of one; what is wrong is named with its line."""
+    several = read_points([table("# a remark\nstress, mode, shear, weight\n\n2, simple shear, 0.1, 1  # its stress\n3, pure-shear, 1.2, 0.5\n")], "kPa")
+    check(several.modes == ["planar", "shear"] and several.stress.tolist() == [2e3, 3e3] and several.weight.tolist() == [1, 0.5], "columns by name")
+    one = read_points([f"biaxial={table('1.1,5', 'a.csv')}", f"uniaxial={table('1.2,7,2', 'b.csv')}"])
+    check(one.mode.tolist() == ["equibiaxial", "uniaxial"] and one.x.tolist() == [1.1, 1.2] and one.weight.tolist() == [1, 2], "files of one mode")
+    head = "mode,stretch,stress\n"
+    for text, *words in ((head + "uniaxal,1.1,2\n", "line 2", "uniaxal", "uniaxial"), (head + "uniaxial,0,2\n", "line 2", "0"), (head + "planar,-1,2\n", "line 2", "-1"),
+                         (head + "uniaxial,1.1,two\n", "line 2", "two"), (head + "uniaxial,1.1\n", "line 2"), (head + "uniaxial,1.1,nan\n", "line 2", "nan"),
+                         (head + "compression,1.1,2\n", "line 2", "1.1"), (head + "compression,0.9,2\n", "negative"), (head + "planar,1.2,3,1,9\n", "line 2"),
+                         ("mode,strain,stress\n", "line 1", "stretch"), ("mode,stretch,stress,colour\n", "line 1", "colour"), (head, "no points"), ("", "no points"),
+                         ("mode,stretch,stress,weight\nplanar,1.2,3,-1\n", "line 2", "-1")):
+        refused(lambda: read_points([table(text)]), *words)
+    refused(lambda: read_points([OUT / "nowhere.csv"]), "nowhere.csv")
+    refused(lambda: read_points([f"plane={table('1.1,5')}"]), "plane")
+    two = Points(["uniaxial"] * 4, [1, 1.1, 1.2, 1.2], [0, 1, 2, 2.1])
+    refused(lambda: fit(two, "ogden", 3), "6 constants", "2 points")
+    refused(lambda: fit(two, "yeoh", 4), "4")
+    refused(lambda: fit(two, "odgen"), "ogden")
+    refused(lambda: fit(two, "gent", 2), "gent")
+    refused(lambda: fit(Points(["uniaxial"] * 2, [1.1, 1.2], [-1, -2]), "yeoh", 1), "shear modulus")
+    refused(lambda: fit(Points(["uniaxial"] * 2, [1.1, 1.2], [0, 2]), "yeoh", 1), "relative")
+
+
+def script(*words, code=0):
+    done = subprocess.run([sys.executable, "scripts/fit", *map(str, words)], capture_output=True, text=True)
+    check(done.returncode == code, f"scripts/fit {words}: exit code {done.returncode}\n{done.stderr}")
+    return done.stdout if not code else done.stderr
+
+
+def check_script():
+    """The options that it prints are run by the program, which finds the stress of the tests; a picture, JSON, laws beside each other."""
+    text = script("docs/data/treloar.csv", "--unit", "MPa", "--law", "ogden", "--terms", 3, "--body", "default", "--poisson", POISSON, "--picture", OUT / "fit.png")
+    lines = [line for line in text.splitlines() if line.startswith("-body_default_")]
+    check(len(lines) == 4 and (OUT / "fit.png").stat().st_size > 5000, text)
+    found, said = run("fitted", cubes(" ".join(lines).split(), {"uniaxial": (2.17, "")}))
+    stress = found.field("stress")[:, 0].mean() / 2.17
+    found.close()
+    check(abs(stress / 0.58e6 - 1) < 0.1 and "unstable" not in said, f"nominal stress at the stretch 2.17: {stress} Pa by the fitted law, 0.58 MPa by the test; {said}")
+    it = json.loads(script("docs/data/treloar.csv", "--unit", "MPa", "--law", "ogden", "--terms", 3, "--body", "default", "--json"))
+    check(it["options"][1:3] == lines[1:3] and it["errors"]["all"]["points"] == 53 and f"{it['shear_modulus'] / 1e6:.4g} MPa" in text, "JSON")
+    text = script("docs/data/brain_cortex.csv", "--unit", "kPa", "--law", "neohookean,ogden:1")
+    check(len(text.splitlines()) == 3 and "compression" in text, text)
+    done = subprocess.run([sys.executable, "scripts/fit", f"uniaxial={table('1.1,5', 'a.csv')}", "--law", "mooney_rivlin", "--terms", "1"], capture_output=True, text=True)
+    check(done.returncode == 0 and "warning" in done.stderr and "uniaxial" in done.stderr, f"one mode alone: {done.stderr}")
+    check("LAW:TERMS" in script("docs/data/treloar.csv", "--law", "yeoh,gent", "--terms", 2, code=1), "terms of several laws")
+    check("nowhere.csv" in script("nowhere.csv", "--law", "gent", code=1), "a file that is missing")
+
+
+for part in (check_published, check_program, check_stability, check_recovered, check_examples, check_tables, check_script):
+    part()
+print("fits: all fine")
