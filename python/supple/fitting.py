@@ -1,7 +1,7 @@
 """Constants of a law from tests of a material: tables of stretch and nominal stress, of one mode or of several together. Needs scipy.
 
     points = read_points(["rubber.csv"], unit="MPa")
-    found = fit(points, "ogden", terms=3)
+    found = fit_law(points, "ogden", terms=3)
     found.law.option_lines("band"), found.errors["planar"], found.ranges["uniaxial"]
 
 Minimised is sum w_i (P(x_i) - P_i)^2 / s_i^2 over all points, w_i their weights and s_i by `errors`:
@@ -190,7 +190,7 @@ def shape_variables(fam, points):
     return lambda z: z, starts, (-LARGEST, LARGEST)
 
 
-def fit(points, law, terms=None, errors="relative", stable=False):
+def fit_law(points, law, terms=None, errors="relative", stable=False):
     """Fits a law, of so many terms, to Points. Returns a Fit; RunError where there are too few points, or no constants have a positive shear modulus."""
     fam = family(law, terms)
     rest = numpy.array([MODES[mode][1] for mode in points.mode])

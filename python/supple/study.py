@@ -37,9 +37,9 @@ def text_of(value):
     return ",".join(map(text_of, value)) if isinstance(value, (tuple, numpy.ndarray)) else str(value)
 
 
-def options_of(scenario, options):
-    """The program's options from keywords: full names (body_organ_young, ts_dt), or the end of those of every body (young)."""
-    viewed = subprocess.run([program(), str(scenario), "-scenario_view"], capture_output=True, text=True)
+def options_of(scenario, options, folder):
+    """The program's options from keywords: full names (body_organ_young, ts_dt), or the end of those of every body (young). folder: of the run, so that runs beside each other do not meet in that of the scenario."""
+    viewed = subprocess.run([program(), str(scenario), "-scenario_view", "-output_dir", str(folder)], capture_output=True, text=True)
     if viewed.returncode:
         raise RunError(viewed.stderr.strip().splitlines()[-1] if viewed.stderr.strip() else f"{scenario} cannot be read")
     known = {line.lstrip("#").split()[0][1:] for line in viewed.stdout.splitlines() if line.lstrip("# ").startswith("-")}
@@ -60,7 +60,7 @@ def start(scenario, folder, ranks=1, **options):
     to all of them. Results of an earlier run in `folder` are replaced, unless output_overwrite=False keeps them in its subfolder before_DATE.
     Raises RunError with the program's message when the run fails."""
     options = {"output_overwrite": True} | options
-    done = subprocess.run([*command(ranks), str(scenario), "-output_dir", str(folder), "-quiet", *options_of(scenario, options)],
+    done = subprocess.run([*command(ranks), str(scenario), "-output_dir", str(folder), "-quiet", *options_of(scenario, options, folder)],
                           capture_output=True, text=True)
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if line.startswith("supple: error:")] or done.stderr.strip().splitlines()

@@ -1,5 +1,6 @@
 """Fits of laws to tests of materials: the closed forms of python/supple/laws.py beside the program's stresses and its warning of instability; constants that synthetic tests
-give back; Treloar's rubber and the brain of the guide; errors of tables; scripts/fit, whose options the program runs.
+give back; Treloar's rubber and the brain of the guide; errors of tables; scripts/fit, whose options the program runs; options of a scenario from its own
+force and probe.
 
 @cpu 120
 """
@@ -15,8 +16,9 @@ import numpy
 from output_common import OUT, SUPPLE
 
 sys.path.insert(0, str(Path("python").resolve()))
+import supple
 from supple import Run, RunError
-from supple.fitting import Fit, Points, fit, read_points
+from supple.fitting import Fit, Points, fit_law, read_points
 from supple.laws import Law
 
 OUT.mkdir(parents=True, exist_ok=True)
@@ -127,17 +129,17 @@ def check_recovered():
     cases = [(law, None) for law, states in LAWS if states is CUBES and law.family.name not in ("mooney_rivlin", "ogden")] + [
         (nine, 9), (Law("ogden", mu=[3e5, -2e4], alpha=[1.7, -2.5]), 2), (Law("ogden", mu=[0.63e6, 0.0012e6, -0.01e6], alpha=[1.3, 5, -2]), 3)]
     for n, (law, terms) in enumerate(cases):
-        found = fit(synthetic(law), law.family.name, terms, ("relative", "mode", "absolute")[n % 3]).law
+        found = fit_law(synthetic(law), law.family.name, terms, ("relative", "mode", "absolute")[n % 3]).law
         for key, value in law.constants.items():
             a, b = numpy.sort(numpy.atleast_1d(value)), numpy.sort(numpy.atleast_1d(found.constants[key]))
             check(a.shape == b.shape and numpy.allclose(a, b, rtol=1e-3), f"{law.family.name} {key}: {b}, expected {a}")
     # weights: points of weight 0 do not count
     points = synthetic(Law("neohookean", mu=5.0))
     points.stress[3], points.weight[3] = 99.0, 0
-    check(abs(fit(points, "neohookean").law.shear_modulus - 5) < 1e-9, "weights")
+    check(abs(fit_law(points, "neohookean").law.shear_modulus - 5) < 1e-9, "weights")
     # terms that are to be stable are, where the free ones are not
     brain = read_points(["docs/data/brain_corona_radiata.csv"], "kPa")
-    free, stable = (fit(brain, "mooney_rivlin", 2, stable=s) for s in (False, True))
+    free, stable = (fit_law(brain, "mooney_rivlin", 2, stable=s) for s in (False, True))
     whole = lambda found: all(row["stable"] == (row["low"], row["high"]) for row in found.ranges.values())
     check(min(stable.law.scale) >= 0 > min(free.law.scale) and whole(stable) and not whole(free), f"{free.law}; {stable.law}")
 
@@ -148,8 +150,8 @@ def check_examples():
     rubber = read_points(["docs/data/treloar.csv"], "MPa")
     check(len(rubber) == 53 and rubber.stress.max() == 6.3e6, "Treloar's points")
     own = Fit(Law("ogden", mu=[0.63e6, 0.0012e6, -0.01e6], alpha=[1.3, 5, -2]), rubber)
-    found = {terms: fit(rubber, "ogden", terms) for terms in (1, 3)}
-    neo = fit(rubber, "isochoric_neohookean")
+    found = {terms: fit_law(rubber, "ogden", terms) for terms in (1, 3)}
+    neo = fit_law(rubber, "isochoric_neohookean")
     percent = lambda a: a.errors["all"]["percent"]
     check(own.errors["all"]["R2"] > 0.98 and percent(found[3]) < percent(own) < 8, f"Ogden: {percent(own)} % with his constants, {percent(found[3])} % fitted")
     check(percent(neo) > 3 * percent(found[3]) and percent(found[1]) > 3 * percent(found[3]), f"neo-Hookean {percent(neo)} %")
@@ -159,9 +161,9 @@ def check_examples():
     for name, low, high in ("corona_radiata", -24.5, -22.5), ("cortex", -21.5, -18):
         brain = read_points([f"docs/data/brain_{name}.csv"], "kPa")
         for errors in ("relative", "mode", "absolute"):
-            one = fit(brain, "ogden", 1, errors)
+            one = fit_law(brain, "ogden", 1, errors)
             check(low < one.law.shape[0] < high and one.errors["all"]["R2"] > 0.97, f"{name}, {errors} errors: {one.law}")
-        neo, one = fit(brain, "isochoric_neohookean"), fit(brain, "ogden", 1)
+        neo, one = fit_law(brain, "isochoric_neohookean"), fit_law(brain, "ogden", 1)
         check(percent(neo) > 2 * percent(one) and neo.errors["compression"]["of_largest"] > 0.25, f"{name}: neo-Hookean {neo.errors}")
 
 
@@ -186,12 +188,12 @@ def check_tables():
     refused(lambda: read_points([OUT / "nowhere.csv"]), "nowhere.csv")
     refused(lambda: read_points([f"plane={table('1.1,5')}"]), "plane")
     two = Points(["uniaxial"] * 4, [1, 1.1, 1.2, 1.2], [0, 1, 2, 2.1])
-    refused(lambda: fit(two, "ogden", 3), "6 constants", "2 points")
-    refused(lambda: fit(two, "yeoh", 4), "4")
-    refused(lambda: fit(two, "odgen"), "ogden")
-    refused(lambda: fit(two, "gent", 2), "gent")
-    refused(lambda: fit(Points(["uniaxial"] * 2, [1.1, 1.2], [-1, -2]), "yeoh", 1), "shear modulus")
-    refused(lambda: fit(Points(["uniaxial"] * 2, [1.1, 1.2], [0, 2]), "yeoh", 1), "relative")
+    refused(lambda: fit_law(two, "ogden", 3), "6 constants", "2 points")
+    refused(lambda: fit_law(two, "yeoh", 4), "4")
+    refused(lambda: fit_law(two, "odgen"), "ogden")
+    refused(lambda: fit_law(two, "gent", 2), "gent")
+    refused(lambda: fit_law(Points(["uniaxial"] * 2, [1.1, 1.2], [-1, -2]), "yeoh", 1), "shear modulus")
+    refused(lambda: fit_law(Points(["uniaxial"] * 2, [1.1, 1.2], [0, 2]), "yeoh", 1), "relative")
 
 
 def script(*words, code=0):
@@ -219,6 +221,58 @@ def check_script():
     check("nowhere.csv" in script("nowhere.csv", "--law", "gent", code=1), "a file that is missing")
 
 
-for part in (check_published, check_program, check_stability, check_recovered, check_examples, check_tables, check_script):
+BLOCK = """
+-bodies block
+-body_block_mesh box:1,1,1:2
+-body_block_material neohookean
+-body_block_young 3e4
+-body_block_poisson 0.3
+-body_block_element p2
+-effects base,plate
+-effect_base_type fixed
+-effect_base_on zmin
+-effect_plate_type prescribed_displacement
+-effect_plate_on zmax
+-effect_plate_displacement 0;0;-0.2*t
+-probes side
+-probe_side_at 1,0.5,0.5
+-time static
+-static_steps 4
+-solver direct
+-snes_rtol 1e-9
+"""
+
+
+def check_identified():
+    """Young's modulus and Poisson's ratio of a pressed block, from its force and how far its side moves; the force alone does not tell them apart as well."""
+    scene = OUT / "block.opts"
+    scene.write_text(BLOCK)
+    real = supple.start(scene, OUT / "real", output_fields="none").history
+    tables = {}
+    for column in ("plate_reaction_z", "side_ux"):
+        tables[column] = OUT / f"{column}.csv"
+        tables[column].write_text("time,value\n" + "".join(f"{t},{v}\n" for t, v in zip(real["time"], real[column])))
+    found = supple.fit(scene, tables, {"young": 1e4, "poisson": 0.2}, OUT / "identified", bounds={"poisson": (0.0, 0.49)}, workers=2)
+    check(abs(found.values["young"] / 3e4 - 1) < 1e-4 and abs(found.values["poisson"] - 0.3) < 1e-4, f"{found}")
+    check(max(found.misfits.values()) < 1e-4 and not found.alike and found.nrun < 40 and "young" in str(found), f"{found}")
+    check(sorted(path.name for path in (OUT / "identified").iterdir()) == ["0000", "0001", "0002"], "folders of the runs")
+    # over another column, which falls
+    over = supple.fit(scene, {"plate_reaction_z": (real["side_ux"], real["plate_reaction_z"])}, {"young": 5e4}, OUT / "identified", over="side_ux", poisson=0.3)
+    check(abs(over.values["young"] / 3e4 - 1) < 1e-4, f"over another column: {over}")
+    # a displacement under a pressure, by a linear law, is that of the pressure over Young's modulus
+    scene.with_name("pressed.opts").write_text(re.sub("-effect_plate_.*\n", "", BLOCK).replace("neohookean", "linear") + "-effect_plate_type pressure\n-effect_plate_on zmax\n-effect_plate_value 100\n")
+    alike = supple.fit(scene.with_name("pressed.opts"), {"side_ux": ([0, 1], [0, 1e-3])}, {"young": 1e4, "effect_plate_value": 50.0}, OUT / "identified")
+    check(alike.alike == [("effect_plate_value", "young")] and alike.misfits["side_ux"] < 1e-4 and "not told apart" in str(alike), f"{alike}")
+    curve = ([0.5, 1], [1, 2])
+    for words, measured, unknown, more in (
+            (["0"], {"side_ux": curve}, {"young": 0}, {}), (["points"], {"side_ux": ([1], [1])}, {"young": 1e4, "poisson": 0.2}, {}), (["no column", "top"], {"top": curve}, {"young": 1e4}, {}),
+            (["1.5"], {"side_ux": ([0.5, 1.5], [1, 2])}, {"young": 1e4}, {}), (["poisson", "bounds"], {"side_ux": curve}, {"young": 1e4}, {"bounds": {"poisson": (0, 1)}}),
+            (["bounds"], {"side_ux": curve}, {"young": 1e4}, {"bounds": {"young": (0, 1)}}), (["yuong"], {"side_ux": curve}, {"yuong": 1e4}, {}),
+            (["nothing", "density"], {"side_ux": curve}, {"density": 1e3}, {}),
+            (["nowhere.csv"], {"side_ux": "nowhere.csv"}, {"young": 1e4}, {}), (["plate_reaction_x"], {"side_ux": curve}, {"young": 1e4}, {"over": "plate_reaction_x"})):
+        refused(lambda: supple.fit(scene, measured, unknown, OUT / "refused", **more), *words)
+
+
+for part in (check_published, check_program, check_stability, check_recovered, check_examples, check_tables, check_script, check_identified):
     part()
 print("fits: all fine")
