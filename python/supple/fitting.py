@@ -12,7 +12,7 @@ Minimised is sum w_i (P(x_i) - P_i)^2 / s_i^2 over all points, w_i their weights
 
 Given alpha of ogden, jm of gent or lambda_m of arruda_boyce, the stress is linear in the other constants: these come from linear least squares within
 the iteration for the former (variable projection, Golub and Pereyra 1973), which starts at many points of a fixed seed. The shear modulus at rest is positive; with
-`stable` every term is (mu_i alpha_i > 0, c_pq >= 0), for which Drucker's condition holds at every stretch.
+`stable` every term is (mu_i alpha_i > 0, c_pq >= 0): then Drucker's condition holds at every stretch, of ogden and yeoh.
 """
 import csv
 import math
@@ -26,7 +26,7 @@ from .run import RunError
 
 UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6}
 ALIASES = {"biaxial": "equibiaxial", "pure_shear": "planar", "simple_shear": "shear", "tension": "uniaxial"}
-STARTS = 24  # of ogden's exponents
+STARTS = 24  # of ogden's exponents: 6 end where 96 do, for Treloar's rubber (2 to 4 terms) and the cortex (2 and 3)
 LARGEST = 60.0  # exponent of ogden that is tried: stresses double within 1.2 % of stretch
 SMALLEST = 1e-2  # exponent of ogden that is written; below it mu is large and the law that of the logarithms
 SHOWN = ("uniaxial", "equibiaxial", "planar", "shear")  # modes of the ranges

@@ -1,4 +1,8 @@
-"""Options of a scenario from what was measured on it: least squares over runs."""
+"""Options of a scenario from what was measured on it: least squares over runs.
+
+A trust region (scipy's) in the logarithms of the unknowns, whose derivatives are forward differences between runs. Not handled: runs whose history jumps with an
+unknown, by contact that opens or steps that change; minima that are not the nearest one.
+"""
 import csv
 import math
 from concurrent.futures import ThreadPoolExecutor
