@@ -45,6 +45,7 @@ typedef struct {
   PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
   SbPack *axes;         /* [batches][9] SbMaterial.axes of a law with fibres, else NULL; owned */
   SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
+  struct _p_SbStressHistory *history; /* of a viscoelastic material, else NULL; owned */
 } SbRegion;
 
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
@@ -130,6 +131,9 @@ struct _p_SbSpace {
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
   PetscBool positive; /* a region's law has infinite energy where det F <= 0 */
+  PetscInt viscous;   /* history variables of a cell at most, all ranks; 0: no viscoelastic body */
+  PetscBool viscous_began;     /* they have values */
+  PetscLogEvent viscous_event; /* SbMat_viscous, around their updates */
   SbPack
     *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
@@ -210,6 +214,31 @@ PetscErrorCode SbSpaceWarnShapes(SbSpace space);
    penalty depends on, Pa. Set: the same, before SbSpaceFollowJumps(). Collective. */
 PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
 PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
+
+/*
+  The history of viscoelastic cells (src/fem/viscous.c); nothing without any. Collective.
+
+  SbSpaceViscousStart   - relaxed at U, unless there is a history already. Before it, stresses are
+                          the relaxed ones.
+  SbSpaceViscousAt      - stresses, energies and tangents are from now on those at a time after the
+                          last step, s, in which the step began with U, m, and V, m/s; 0: at its
+                          end. second: of second order, for viscosities
+  SbSpaceViscousAdvance - a step of length dt, s, from U0 to U1 was accepted. loss: raised by what
+                          the branches of Prony series lost, J, or NULL: energies are not wanted
+  SbSpaceViscousWork    - what viscosities dissipate in a step from U[0], V[0] to U[1], V[1], m
+                          and m/s, raises loss, J: by the mean of their stresses at both ends, as
+                          works in the energy balance
+  SbSpaceViscousStored  - energy of the branches of a body, -1: of all, J. Not collective.
+  SbSpaceGetHistory     - for checkpoints, x[viscous ncell_owned]. Not collective.
+  SbSpaceSetHistory     - the same
+*/
+PetscErrorCode SbSpaceViscousStart(SbSpace space, Vec U);
+PetscErrorCode SbSpaceViscousAt(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
+PetscErrorCode SbSpaceViscousAdvance(SbSpace space, PetscReal dt, Vec U0, Vec U1, PetscReal *loss);
+PetscErrorCode SbSpaceViscousWork(SbSpace space, const Vec U[2], const Vec V[2], PetscReal *loss);
+PetscReal SbSpaceViscousStored(SbSpace space, PetscInt body);
+PetscErrorCode SbSpaceGetHistory(SbSpace space, PetscReal x[]);
+PetscErrorCode SbSpaceSetHistory(SbSpace space, const PetscReal x[]);
 
 /* matrices and their assembly */
 

@@ -12,7 +12,8 @@
 #include "sbkernel.h"
 
 typedef struct _p_SbMaterial *SbMaterial;
-typedef struct _p_SbFibres *SbFibres; /* directions of the axes of a law with fibres */
+typedef struct _p_SbFibres *SbFibres;   /* directions of the axes of a law with fibres */
+typedef struct _p_SbViscous *SbViscous; /* of a viscoelastic material */
 
 /* polar.c, spectral.c: 3x3 matrices of a batch */
 
@@ -26,6 +27,12 @@ void SbPolar(const SbPack F[9], SbPack R[9]);
 
 /* F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign. */
 void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);
+
+/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22,
+   right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and
+   S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the
+   sign of det F being in s. Not collective. */
+void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
 
 /* laws */
 
@@ -143,6 +150,7 @@ struct _p_SbMaterial {
   SbMaterial stiffest;   /* SbMaterialGetStiffest(), likewise */
   void *data;            /* the law's own constants; freed with the material */
   SbFibres fibres;       /* of a law with fibres, else NULL; owned */
+  SbViscous viscous;     /* of a viscoelastic material, else NULL; owned */
   /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
      state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
   const SbPack *axes;
@@ -158,6 +166,25 @@ struct _p_SbFibres {
   /* outer, inner, base, apex, inner of the right ventricle or ""; the first one "": no rule */
   char surface[SB_FIBRE_SURFACES][SB_NAME_MAX];
   PetscReal angle[4]; /* rad, alpha inside and outside, beta inside and outside */
+};
+
+/* A Prony series and a viscosity, with the state that follows from the time since the last step
+   (src/material/viscous.c). The law of the material is the instantaneous one. */
+#define SB_PRONY_TERMS 16
+struct _p_SbViscous {
+  PetscInt n;                                            /* terms of the series */
+  PetscReal time[SB_PRONY_TERMS];                        /* tau_i, s */
+  PetscReal shear[SB_PRONY_TERMS], bulk[SB_PRONY_TERMS]; /* g_i, k_i: fractions of G and K */
+  PetscReal viscosity[2];                                /* of shear and volume, Pa s */
+
+  /* the law of a step: `scale` times that of `step`, plus what is constant in it */
+  PetscReal elapsed; /* time since the end of the last step, s; inf: relaxed, without a history */
+  PetscReal decay[SB_PRONY_TERMS], mean[SB_PRONY_TERMS]; /* exp(-x), b(x), x = elapsed / tau_i */
+  PetscReal scale, relaxed_scale;
+  SbMaterial step, relaxed; /* the law with other lambda; relaxed: that for inf; owned */
+
+  /* since the start of the run, of all cells with this material, J */
+  PetscReal stored[SB_PRONY_TERMS]; /* energy in the branches of the series */
 };
 
 /* Names of all laws, "linear|corotated|...": the range of the option `material`. */
@@ -198,6 +225,9 @@ PetscErrorCode SbMaterialGetPointwise(SbMaterial m, SbMaterial *point);
    itself without fibres. Otherwise as SbMaterialGetShear(). */
 PetscErrorCode SbMaterialGetStiffest(SbMaterial m, SbMaterial *stiffest);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
+/* The law of a viscoelastic material after this time since the last step, s, inf: relaxed; sets
+   m->viscous->scale, ->step and the factors of the history. Not collective. */
+void SbViscousSetElapsed(SbMaterial m, PetscReal elapsed);
 /* The axes of a law with fibres at a place x, m, at rest: Q[9], orthonormal, its columns the fibre,
    the sheet and their normal. given[6]: fibre and sheet by fields or by the rule, or NULL. Errors:
    PETSC_ERR_USER_INPUT with option and place where a direction is zero, or the sheet is along the

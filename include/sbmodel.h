@@ -8,11 +8,13 @@
 /* Scalars of one instant, summed over all ranks. SI. */
 typedef struct {
   PetscReal kinetic; /* 1/2 v.M v, J */
-  PetscReal strain;  /* J */
+  PetscReal strain;  /* J; of viscoelastic bodies that of the relaxed law and of the branches */
   PetscReal
     load_work; /* by loads since the start (constant: minus the change of their potential), J */
   PetscReal prescribed_work; /* work done by moving supports since the start, J */
   PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
+  PetscReal relaxation_loss; /* dissipated by Prony series of materials since the start, J */
+  PetscReal viscosity_loss;  /* by viscosities of materials, J */
   PetscReal remesh_loss;     /* energy lost by re-meshing since the start, J */
   PetscReal remesh_mass; /* change by re-meshings since the start, each as its absolute value, kg */
   PetscReal remesh_momentum; /* likewise of the momentum, kg m/s */

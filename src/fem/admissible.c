@@ -181,6 +181,10 @@ PetscErrorCode SbSpaceDescribeInverted(SbSpace s, Vec U, size_t size, char text[
         "is stretched beyond the limit of the law %s, where its energy is infinite; one with "
         "a higher limit, or another law, is finite there",
         s->material[mesh->cell_material[worst.cell]]->type->name);
+    else if (!s->material[mesh->cell_material[worst.cell]]->type->positive)
+      SbAppend(size, text,
+               "is inverted or flat (det F %.3g), where a viscoelastic body has no stress",
+               (double)least.J);
     else
       SbAppend(size, text,
                "is inverted or flat (det F %.3g), where the energy of the law %s is infinite; the "

@@ -239,9 +239,9 @@ typedef struct {
 SbPoints SbBatchPoints(SbSpace space, PetscInt b);
 /* A law of a region as its operations take it for batch b: itself or, of a law with fibres, `own`,
    a copy with the axes of these cells. */
-SB_INLINE const struct _p_SbMaterial *SbBatchLaw(const SbRegion *region,
-                                                 const struct _p_SbMaterial *law, PetscInt b,
-                                                 struct _p_SbMaterial *own)
+SB_INLINE const struct _p_SbMaterial *SbBatchAxes(const SbRegion *region,
+                                                  const struct _p_SbMaterial *law, PetscInt b,
+                                                  struct _p_SbMaterial *own)
 {
   if (!region->axes)
     return law;
@@ -249,6 +249,47 @@ SB_INLINE const struct _p_SbMaterial *SbBatchLaw(const SbRegion *region,
   own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
   return own;
 }
+/* The same; of a viscoelastic material the law of the step, to which SbViscousStress() and its
+   siblings add the history. */
+SB_INLINE const struct _p_SbMaterial *SbBatchLaw(const SbRegion *region,
+                                                 const struct _p_SbMaterial *law, PetscInt b,
+                                                 struct _p_SbMaterial *own)
+{
+  if (region->history && law == region->material)
+    law = law->viscous->step;
+  return SbBatchAxes(region, law, b, own);
+}
+
+/* viscous.c: history of the cells of a region; a point has `width` numbers, S[6], theta and, of P2
+   with a mean dilatation, that. */
+struct _p_SbStressHistory {
+  int npoint, width;
+  PetscBool mean;      /* P2 with a mean dilatation */
+  PetscBool pressures; /* theta or its mean relax apart from S */
+  PetscBool acting;    /* there is a history: SbSpaceViscousAt() */
+  PetscReal hooke[2];  /* lambda and mu on E of viscosities in a step, Pa */
+  SbPack *last;        /* [batch][npoint][width] of the law at the end of the last step */
+  SbPack *branch;      /* [batch][npoint][term][width] of the series, Pa */
+  SbPack *dead;        /* [batch][npoint][width] what is constant in the step, Pa */
+};
+PetscErrorCode SbViscousCreate(SbSpace space);
+PetscErrorCode SbViscousDestroy(SbRegion *region);
+/* Of a region with a history, at point q of batch b with F: from P and psi of the law
+   (SbBatchLaw()) those with the history. K: adds to the blocks of the tangent of scale times the
+   law, W: the volume times the factor of the stiffness. */
+void SbViscousStress(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                     const SbPack F[9], SbPack P[9]);
+void SbViscousEnergy(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                     const SbPack F[9], SbPack psi);
+void SbViscousBlocks(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                     const SbPack g[9], const SbPack W, const SbPack F[9], SbPack K[10][9]);
+/* p, Pa, compression, from that of the law of the step. */
+void SbViscousPressure(const SbRegion *region, PetscInt b, int q, SbPack p);
+/* The pressure of P2's mean is `factor` times that of SbQuadraticVolume() plus `constant`, Pa, a
+   lane each; energy: for the energy. */
+void SbViscousMean(const SbRegion *region, PetscInt b, PetscBool energy, PetscReal *factor,
+                   const PetscReal **constant);
+
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {

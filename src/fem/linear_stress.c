@@ -214,7 +214,8 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
     const PetscBool points = (PetscBool)(law->ops.dilatation_hessian != NULL);
     const PetscBool mean = (PetscBool)(region->quadratic && law != region->material);
 
-    if (region->material->linear || (!points && !mean) || region->bstart == region->bend)
+    if (region->history || region->material->linear || (!points && !mean) ||
+        region->bstart == region->bend)
       continue;
     if (points && !region->stress)
       PetscCall(PetscCalloc1((region->bend - region->bstart) * SbBatchPoints(s, region->bstart).n,

@@ -286,6 +286,23 @@ SB_KERNEL static void rotate_gradients(const SbPack R[restrict 9], const SbPack 
   }
 }
 
+/* The factors of a viscoelastic region: those of the law of the step for the stiffness. */
+static void put_viscous(Operator *o, PetscInt r, const SbStage *stage)
+{
+  const SbRegion *region = &o->space->region[r];
+  const SbMaterial m = region->material;
+  const SbViscous v = m->viscous;
+  const PetscReal stiffness = stage->shift_k * v->scale;
+  const PetscReal damping = stage->shift_v * o->space->beta[region->body];
+  const PetscReal step = SbMaterialVolumetricModulus(v->step);
+  const PetscReal points = SbMaterialVolumetricModulus(region->pointwise);
+  const PetscBool mean = (PetscBool)(region->pointwise != m);
+
+  o->mu[r] = (stiffness + damping) * SbMaterialShearModulus(m);
+  o->lambda[r] = stiffness * (mean ? points : step) + damping * points;
+  o->mean[r] = mean ? stiffness * (step - points) + damping * SbMaterialMeanModulus(m) : 0.;
+}
+
 /* Computes rotations and factors of a stage. */
 static PetscErrorCode assemble(Mat A, const SbStage *stage)
 {
@@ -307,6 +324,8 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
     o->lambda[r] = factor * SbMaterialVolumetricModulus(region->pointwise);
     o->mean[r] = region->pointwise != m ? factor * SbMaterialMeanModulus(m) : 0.;
     o->mu[r] = factor * SbMaterialShearModulus(m);
+    if (region->history)
+      put_viscous(o, r, stage);
     stiffest = PetscMax(stiffest, factor * SbMaterialYoungModulus(m));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (int q = 0; q < (region->quadratic ? 4 : 1); q++) {
@@ -330,8 +349,13 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 {
   PetscFunctionBeginUser;
   *has = (PetscBool)(!s->consistent_mass && !s->faces && !s->mesh->edge_off);
-  for (PetscInt r = 0; r < s->nregion; r++)
-    *has = (PetscBool)(*has && (s->region[r].material->linear || s->region[r].material->ops.frame));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbMaterial m = s->region[r].material;
+    const PetscReal *viscosity = m->viscous ? m->viscous->viscosity : NULL;
+
+    *has = (PetscBool)(*has && (m->linear || m->ops.frame) &&
+                       (!viscosity || (viscosity[0] == 0. && viscosity[1] == 0.)));
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

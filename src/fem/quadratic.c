@@ -154,6 +154,37 @@ void SbBatchMass(SbSpace s, PetscInt b, SbPack mass[SB_PAIRS])
   }
 }
 
+/* SbBatchState() of a viscoelastic material: what the mean dilatation, by its pressure p without
+   history, contributes at n points. */
+static void add_mean_history(const SbRegion *region, PetscInt b, int n, const SbPack p,
+                             SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
+                             SbPack pressure[SB_POINTS], const SbPack F[SB_POINTS][9])
+{
+  const SbMaterial m = region->material;
+  const PetscReal lambda = SbMaterialMeanModulus(m);
+  const PetscReal *constant, *in_energy;
+  PetscReal factor, of_energy;
+
+  SbViscousMean(region, b, PETSC_FALSE, &factor, &constant);
+  SbViscousMean(region, b, PETSC_TRUE, &of_energy, &in_energy);
+  for (int q = 0; q < n; q++) {
+    SbPack D[9];
+
+    if (P)
+      m->ops.dilatation_gradient(m, F[q], D);
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal tension = factor * p[l] + constant[l];
+
+      for (int k = 0; P && k < 9; k++)
+        P[q][k][l] += tension * D[k][l];
+      if (psi)
+        psi[q][l] += (of_energy * p[l] / 2. + in_energy[l]) * p[l] / lambda;
+      if (pressure)
+        pressure[q][l] -= tension;
+    }
+  }
+}
+
 void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
@@ -171,7 +202,13 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
     if (psi)
       law->ops.energy(law, (const SbPack *)F[q], psi[q]);
     if (pressure)
-      SbMaterialPressure(m, (const SbPack *)F[q], pressure[q]);
+      SbMaterialPressure(region->history ? law : m, (const SbPack *)F[q], pressure[q]);
+    if (region->history && P)
+      SbViscousStress(region, law, b, q, (const SbPack *)F[q], P[q]);
+    if (region->history && psi)
+      SbViscousEnergy(region, law, b, q, (const SbPack *)F[q], psi[q]);
+    if (region->history && pressure)
+      SbViscousPressure(region, b, q, pressure[q]);
   }
   if (m == region->material)
     return;
@@ -180,6 +217,10 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
   const PetscReal lambda = SbMaterialMeanModulus(region->material);
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
+  if (region->history) {
+    add_mean_history(region, b, at.n, p, P ? P : NULL, psi, pressure, (const SbPack(*)[9])F);
+    return;
+  }
   for (int q = 0; q < at.n; q++) {
     SbPack D[9];
 

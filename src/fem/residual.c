@@ -14,6 +14,17 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
+/* The pressure of P2's mean with the history of a viscoelastic material. */
+static void add_mean_history(const SbRegion *region, PetscInt b, SbPack p)
+{
+  const PetscReal *constant;
+  PetscReal factor;
+
+  SbViscousMean(region, b, PETSC_FALSE, &factor, &constant);
+  for (int l = 0; l < SB_BATCH; l++)
+    p[l] = factor * p[l] + constant[l];
+}
+
 /* P2: each point with its fraction of the volume; most of the volumetric part by the mean of the
    cell. Damping likewise: mu (H + R H^T R) + lambda_p (R : H) R at the points, lambda_m times the
    mean of R : H. */
@@ -36,6 +47,8 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
+      if (region->history)
+        add_mean_history(region, b, p);
       for (int k = 0; k < 30; k++)
         for (int l = 0; l < SB_BATCH; l++)
           fe[k][l] = p[l] * b10[k][l];
@@ -54,6 +67,8 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     for (int q = 0; q < at.n; q++) {
       if (elastic)
         law->ops.stress(law, (const SbPack *)F[q], P);
+      if (elastic && region->history)
+        SbViscousStress(region, law, b, q, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
         if (mean)

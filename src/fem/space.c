@@ -243,6 +243,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(find_regions(s));
   PetscCall(tabulate_batches(s));
   PetscCall(SbSpaceFindAxes(s));
+  PetscCall(SbViscousCreate(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
     PetscCall(SbJumpCreate(s, &s->jump));
@@ -316,6 +317,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscFree(s->region[r].stress));
     PetscCall(PetscFree(s->region[r].axes));
+    PetscCall(SbViscousDestroy(&s->region[r]));
   }
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));

@@ -103,6 +103,8 @@ typedef struct {
   PetscReal
     damping; /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
   PetscReal lambda;             /* volumetric modulus of the law, Pa */
+  PetscReal damped;             /* that of damping, and their mean by these factors: they differ */
+  PetscReal both;               /* for viscoelastic materials only */
   PetscReal mu;                 /* shear modulus of the law, Pa */
   const SbPack *pressure;       /* pressure in addition to the law's own, Pa, tension; NULL: none */
   const SbPack *mean;           /* that of a linearised stress */
@@ -119,7 +121,7 @@ static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
    factor on its moduli. */
 typedef struct {
   SbPack D[9];
-  PetscReal factor;
+  PetscReal factor, lambda; /* Pa */
 } Split;
 
 /* C -= lambda D D^T */
@@ -138,7 +140,7 @@ static void law_blocks(const struct _p_SbMaterial *m, const SbPack *g, const SbP
                        const Factors *x, const SbPack F[9], Split *split, SbPack K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping;
-  const PetscReal lambda = split ? 0. : x->lambda;
+  const PetscReal lambda = split ? 0. : x->both;
   SbPack R[9], T[9], W;
 
   scaled_volumes(V, both, W);
@@ -168,6 +170,7 @@ static void law_blocks(const struct _p_SbMaterial *m, const SbPack *g, const SbP
     if (split) {
       m->ops.dilatation_gradient(m, F, split->D);
       split->factor = x->stiffness;
+      split->lambda = x->lambda;
       remove_volumetric(x->lambda, (const SbPack *)split->D, C);
     }
     if (x->pressure && !x->stress && m->ops.dilatation_hessian)
@@ -178,7 +181,7 @@ static void law_blocks(const struct _p_SbMaterial *m, const SbPack *g, const SbP
       return;
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
-    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
+    SbCellBlocksIsotropic(g, W, x->damped, x->mu, (const SbPack *)R, D);
     for (int k = 0; k < 90; k++)
       for (int l = 0; l < SB_BATCH; l++)
         K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
@@ -188,6 +191,7 @@ static void law_blocks(const struct _p_SbMaterial *m, const SbPack *g, const SbP
     return;
   memcpy(split->D, R, sizeof(split->D));
   split->factor = both;
+  split->lambda = x->both;
 }
 
 /* K_ab += factor b_a b_b^T */
@@ -205,6 +209,72 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
   }
 }
 
+/* Factors of a region with the factors of stiffness and damping: of the law of the step for the
+   former. */
+static Factors factors_of(const SbRegion *region, PetscReal stiffness, PetscReal damping)
+{
+  const SbMaterial m = region->material;
+  const PetscReal lambda = SbMaterialVolumetricModulus(m);
+  Factors x = {.stiffness = stiffness,
+               .damping = damping,
+               .lambda = lambda,
+               .damped = lambda,
+               .both = lambda,
+               .mu = SbMaterialShearModulus(m)};
+
+  if (!region->history)
+    return x;
+  x.stiffness *= m->viscous->scale;
+  x.lambda = x.both = SbMaterialVolumetricModulus(m->viscous->step);
+  if (damping != 0.)
+    x.both = (x.stiffness * x.lambda + damping * lambda) / (x.stiffness + damping);
+  return x;
+}
+
+/* The pressure that does not come from F of a viscoelastic material, over its scale, with that of
+   P2's mean or NULL; whether there is any. */
+static PetscBool point_pressure(const SbRegion *region, PetscInt b, int q, const PetscReal mean[],
+                                SbPack pressure)
+{
+  const PetscReal scale = -1. / region->material->viscous->scale;
+
+  for (int l = 0; l < SB_BATCH; l++)
+    pressure[l] = 0.;
+  SbViscousPressure(region, b, q, pressure);
+  for (int l = 0; l < SB_BATCH; l++)
+    pressure[l] = scale * pressure[l] + (mean ? mean[l] : 0.);
+  return (PetscBool)(mean || region->history->pressures);
+}
+
+/* Of P2's mean: its pressure p with the history, over the scale; returns the modulus of the
+   step. */
+static PetscReal mean_history(const SbRegion *region, PetscInt b, const Factors *x, PetscBool one_D,
+                              PetscReal lambda, SbPack p)
+{
+  const PetscReal scale = region->material->viscous->scale;
+  const PetscReal damping = one_D ? x->damping : 0.;
+  const PetscReal *constant;
+  PetscReal factor;
+
+  SbViscousMean(region, b, PETSC_FALSE, &factor, &constant);
+  factor /= scale;
+  for (int l = 0; l < SB_BATCH; l++)
+    p[l] = factor * p[l] + constant[l] / scale;
+  return damping == 0. ? factor * lambda
+                       : (x->stiffness * factor + damping) * lambda / (x->stiffness + damping);
+}
+
+/* What the history of a viscoelastic material adds to the blocks of a point. */
+static void add_history(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                        const SbPack *g, const SbPack V, PetscReal stiffness, const SbPack F[9],
+                        SbPack K[10][9])
+{
+  SbPack W;
+
+  scaled_volumes(V, stiffness, W);
+  SbViscousBlocks(region, law, b, q, g, W, F, K);
+}
+
 /* Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off.
    With one pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining
    modulus stiffens the modes that the pressures hardly constrain. Iterations of -solver pressure,
@@ -216,7 +286,7 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 /* Whether tangents have linearised stresses: not those that the user wants filtered. */
 SB_INLINE PetscBool has_linear_stress(SbSpace s, const SbRegion *region)
 {
-  return (PetscBool)(s->linear_stress && region->stress &&
+  return (PetscBool)(s->linear_stress && region->stress && !region->history &&
                      (region->material->adaptive || region->material->tangent == SB_TANGENT_EXACT));
 }
 
@@ -225,8 +295,8 @@ SB_INLINE PetscBool has_linear_stress(SbSpace s, const SbRegion *region)
    m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
    there and lambda_m/V b b^T is not added. */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
-                             const Factors *x, PetscInt batch, const SbVolumetric *out,
-                             SbPack K[SB_PAIRS][9])
+                             PetscReal shift_k, const Factors *x, PetscInt batch,
+                             const SbVolumetric *out, SbPack K[SB_PAIRS][9])
 {
   const SbMaterial m = region->material;
   const SbMaterial law = region->pointwise;
@@ -234,10 +304,12 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   const SbPack *V = points.V;
   const PetscBool mean = (PetscBool)(law != m);
   const PetscBool one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
-  const PetscReal lambda_m = mean ? SbMaterialMeanModulus(m) : 0.;
-  const PetscBool split = (PetscBool)(out && mean && lambda_m > 0.);
+  const PetscReal damped_m = mean ? SbMaterialMeanModulus(m) : 0.;
+  const PetscBool split = (PetscBool)(out && mean && damped_m > 0.);
+  PetscReal lambda_m = damped_m;
   SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
     b[30] = {{0}};
+  SbPack pressure;
   struct _p_SbMaterial own;
   const struct _p_SbMaterial *local = SbBatchLaw(region, law, batch, &own);
   Factors at = *x;
@@ -245,18 +317,28 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
-    if (s->linear_stress)
+    if (region->history)
+      lambda_m = mean_history(region, batch, x, one_D, damped_m, p);
+    else if (s->linear_stress)
       memcpy(p, s->pressure[batch], sizeof(p));
-    at.lambda = SbMaterialVolumetricModulus(law);
+    at.lambda = at.damped = at.both = SbMaterialVolumetricModulus(law);
     at.pressure =
       m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
     at.mean = m->jacobian && law->tangent == SB_TANGENT_EXACT_SPD ? NULL : &p;
   }
+
+  const PetscReal *of_mean = at.pressure ? p : NULL;
+
   for (int q = 0; q < points.n; q++) {
     if (has_linear_stress(s, region))
       at.stress = &region->stress[points.n * (batch - region->bstart) + q];
     SbPointVolume(&points, q, W);
+    if (region->history && point_pressure(region, batch, q, of_mean, pressure))
+      at.pressure = (const SbPack *)&pressure;
     law_blocks(local, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
+    if (region->history)
+      add_history(region, local, batch, q, points.g + points.step * q, W, shift_k,
+                  (const SbPack *)F[q], B[q]);
   }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal both = x->stiffness + (one_D ? x->damping : 0.);
@@ -300,7 +382,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     SbPointForce(&points, q, (const SbPack *)R, b);
   }
   for (int l = 0; l < SB_BATCH; l++)
-    factor[l] = (*V)[l] > 0. ? lambda_m * x->damping / (*V)[l] : 0.;
+    factor[l] = (*V)[l] > 0. ? damped_m * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
 }
 
@@ -347,10 +429,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const SbMaterial m = region->material;
   const PetscReal shift = stage->shift_a + stage->shift_v * s->alpha[region->body];
   const PetscReal inertia = s->consistent_mass ? m->density * shift : 0.;
-  const Factors factors = {.stiffness = stage->shift_k,
-                           .damping = stage->shift_v * s->beta[region->body],
-                           .lambda = SbMaterialVolumetricModulus(m),
-                           .mu = SbMaterialShearModulus(m)};
+  const Factors factors =
+    factors_of(region, stage->shift_k, stage->shift_v * s->beta[region->body]);
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept;
   Split *split = out && faces && factors.lambda > 0. ? &kept : NULL;
@@ -360,21 +440,27 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       U[30], F[SB_POINTS][9];
 
     if (region->quadratic)
-      quadratic_blocks(s, region, stage->u, &factors, b, out, K);
+      quadratic_blocks(s, region, stage->u, stage->shift_k, &factors, b, out, K);
     else {
       Factors at = factors;
       struct _p_SbMaterial own;
       const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
+      SbPack pressure;
 
       if (!m->linear)
         SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
       if (has_linear_stress(s, region))
         at.stress = &region->stress[b - region->bstart];
+      if (region->history && point_pressure(region, b, 0, NULL, pressure))
+        at.pressure = (const SbPack *)&pressure;
       law_blocks(law, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
+      if (region->history)
+        add_history(region, law, b, 0, s->batch_g + 9 * b, s->batch_V[b], stage->shift_k,
+                    (const SbPack *)F[0], K);
 
       /* b_a = V D grad psi_a, as the force of a stress D */
       for (int l = 0; out && l < SB_BATCH; l++) {
-        out->modulus[b][l] = split ? split->factor * factors.lambda : 0.;
+        out->modulus[b][l] = split ? split->factor * split->lambda : 0.;
         out->shear[b][l] = split ? split->factor * factors.mu : 0.;
       }
       if (out)

@@ -21,6 +21,18 @@ static const SbOption body_rows[] = {
    "take bulk instead, if it is given"},
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
    "mass per volume in the reference configuration"},
+  {"prony_times", SB_OPTION_STRING, 1, "s", "", "",
+   "viscoelastic: relaxation times of the terms of a Prony series, up to 16 numbers with commas; "
+   "the moduli of the law are the instantaneous ones"},
+  {"prony_shear", SB_OPTION_STRING, 1, "", "", "",
+   "fractions of the shear modulus that relax, one for each time, in [0, 1), their sum below 1; "
+   "fibres relax with the shear modulus"},
+  {"prony_bulk", SB_OPTION_STRING, 1, "", "", "",
+   "fractions of the bulk modulus that relax, one for each time; empty: it does not relax"},
+  {"viscosity", SB_OPTION_REAL, 1, "Pa s", "0", "[0, inf)",
+   "Kelvin-Voigt: viscosity beside the elastic law, of changes of shape"},
+  {"viscosity_bulk", SB_OPTION_REAL, 1, "Pa s", "0", "[0, inf)",
+   "Kelvin-Voigt: viscosity of changes of volume"},
 };
 
 PetscErrorCode SbMaterialRegister(const SbMaterialType *type)
@@ -115,6 +127,21 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* m with other Lame parameters, in *other, which m owns. */
+static PetscErrorCode with_lame(SbMaterial m, PetscReal lambda, PetscReal mu, SbMaterial *other)
+{
+  PetscFunctionBeginUser;
+  if (*other)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(create(m->type, 2 * mu, 0., m->density, other));
+  if (lambda != 0.)
+    SbMaterialSetLame(*other, lambda, mu);
+  PetscCall(SbMaterialSetTangent(*other, m->tangent));
+  if (m->type->size)
+    PetscCall(PetscMemcpy((*other)->data, m->data, m->type->size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
 {
   const SbMaterialType *type = SbMaterialFind(law);
@@ -145,6 +172,16 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
     choice += m->ops.spin ? SB_TANGENT_WARPED - 1 : SB_TANGENT_EXACT - 1;
     PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)choice));
   }
+  PetscCall(SbViscousRead(m, &scope));
+  if (m->viscous) {
+    SbMaterial *const laws_of[2] = {&m->viscous->step, &m->viscous->relaxed};
+
+    for (int k = 0; k < 2; k++) {
+      PetscCall(with_lame(m, m->rest->lambda, m->rest->mu, laws_of[k]));
+      (*laws_of[k])->positive = m->positive;
+    }
+    PetscCall(SbViscousRelax(m, &scope));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,24 +194,14 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscCall(SbMaterialDestroy(&(*m)->point));
   PetscCall(SbMaterialDestroy(&(*m)->stiffest));
   PetscCall(SbFibresDestroy(&(*m)->fibres));
+  if ((*m)->viscous) {
+    PetscCall(SbMaterialDestroy(&(*m)->viscous->step));
+    PetscCall(SbMaterialDestroy(&(*m)->viscous->relaxed));
+    PetscCall(PetscFree((*m)->viscous));
+  }
   PetscCall(PetscFree((*m)->rest));
   PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* m with other Lame parameters, in *other, which m owns. */
-static PetscErrorCode with_lame(SbMaterial m, PetscReal lambda, PetscReal mu, SbMaterial *other)
-{
-  PetscFunctionBeginUser;
-  if (*other)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(create(m->type, 2 * mu, 0., m->density, other));
-  if (lambda != 0.)
-    SbMaterialSetLame(*other, lambda, mu);
-  PetscCall(SbMaterialSetTangent(*other, m->tangent));
-  if (m->type->size)
-    PetscCall(PetscMemcpy((*other)->data, m->data, m->type->size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,6 +256,8 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
     PetscCall(SbMaterialSetTangent(m->shear, kind));
   if (m->point)
     PetscCall(SbMaterialSetTangent(m->point, kind));
+  if (m->viscous)
+    PetscCall(SbMaterialSetTangent(m->viscous->step, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -39,6 +39,13 @@ struct _p_SbElastic {
 
 PetscErrorCode SbFibresDestroy(SbFibres *fibres);
 
+/* viscous.c: reads the series and the viscosity of a body into m->viscous; NULL: it has neither.
+   Errors: PETSC_ERR_USER for what is no fraction, time or viscosity. */
+PetscErrorCode SbViscousRead(SbMaterial m, const SbScope *scope);
+/* The relaxed law, once there are the copies `step` and `relaxed`, and the state of a run that has
+   not begun. Error: PETSC_ERR_USER for a series that the law does not admit. */
+PetscErrorCode SbViscousRelax(SbMaterial m, const SbScope *scope);
+
 /* Option row of a law without a warped tangent. */
 #define SB_MATERIAL_TANGENT_ROW                                                          \
   {                                                                                      \
@@ -87,11 +94,3 @@ SB_INLINE void SbTangentPut(const SbPack c, int ij, int kl, SbPack C[81])
   for (int l = 0; l < SB_BATCH; l++)
     C[9 * kl + ij][l] = c[l];
 }
-
-/* spectral.c */
-
-/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22,
-   right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and
-   S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the
-   sign of det F being in s. Not collective. */
-void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);

@@ -55,6 +55,8 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
   e->kinetic = sum.kinetic;
   e->strain = sum.strain;
+  if (s->viscous)
+    e->strain += SbSpaceViscousStored(s, -1);
   e->volume = sum.volume;
   e->ninverted = (PetscInt)sum.inverted;
   e->max_speed = PetscSqrtReal(extreme[0]);
@@ -82,6 +84,8 @@ PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_
   SbSpaceStrainEnergy(s, at.stage.u, strain, &unused[0], &unused[1], &n, &unused[2]);
   for (PetscInt b = 0; b < m->nbody; b++)
     sum[b][1] += strain[b];
+  for (PetscInt b = 0; b < m->nbody && s->viscous && s->rank == 0; b++)
+    sum[b][1] += SbSpaceViscousStored(s, b);
   if (V)
     SbSpaceAddInertia(s, &(SbStage){.a = at.stage.v}, p);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {

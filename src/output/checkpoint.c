@@ -31,29 +31,49 @@ typedef struct {
   const SbOrder *order;
   PetscInt ncomp;
   uint64_t salt;
-  Vec vec; /* NULL: penalty data of faces */
+  Vec vec;        /* NULL: penalty data of faces, or */
+  PetscBool past; /* the history of viscoelastic cells */
 } Part;
 
 /* Those of a run: arc length has `path`; penalty data of faces are there where they are history
    variables. */
-#define NPART 5
+#define NPART 6
 static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
 {
   const SbModel m = run->model;
   const PetscBool implicit =
     (PetscBool)(m->dynamic && run->solve.J && run->solve.preset != SB_TIME_ALPHA2);
   const PetscBool remember = (PetscBool)(implicit && m->space->jump && !m->space->linear);
-  const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->state.U},
-                           {"v", "SI", NULL, &out->node, 3, 1, run->state.V},
-                           {"a", "SI", NULL, &out->node, 3, 2, run->state.A},
-                           {"path", "SI", "path_checksum", &out->node, 3, 3, run->state.path},
-                           {"jumps", "N/m, Pa", "jumps_checksum", &out->cell, 5, 0, NULL}};
+  const PetscBool past = (PetscBool)(m->dynamic && m->space->viscous);
+  const Part all[NPART] = {
+    {"u", "SI", NULL, &out->node, 3, 0, run->state.U, PETSC_FALSE},
+    {"v", "SI", NULL, &out->node, 3, 1, run->state.V, PETSC_FALSE},
+    {"a", "SI", NULL, &out->node, 3, 2, run->state.A, PETSC_FALSE},
+    {"path", "SI", "path_checksum", &out->node, 3, 3, run->state.path, PETSC_FALSE},
+    {"jumps", "N/m, Pa", "jumps_checksum", &out->cell, 5, 0, NULL, PETSC_FALSE},
+    {"viscous", "Pa, 1", NULL, &out->cell, m->space->viscous, 4, NULL, PETSC_TRUE}};
   PetscInt n = 0;
 
   for (int k = 0; k < NPART; k++)
-    if (all[k].vec || (k == NPART - 1 && remember))
+    if (all[k].vec || (k == NPART - 2 && remember) || (k == NPART - 1 && past))
       part[n++] = all[k];
   return n;
+}
+
+/* Room for one of them: in the order of the file, and of the cells of this rank. */
+static PetscErrorCode part_room(PetscInt n, const Part part[], SbOutput out, PetscReal **slice,
+                                PetscReal **cells)
+{
+  PetscInt room[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < n; k++) {
+    room[0] = PetscMax(room[0], part[k].ncomp * part[k].order->n);
+    if (!part[k].vec)
+      room[1] = PetscMax(room[1], part[k].ncomp * out->cell.nowned);
+  }
+  PetscCall(PetscMalloc2(room[0], slice, room[1], cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Step and time of the file, and the next step's length. */
@@ -69,7 +89,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 16
+#define NNUMBER 18
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->state.energies;
@@ -90,6 +110,8 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"energy_most", &run->state.energy_most, PETSC_TRUE},
     {"paused_after", &times->paused, PETSC_TRUE},
     {"good_steps", &run->clock.good_steps, PETSC_TRUE},
+    {"relaxation_loss", &e->relaxation_loss, PETSC_TRUE},
+    {"viscosity_loss", &e->viscosity_loss, PETSC_TRUE},
   };
 
   memcpy(number, all, sizeof(all));
@@ -112,20 +134,21 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
 {
   Part part[NPART];
   const PetscInt n = parts_of(run, out, part);
-  PetscReal *slice, *jumps;
+  PetscReal *slice, *cells;
 
   PetscFunctionBeginUser;
   *checksum = 0;
-  PetscCall(
-    PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  PetscCall(part_room(n, part, out, &slice, &cells));
   for (const Part *p = part; p < part + n; p++) {
-    const PetscScalar *array = jumps;
+    const PetscScalar *array = cells;
     uint64_t sum;
 
     if (p->vec)
       PetscCall(VecGetArrayRead(p->vec, &array));
+    else if (p->past)
+      PetscCall(SbSpaceGetHistory(run->model->space, cells));
     else
-      PetscCall(SbSpaceGetJumps(run->model->space, run->state.U, jumps));
+      PetscCall(SbSpaceGetJumps(run->model->space, run->state.U, cells));
     PetscCall(SbForestReduce(p->order->sf, p->ncomp, MPIU_REAL, array, slice));
     if (p->vec)
       PetscCall(VecRestoreArrayRead(p->vec, &array));
@@ -139,7 +162,7 @@ static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *ch
   }
   if (run->state.path)
     PetscCall(SbH5PutReal(h, h->file, "path_first", run->clock.arc.first));
-  PetscCall(PetscFree2(slice, jumps));
+  PetscCall(PetscFree2(slice, cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -279,6 +302,45 @@ static void sum_of_scalars(SbRun run, SbH5 *h, const char *options, uint64_t *su
   }
 }
 
+/* Name of the energy of term i of the series of material k. */
+static void branch_name(PetscInt k, PetscInt i, char name[SB_NAME_MAX])
+{
+  SbFormat(SB_NAME_MAX, name, "branch_energy_%" PetscInt_FMT "_%" PetscInt_FMT, k, i);
+}
+
+/* Energies of the branches of viscoelastic materials. */
+static PetscErrorCode write_branches(SbRun run, SbH5 *h)
+{
+  const SbModel m = run->model;
+  char name[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->nmaterial && m->dynamic; k++) {
+    const SbViscous v = m->material[k]->viscous;
+
+    for (PetscInt i = 0; v && i < v->n; i++) {
+      branch_name(k, i, name);
+      PetscCall(SbH5PutReal(h, h->file, name, v->stored[i]));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void read_branches(SbRun run, SbH5 *h, PetscBool *ok)
+{
+  const SbModel m = run->model;
+  char name[SB_NAME_MAX];
+
+  for (PetscInt k = 0; k < m->nmaterial && m->dynamic; k++) {
+    const SbViscous v = m->material[k]->viscous;
+
+    for (PetscInt i = 0; v && i < v->n && *ok; i++) {
+      branch_name(k, i, name);
+      SbH5GetReal(h->file, name, &v->stored[i], ok);
+    }
+  }
+}
+
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
@@ -333,6 +395,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     if (!number[i].optional || *number[i].value != 0.)
       PetscCall(SbH5PutReal(&h, h.file, number[i].name, *number[i].value));
   PetscCall(SbH5PutInt(&h, h.file, "step", step->step));
+  PetscCall(write_branches(run, &h));
 
   /* accumulated error estimates, and the material points of probes */
   for (PetscInt i = 0; i < run->monitors.ncheckpoint; i++)
@@ -428,13 +491,12 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
 {
   Part part[NPART];
   const PetscInt n = parts_of(run, out, part);
-  PetscReal *slice, *jumps;
+  PetscReal *slice, *cells;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  PetscCall(part_room(n, part, out, &slice, &cells));
   for (const Part *p = part; p < part + n && *ok; p++) {
-    PetscScalar *array = jumps;
+    PetscScalar *array = cells;
     uint64_t sum;
     int64_t own = 0;
 
@@ -456,10 +518,12 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
     PetscCall(SbForestBroadcast(p->order->sf, p->ncomp, MPIU_REAL, slice, array));
     if (p->vec)
       PetscCall(VecRestoreArray(p->vec, &array));
+    else if (*ok && p->past)
+      PetscCall(SbSpaceSetHistory(run->model->space, cells));
     else if (*ok)
-      PetscCall(SbSpaceSetJumps(run->model->space, jumps));
+      PetscCall(SbSpaceSetJumps(run->model->space, cells));
   }
-  PetscCall(PetscFree2(slice, jumps));
+  PetscCall(PetscFree2(slice, cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -558,6 +622,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
         out->comm, "%s has no errors, as it was written without -ledger: they count from there",
         h.path));
   }
+  read_branches(run, &h, ok);
   if (*ok)
     PetscCall(SbProbesRead(run, out, &h));
   if (*ok)

@@ -72,6 +72,13 @@ static const struct {
   {"rejected", "1", COUNT, AT(rejected)},
 };
 
+/* Those of runs with viscoelastic bodies. */
+static const struct {
+  const char *name;
+  size_t from;
+} losses[] = {{"relaxation_loss", AT(energies.relaxation_loss)},
+              {"viscosity_loss", AT(energies.viscosity_loss)}};
+
 /* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
 static const struct {
   const char *name, *unit;
@@ -122,6 +129,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   PetscCheck(line[1], PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
     put_column(line, columns[i].unit, "%s%s", i ? "," : "", columns[i].name);
+  for (size_t i = 0; run->model->space->viscous && i < PETSC_STATIC_ARRAY_LENGTH(losses); i++)
+    put_column(line, "J", ",%s", losses[i].name);
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     const SbEffect effect = run->model->history[e];
 
@@ -302,6 +311,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       else
         (void)fprintf(h->text, "%.17g", *(const PetscReal *)value);
     }
+    for (size_t k = 0; s->viscous && k < PETSC_STATIC_ARRAY_LENGTH(losses); k++)
+      (void)fprintf(h->text, ",%.17g",
+                    *(const PetscReal *)(const void *)((const char *)step + losses[k].from));
     for (PetscInt k = 0; k < h->nextra; k++)
       (void)fprintf(h->text, ",%.17g", h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)

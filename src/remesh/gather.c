@@ -235,3 +235,55 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
   PetscCall(SbContactSetResume(&b->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbViscousHandOver(SbRun from, SbRun to)
+{
+  const SbModel a = from->model;
+  const SbModel b = to->model;
+  const PetscInt n = a->space->viscous;
+  PetscReal *own, *all[2];
+  PetscMPIInt rank;
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+  if (!n || !a->dynamic)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Comm_rank(a->comm, &rank));
+  PetscCall(
+    PetscCalloc2(rank ? 0 : n * a->mesh->Ncell, &all[0], rank ? 0 : n * b->mesh->Ncell, &all[1]));
+
+  // by original numbers on rank 0
+  PetscCall(PetscMalloc1(n * a->mesh->ncell_owned, &own));
+  PetscCall(SbSpaceGetHistory(a->space, own));
+  PetscCall(SbForestCreate(a->comm, rank ? 0 : a->mesh->Ncell, a->mesh->ncell_owned,
+                           a->mesh->cell_orig, &sf));
+  PetscCall(SbForestReduce(sf, n, MPIU_REAL, own, all[0]));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscFree(own));
+
+  // viscoelastic bodies keep their cells, but other numbers may have changed
+  for (PetscInt body = 0, first[2] = {0, 0}; body < a->nbody; body++) {
+    const PetscInt count[2] = {a->body[body].ncell, b->body[body].ncell};
+
+    if (!rank && count[0] == count[1])
+      PetscCall(PetscArraycpy(all[1] + n * first[1], all[0] + n * first[0], n * count[0]));
+    for (int k = 0; k < 2; k++)
+      first[k] += count[k];
+  }
+
+  // to the owners of cells
+  PetscCall(PetscMalloc1(n * b->mesh->ncell_owned, &own));
+  PetscCall(SbForestCreate(b->comm, rank ? 0 : b->mesh->Ncell, b->mesh->ncell_owned,
+                           b->mesh->cell_orig, &sf));
+  PetscCall(SbForestBroadcast(sf, n, MPIU_REAL, all[1], own));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(SbSpaceSetHistory(b->space, own));
+  PetscCall(PetscFree(own));
+  PetscCall(PetscFree2(all[0], all[1]));
+  for (PetscInt k = 0; k < a->nmaterial; k++)
+    if (a->material[k]->viscous)
+      PetscCall(PetscArraycpy(b->material[k]->viscous->stored, a->material[k]->viscous->stored,
+                              SB_PRONY_TERMS));
+  PetscCall(SbSpaceViscousAt(b->space, 0., PETSC_FALSE, to->state.U, to->state.V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

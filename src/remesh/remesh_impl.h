@@ -136,3 +136,5 @@ PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool nam
 
 /* gather.c: transfers the history variables of effects to the new model. Collective. */
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);
+/* The history of viscoelastic cells, to the same cells of the new model. Collective. */
+PetscErrorCode SbViscousHandOver(SbRun from, SbRun to);

@@ -102,6 +102,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   }
   e->integrator_loss = run->state.energy_start + e->load_work + e->prescribed_work -
                        e->damping_loss - e->remesh_loss - e->kinetic - e->strain;
+  if (m->space->viscous)
+    e->integrator_loss -= e->relaxation_loss + e->viscosity_loss;
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&
       -e->integrator_loss > GIVEN * run->state.energy_most + rounding(m)) {

@@ -69,6 +69,26 @@ static PetscErrorCode read_static(SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Integrators that viscoelastic materials do not go with. */
+static PetscErrorCode check_viscous(const SbMaterial m, PetscBool body, SbRun r)
+{
+  PetscFunctionBeginUser;
+  if (!m->viscous)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s_%s_%s: -time alpha2 keeps no history of stresses; take genalpha, which is the "
+             "same method",
+             body ? "body" : "inclusion", m->name, m->viscous->n ? "prony_times" : "viscosity");
+  PetscCheck(!SbRunIsExplicit(r) ||
+               (m->viscous->viscosity[0] == 0. && m->viscous->viscosity[1] == 0.),
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s_%s_viscosity: the stable step of explicit integrators is known without "
+             "viscosities; take -time euler_implicit, newmark or genalpha, or a series of "
+             "prony_times, which goes with all of them",
+             body ? "body" : "inclusion", m->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -98,6 +118,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   for (PetscInt k = 0; k < model->nmaterial && !inverted && !model->dynamic && !r->clock.arc.on;
        k++)
     r->solve.reject_inverted = (PetscBool)(r->solve.reject_inverted || model->material[k]->softens);
+  for (PetscInt k = 0; k < model->nmaterial; k++)
+    PetscCall(check_viscous(model->material[k], (PetscBool)(k < model->nbody), r));
   PetscCheck(!r->solve.reject_inverted || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
              PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
@@ -354,6 +376,12 @@ PetscErrorCode SbRunSolve(SbRun run)
   PetscCall(start_contacts(run));
   PetscCall(SbSpaceDescribeInverted(m->space, run->state.U, sizeof(inverted), inverted));
   PetscCheck(!inverted[0], m->comm, PETSC_ERR_USER_INPUT, "The run cannot start: %s", inverted);
+
+  /* viscoelastic bodies begin relaxed, unless the run goes on */
+  if (m->space->viscous && m->dynamic) {
+    PetscCall(SbSpaceViscousStart(m->space, run->state.U));
+    PetscCall(SbSpaceViscousAt(m->space, 0., PETSC_FALSE, run->state.U, run->state.V));
+  }
   if (run->solve.ts)
     PetscCall(SbRunIntegrate(run));
   else if (run->clock.arc.on)

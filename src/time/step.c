@@ -79,6 +79,22 @@ static PetscErrorCode warn_short(SbRun run, PetscReal dt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The post-solve callback, which evaluates the end of the step: again, more accurately? */
+static PetscErrorCode ask_about(SbRun run, const SbSolvedStep *step, PetscBool *again)
+{
+  const SbSpace s = run->model->space;
+  const PetscReal part = run->solve.stage.part;
+  const PetscBool staged = (PetscBool)(s->viscous && step->U0 && step->V0 && part != 1.);
+
+  PetscFunctionBeginUser;
+  if (staged)
+    PetscCall(SbSpaceViscousAt(s, step->dt, PETSC_TRUE, step->U0, step->V0));
+  PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, again));
+  if (staged)
+    PetscCall(SbSpaceViscousAt(s, part * step->dt, PETSC_TRUE, step->U0, step->V0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   const SbModel m = run->model;
@@ -135,7 +151,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
     if (*ok && run->monitors.post_solve.fn && asked++ < SB_MAX_RESOLVES)
-      PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, &again));
+      PetscCall(ask_about(run, step, &again));
   }
 
   /* -time_inverted reject */

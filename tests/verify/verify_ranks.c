@@ -179,6 +179,14 @@ int main(int argc, char **argv)
                   BAR CLAMP
                   "-body_bar_material corotated -effects gravity,clamp -time newmark -ts_dt 0.01 "
                   "-ts_max_time 0.3 -ts_adapt_type basic -snes_rtol 1e-9"));
+  PetscCall(check(
+    "viscoelastic", 1e-8,
+    TWO
+    "-body_bar_material neohookean -body_bar_prony_times 0.02,0.2 -body_bar_prony_shear 0.3,0.4 "
+    "-body_bar_prony_bulk 0.1,0.1 -body_bar_viscosity 20 -body_bar_element p2 "
+    "-body_block_material stvk -body_block_prony_times 0.05 -body_block_prony_shear 0.5 "
+    "-effects gravity,hold -effect_hold_type fixed -effect_hold_on bar.xmin -time genalpha "
+    "-ts_dt 0.01 -ts_max_time 0.2 -snes_rtol 1e-9 -solver direct"));
   PetscCall(
     check("explicit, consistent mass", 1e-10,
           TWO CLAMP
