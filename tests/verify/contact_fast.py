@@ -5,15 +5,12 @@ lone one flies on as if nothing had happened, and the two separate as fast as wi
 blocks falls as with solved steps, topples, and comes to rest under its weight. The same on 1, 2 and 3 ranks, and after a restart. What it is
 not for is an error.
 """
-import csv
 import re
 import shutil
-import subprocess
-import sys
 
-import numpy
 
-from output_common import MPI, OUT, SUPPLE
+from output_common import OUT
+from scene_common import check, history, start
 
 BODY = ("-body_{0}_mesh box:{1} -body_{0}_translate {2} -body_{0}_material stable_neohookean -body_{0}_young 1e5 -body_{0}_poisson 0.3 "
         "-body_{0}_density 1000 ")
@@ -28,22 +25,7 @@ COMMON = "-quiet -time euler_implicit -output_fields none -output_history_bodies
 
 
 def run(folder, options, ranks=1, code=0):
-    command = [*MPI, str(ranks), SUPPLE, *(COMMON + options).split(), "-output_dir", str(OUT / folder)]
-    result = subprocess.run(command, capture_output=True, text=True)
-    if result.returncode != code:
-        sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
-    return result.stdout + result.stderr
-
-
-def history(folder):
-    with open(OUT / folder / "history.csv", newline="") as f:
-        names, _, *rows = csv.reader(f)
-    return {name: numpy.array([float(row[k]) for row in rows]) for k, name in enumerate(names)}
-
-
-def check(good, text):
-    if not good:
-        sys.exit(text)
+    return start(folder, COMMON + options, ranks, code)
 
 
 def check_impact():

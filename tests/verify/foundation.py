@@ -4,14 +4,12 @@ A block sinks by its weight over stiffness and area, with every element, the sam
 strain and springs add up to what there was, and it bounces with the period of a mass on a spring. A damper of density times speed of sound lets
 a wave in a bar out. Stiffness by a formula of the place. What is missing or below zero is an error.
 """
-import csv
 import math
-import subprocess
 import sys
 
 import numpy
 
-from output_common import MPI, OUT, SUPPLE
+from scene_common import history, start
 
 BLOCK = ("-bodies b -body_b_mesh box:0.2,0.1,0.05:2 -body_b_material {law} -body_b_element {element} -body_b_young {young} -body_b_poisson {nu} "
          "-body_b_density 1000 -effects foam{more} -effect_foam_type foundation -effect_foam_on zmin ")
@@ -20,17 +18,7 @@ count = 0
 
 
 def run(folder, options, ranks=1, code=0):
-    command = [*MPI, str(ranks), SUPPLE, *(COMMON + options).split(), "-output_dir", str(OUT / folder)]
-    result = subprocess.run(command, capture_output=True, text=True)
-    if result.returncode != code:
-        sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
-    return result.stdout + result.stderr
-
-
-def history(folder):
-    with open(OUT / folder / "history.csv", newline="") as f:
-        names, _, *rows = csv.reader(f)
-    return {name: numpy.array([float(row[k]) for row in rows]) for k, name in enumerate(names)}
+    return start(folder, COMMON + options, ranks, code)
 
 
 def near(value, expected, tolerance, what):

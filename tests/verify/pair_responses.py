@@ -5,16 +5,14 @@ stress is uniform, exactly so for multiplier and projected. A cube flies into an
 through anything, and no pair pulls. A block lands with generalized-alpha. Multipliers that do not settle. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
-import csv
 import re
 import shutil
-import subprocess
-import sys
 
 import h5py
 import numpy
 
-from output_common import MPI, OUT, SUPPLE
+from output_common import OUT
+from scene_common import check, history, start
 
 ALL = ("penalty", "augmented", "multiplier", "projected")
 EXACT = ("multiplier", "projected")
@@ -39,22 +37,7 @@ COMMON = "-quiet -snes_rtol 1e-12 -ksp_rtol 1e-12 -reproducible "
 
 
 def run(folder, options, ranks=1, code=0):
-    command = [*MPI, str(ranks), SUPPLE, *(COMMON + options).split(), "-output_dir", str(OUT / folder)]
-    result = subprocess.run(command, capture_output=True, text=True)
-    if result.returncode != code:
-        sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
-    return result.stdout + result.stderr
-
-
-def history(folder):
-    with open(OUT / folder / "history.csv", newline="") as f:
-        names, _, *rows = csv.reader(f)
-    return {name: numpy.array([float(row[k]) for row in rows]) for k, name in enumerate(names)}
-
-
-def check(good, text):
-    if not good:
-        sys.exit(text)
+    return start(folder, COMMON + options, ranks, code)
 
 
 def check_patch():
