@@ -39,6 +39,19 @@ struct _p_SbPotential {
   PetscInt nblock;        /* number of its blocks, all ranks */
 };
 
+/* The stage of X, which may be the start of the step. */
+static PetscErrorCode find_stage(SbRun run, Vec X)
+{
+  const Vec start = run->solve.stage.start;
+  const PetscReal part = run->solve.stage.part;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(X, run->solve.stage.U));
+  if (X != start)
+    PetscCall(VecAXPBY(run->solve.stage.U, 1. - part, part, start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode energy(void *ctx, Vec X, SbNewtonEnergy *value, Vec strain, Vec contact)
 {
   const SbRun run = ((SbPotential)ctx)->run;
@@ -50,7 +63,7 @@ static PetscErrorCode energy(void *ctx, Vec X, SbNewtonEnergy *value, Vec strain
 
   /* strain at the stage */
   if (stage)
-    PetscCall(VecAXPBYPCZ(stage, 1. - part, part, 0., run->solve.stage.start, X));
+    PetscCall(find_stage(run, X));
   PetscCall(SbModelStrainEnergy(m, stage ? stage : X, strain, &value->strain, &value->ninverted));
   if (stage && part != 1.) {
     value->strain /= PetscSqr(part);
@@ -120,7 +133,7 @@ static PetscErrorCode longest(void *ctx, Vec X, Vec Y, PetscReal *part)
   PetscCall(SbSpaceLongestStep(space, X, Y, 1., part));
   if (!stage || !space->positive)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecAXPBYPCZ(stage, 1. - at, at, 0., run->solve.stage.start, X));
+  PetscCall(find_stage(run, X));
   PetscCall(SbSpaceLongestStep(space, stage, Y, at, &there));
   *part = PetscMin(*part, there);
   PetscFunctionReturn(PETSC_SUCCESS);
