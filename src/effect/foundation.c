@@ -40,7 +40,7 @@ static const SbOption rows[] = {
   {"direction", SB_OPTION_CHOICE, 1, "", "normal", "normal|all",
    "which displacement is resisted: normal to the rest surface, or all of it"},
   {"time", SB_OPTION_FORMULA, 1, "", "1", "",
-   "amplitude: factor on the stiffness, a formula of the time t"},
+   "amplitude: factor on the stiffness, a formula of the time t, at least 0"},
 };
 
 static PetscErrorCode options_foundation(SbEffect e, const SbScope *scope)
@@ -147,6 +147,19 @@ static PetscErrorCode setup_foundation(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor on the stiffness at a time, at least 0: bodies would run away from the ground. */
+static PetscErrorCode factor_at(SbEffect e, PetscReal t, PetscReal *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbFormulaEval(e->time, t, NULL, s));
+  PetscCheck(
+    *s >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "-effect_%s_time is %g at t = %g: a factor on the stiffness of the foundation has to be "
+    "at least 0",
+    e->name, (double)*s, (double)t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* P times the value at a point of a field of the nodes. */
 static void value_at(SbSpace space, const Point *at, const PetscReal u[], PetscReal Pu[3])
 {
@@ -166,7 +179,7 @@ static PetscErrorCode force_foundation(SbEffect e, SbSpace space, const SbStage 
   PetscReal s;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &s));
+  PetscCall(factor_at(e, stage->t, &s));
   for (PetscInt k = 0; k < b->n; k++) {
     const Point *at = &b->point[k];
     PetscReal u[3];
@@ -189,7 +202,7 @@ static PetscErrorCode tangent_foundation(SbEffect e, SbSpace space, const SbStag
   PetscReal s;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &s));
+  PetscCall(factor_at(e, stage->t, &s));
   for (PetscInt i = 0; i < b->n; i++) {
     const Point *at = &b->point[i];
     const PetscReal factor = stage->shift_k * s * at->k + stage->shift_v * at->c;
@@ -218,7 +231,7 @@ static PetscErrorCode history_foundation(SbEffect e, SbSpace space, const SbStag
 
   PetscFunctionBeginUser;
   (void)residual;
-  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &s));
+  PetscCall(factor_at(e, stage->t, &s));
   for (PetscInt k = 0; k < b->n; k++) {
     const Point *at = &b->point[k];
     PetscReal u[3];

@@ -68,6 +68,7 @@ run("formula", block(more=",gravity") + "-effect_foam_stiffness 1e4+1e5*x -effec
 near(history("formula")["foam_force_z"][-1], 9.81, 1e-6, "force, stiffness by place")
 
 for options, words in (("", "-effect_foam_stiffness"), ("-effect_foam_stiffness x-0.1", "at least 0"), ("-effect_foam_stiffness t", "-effect_foam_time"),
+                       ("-effect_foam_stiffness 1 -effect_foam_time cos(9*t)", "-effect_foam_time is -"),
                        ("-effect_foam_stiffness 1 -time euler_explicit", "euler_explicit")):
     text = run("error", block() + options, code=1)
     count += 1
