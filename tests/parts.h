@@ -60,7 +60,7 @@ static const Part parts[] = {
    PETSC_TRUE},
   {"effect", "foundation",
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
-   NULL, PETSC_TRUE},
+   NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "point_force",
    "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1",
    NULL, NULL, PETSC_TRUE},
