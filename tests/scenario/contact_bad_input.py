@@ -71,7 +71,8 @@ for response in ALL:
     check(f"inside {response}", code == 0 and last["inverted"] == 0 and 0.005 < last["meet_penetration"] < 0.01, text)
     code, text, last = run("thin", FREE + PLATE.format(0.13, 0.1301), response)
     said = "effect meet" in text and "passed through the obstacle" in text and "response barrier" in text
-    check(f"thin {response}", code == 0 and (said if nodes else not text.strip() and last["centre_z"] < 0.13), text)
+    fast = text.count("warning") == 1 and "a would go 0.2 m in a step" in text
+    check(f"thin {response}", code == 0 and (said if nodes else fast and last["centre_z"] < 0.13), text)
     code, text, last = run("jump", ONE + PLATE.format(0.11, 0.13) + "-effect_meet_displacement 0;0;-0.2*min(max(1e6*(t-0.025),0),1)", response)
     said = "effect meet" in text and ("passed through the obstacle" if nodes else "a and the obstacle are") in text
     check(f"jump {response}", said and code == (0 if nodes else 1), text)
