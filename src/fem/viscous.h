@@ -5,8 +5,7 @@
 #pragma once
 #include "fem_impl.h"
 
-/* Rows and columns of the six entries of a symmetric tensor, and how SbHistoryOften each is in a
-   product. */
+/* Rows and columns of the six entries of a symmetric tensor, and how often each is in a product. */
 static const int SbHistoryRow[6] = {0, 0, 0, 1, 1, 2};
 static const int SbHistoryColumn[6] = {0, 1, 2, 1, 2, 2};
 static const PetscReal SbHistoryOften[6] = {1., 2., 2., 1., 2., 1.};
