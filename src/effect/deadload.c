@@ -212,8 +212,6 @@ static PetscErrorCode integrate(DeadLoad *load, SbSpace space, PetscReal t)
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item];
     const PetscInt cell = corner[0] / 4;
-    const PetscBool curved = (PetscBool)(mesh->cell_set[cell] & SB_CURVED);
-    PetscReal nodes[SB_CELL_NODES][3], x[4][3];
     PetscReal e[3][3] = {{0}};
     PetscReal part = 1;
 
@@ -221,28 +219,16 @@ static PetscErrorCode integrate(DeadLoad *load, SbSpace space, PetscReal t)
     if (load->around)
       part = SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / load->around[mesh->cell[corner[0]]];
 
-    // vertices of the cell
-    if (curved)
-      SbSpaceCellPositions(space, cell, nodes);
-    for (int k = 0; k < 12; k++)
-      x[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * cell + k / 3] + k % 3];
     for (int k = 0; k < rule->n; k++) {
       PetscReal L[4] = {0};
-      PetscReal phi[SB_CELL_NODES];
-      PetscReal p[3] = {0};
-      PetscReal q[3], measure;
+      PetscReal phi[SB_CELL_NODES], p[3], q[3], x[4][3], measure;
       PetscInt n;
 
-      // basis functions and rest position at the point
       for (PetscInt c = 0; c < nc; c++)
         L[corner[c] % 4] = rule->L[k][c];
-      n = SbCellBasis(SbSpaceCellElement(space, cell), L, phi);
-      for (PetscInt a = 0; a < 3 * n; a++)
-        p[a % 3] += phi[a / 3] * space->node_x[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3];
+      n = SbEffectPoint(space, cell, L, phi, p, x);
 
       // volume or area of the simplex with the derivatives of the map at the point
-      if (curved)
-        SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
       for (PetscInt c = 1; c < nc; c++)
         SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
       measure = part * measure_of(nc, (const PetscReal(*)[3])e);

@@ -35,6 +35,33 @@ typedef enum {
 PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt *n,
                              PetscInt **items);
 
+/*
+  SbEffectPoint - a point of a cell with the barycentric coordinates L at rest: the basis functions
+  phi, their number as the result, the place x, m, and the corners of the straight tet with the
+  derivatives of the cell's map there, m. Not collective.
+*/
+PetscInt SbEffectPoint(SbSpace space, PetscInt cell, const PetscReal L[4],
+                       PetscReal phi[SB_CELL_NODES], PetscReal x[3], PetscReal corner[4][3]);
+
+/*
+  SbPlaceFind - the nodes whose mean displacement is that of a point of a body, at rest. Collective;
+  release it with SbPlaceDestroy(). A point outside moves to the nearest place.
+
+  body: -1: the one that holds the point. option: for messages. Errors (PETSC_ERR_USER_INPUT, alike
+  on all ranks): two bodies hold the point.
+*/
+typedef struct {
+  PetscInt body;
+  PetscReal x[3];    /* the place at rest, m */
+  PetscReal off;     /* its distance from the point, m; 0: the body holds the point */
+  PetscInt n;        /* its nodes */
+  PetscInt *gnode;   /* [n] global numbers, ascending; alike on all ranks */
+  PetscReal *weight; /* [n] of the mean, sum 1 */
+} SbPlace;
+PetscErrorCode SbPlaceFind(SbSpace space, const char *option, PetscInt body,
+                           const PetscReal point[3], SbPlace *place);
+PetscErrorCode SbPlaceDestroy(SbPlace *place);
+
 /* Basis functions of a cell at the barycentric coordinates L; returns their number. */
 static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
 {

@@ -26,7 +26,7 @@ typedef struct {
   SbFormula stiffness, damping; /* Pa/m, Pa s/m */
   int direction;                /* 0: normal, 1: all */
   PetscInt n;
-  Point *point; /* [n] of owned and ghost cells */
+  Point *point; /* [n] of owned and ghost cells; those of a facet follow each other */
 } Foundation;
 
 static const SbOption rows[] = {
@@ -63,16 +63,8 @@ static PetscErrorCode options_foundation(SbEffect e, const SbScope *scope)
                "-effect_%s_time is a factor on the stiffness that may change",
                e->name, i ? "damping" : "stiffness", e->name);
   PetscCall(SbOptionChoice(scope, "direction", &b->direction));
-  if (SbOptionFind(&SbRunScope, "time")) {
-    int time;
-
-    PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
-    PetscCheck(time != 3 && time != 4, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "effect %s: the stable step of -time euler_symplectic and euler_explicit does not "
-               "know its springs and dampers; use an implicit integrator",
-               e->name);
-  }
   e->linear = PETSC_FALSE;
+  e->stiff = PETSC_TRUE;
   e->holds = given[0];
   e->steady = PETSC_FALSE; /* a load factor does not make the ground softer */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -93,30 +85,16 @@ static PetscErrorCode coefficient(SbEffect e, const char *key, SbFormula formula
 static PetscErrorCode set_point(SbEffect e, SbSpace space, const SbFacet *facet, int q, Point *at)
 {
   const Foundation *b = (const Foundation *)e->data;
-  const SbMesh mesh = space->mesh;
-  const PetscBool curved = (PetscBool)(mesh->cell_set[facet->cell] & SB_CURVED);
-  PetscReal nodes[SB_CELL_NODES][3], corner[4][3], side[2][3], normal[3];
+  PetscReal x[3], corner[4][3], side[2][3], normal[3];
   PetscReal L[4] = {0};
-  PetscReal x[3] = {0};
 
   PetscFunctionBeginUser;
-  *at = (Point){.cell = facet->cell, .counts = (PetscBool)(facet->cell < mesh->ncell_owned)};
-
-  /* basis functions and rest position */
   for (int i = 0; i < 3; i++)
     L[facet->corner[i]] = SbRuleFacet.L[q][i];
-  at->n = SbCellBasis(SbSpaceCellElement(space, facet->cell), L, at->phi);
-  for (PetscInt a = 0; a < 3 * at->n; a++)
-    x[a % 3] +=
-      at->phi[a / 3] * space->node_x[3 * SbSpaceCellNode(space, facet->cell, a / 3) + a % 3];
+  *at = (Point){.cell = facet->cell, .counts = (PetscBool)(facet->cell < space->mesh->ncell_owned)};
+  at->n = SbEffectPoint(space, facet->cell, L, at->phi, x, corner);
 
   /* area and normal, by the derivatives of the map */
-  for (int k = 0; k < 12; k++)
-    corner[k / 3][k % 3] = mesh->x[3 * mesh->cell[4 * facet->cell + k / 3] + k % 3];
-  if (curved) {
-    SbSpaceCellPositions(space, facet->cell, nodes);
-    SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, corner);
-  }
   for (int i = 0; i < 2; i++)
     SbSubtract(corner[facet->corner[i + 1]], corner[facet->corner[0]], side[i]);
   SbCross(side[0], side[1], normal);
@@ -203,20 +181,17 @@ static PetscErrorCode tangent_foundation(SbEffect e, SbSpace space, const SbStag
 
   PetscFunctionBeginUser;
   PetscCall(factor_at(e, stage->t, &s));
-  for (PetscInt i = 0; i < b->n; i++) {
-    const Point *at = &b->point[i];
-    const PetscReal factor = stage->shift_k * s * at->k + stage->shift_v * at->c;
+  for (const Point *facet = b->point; facet < b->point + b->n; facet += SbRuleFacet.n) {
+    for (PetscInt pair = 0; pair < facet->n * facet->n; pair++) {
+      const PetscInt a = pair / facet->n;
+      const PetscInt c = pair % facet->n;
+      PetscReal block[9] = {0};
 
-    for (PetscInt a = 0; a < at->n; a++) {
-      for (PetscInt c = 0; c < at->n; c++) {
-        PetscReal block[9];
-
-        if (at->phi[a] * at->phi[c] == 0)
-          continue;
+      for (const Point *at = facet; at < facet + SbRuleFacet.n; at++)
         for (int k = 0; k < 9; k++)
-          block[k] = factor * at->phi[a] * at->phi[c] * at->P[k];
-        PetscCall(SbSpaceAddCellBlock(space, A, at->cell, a, c, block));
-      }
+          block[k] += (stage->shift_k * s * at->k + stage->shift_v * at->c) * at->phi[a] *
+                      at->phi[c] * at->P[k];
+      PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, a, c, block));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -132,6 +132,11 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
       "law does not admit; take genalpha, which is the same method",
       model->material[k]->name, model->material[k]->type->name);
   for (PetscInt e = 0; e < model->neffect; e++) {
+    PetscCheck(!SbRunIsExplicit(r) || !model->effect[e]->stiff, PETSC_COMM_WORLD,
+               PETSC_ERR_USER_INPUT,
+               "effect %s: the stable step of -time euler_symplectic and euler_explicit does not "
+               "know its springs and dampers; use an implicit integrator",
+               model->effect[e]->name);
     r->solve.saddle = (PetscBool)(r->solve.saddle ||
                                   (model->effect[e]->contact && model->effect[e]->contact->saddle));
     barrier = (PetscBool)(barrier || SbEffectHasPotential(model->effect[e]));
