@@ -85,8 +85,8 @@ typedef struct {
   SbEffectOps ops;
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
-  SbEffectPointForce, SbEffectFoundation, SbEffectFixed, SbEffectPrescribedDisplacement,
-  SbEffectDamping;
+  SbEffectPointForce, SbEffectFoundation, SbEffectSpring, SbEffectCable, SbEffectFixed,
+  SbEffectPrescribedDisplacement, SbEffectDamping;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];

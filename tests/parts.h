@@ -61,6 +61,14 @@ static const Part parts[] = {
   {"effect", "foundation",
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
    NULL, PETSC_FALSE}, /* implicit only */
+  {"effect", "spring",
+   "-effects line -effect_line_type spring -effect_line_points "
+   "0.4,0.05,0.05;ground:0.4,0.05,0.5 -effect_line_stiffness 100",
+   NULL, NULL, PETSC_FALSE}, /* implicit only */
+  {"effect", "cable",
+   "-effects line -effect_line_type cable -effect_line_points "
+   "0.1,0.05,0.05;0.3,0.05,0.05;ground:0.4,0.05,0.5 -effect_line_tension 1",
+   NULL, NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "point_force",
    "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1",
    NULL, NULL, PETSC_TRUE},

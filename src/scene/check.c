@@ -199,7 +199,7 @@ PetscErrorCode SbSceneCheck(SbModel model)
   PetscCheck(
     constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
     "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
-    "type fixed, prescribed_displacement or foundation");
+    "type fixed, prescribed_displacement or foundation, or springs to the ground");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,8 +9,11 @@
 PetscErrorCode SbRegisterAll(void)
 {
   static const SbEffectType *const effects[] = {
-    &SbEffectGravity,    &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
-    &SbEffectFoundation, &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
+    &SbEffectGravity,    &SbEffectBodyForce,
+    &SbEffectTraction,   &SbEffectPressure,
+    &SbEffectFoundation, &SbEffectSpring,
+    &SbEffectCable,      &SbEffectPointForce,
+    &SbEffectFixed,      &SbEffectPrescribedDisplacement,
     &SbEffectDamping,    &SbEffectContact};
   static const struct {
     const char *klass;

@@ -53,6 +53,8 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectPressure));
   PetscCall(SbEffectRegister(&SbEffectPointForce));
   PetscCall(SbEffectRegister(&SbEffectFoundation));
+  PetscCall(SbEffectRegister(&SbEffectSpring));
+  PetscCall(SbEffectRegister(&SbEffectCable));
   PetscCall(SbEffectRegister(&SbEffectFixed));
   PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
   PetscCall(SbEffectRegister(&SbEffectDamping));

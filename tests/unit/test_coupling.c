@@ -1,122 +1,24 @@
 /*
-  Couplings: an effect of the test, a spring between two nodes of different bodies that share no
-  cell. On any number of ranks, for each element: the tangent with its blocks against finite
-  differences of the residual, an equilibrium by the program's solver, the two forces opposite and
-  equal, the same on one rank. Without couplings the space has nothing of them.
+  Couplings: a spring between two nodes of different bodies that share no cell. On any number of
+  ranks, for each element: the tangent with its blocks against finite differences of the residual,
+  an equilibrium by the program's solver, the two forces opposite and equal, the same on one rank.
+  Without couplings the space has nothing of them.
 */
 // @ranks 1 3
 #include "../scene.h"
 
-#define STIFFNESS 300.0 /* N/m */
-#define LENGTH 1.0      /* natural length, m; the nodes are farther apart */
+#define STIFFNESS 300.0 /* N/m; the natural length is 1 m, and the nodes are farther apart */
 
 /* The nodes at two corners, opposite each other but for a shift. */
 static const PetscReal corner[2][3] = {{1., 1., 1.}, {3., 0., 1.}};
+static const char spring[] = ",pull -effect_pull_type spring -effect_pull_points a:1,1,1;b:3,0,1 "
+                             "-effect_pull_stiffness 300 -effect_pull_length 1";
 
-typedef struct {
-  PetscInt number; /* of its coupling; -1: another rank's */
-} TestSpring;
-
-static PetscErrorCode options_spring(SbEffect e, const SbScope *scope)
-{
-  PetscFunctionBeginUser;
-  (void)scope;
-  e->linear = e->steady = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode couplings_spring(SbEffect e, SbSpace s)
-{
-  TestSpring *spring = (TestSpring *)e->data;
-  PetscInt gnode[2] = {-1, -1};
-
-  PetscFunctionBeginUser;
-
-  /* the nodes nearest to the corners, of all ranks */
-  for (int k = 0; k < 2; k++) {
-    struct {
-      double distance;
-      int rank;
-    } mine = {PETSC_MAX_REAL, s->rank}, best;
-
-    for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      const PetscReal d = SbDistance2(s->node_x + 3 * i, corner[k]);
-
-      if (s->node_body[i] != k || (double)d >= mine.distance)
-        continue;
-      mine.distance = (double)d;
-      gnode[k] = s->gnode[i];
-    }
-    PetscCallMPI(MPI_Allreduce(&mine, &best, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
-    PetscCallMPI(MPI_Bcast(&gnode[k], 1, MPIU_INT, best.rank, s->comm));
-  }
-  PetscCall(SbSpaceCouple(s, 2, gnode, &spring->number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Its nodes, the unit vector from the first to the second, and its elongation, m. */
-static PetscReal elongation(const TestSpring *spring, SbSpace s, const PetscReal u[],
-                            const PetscInt **node, PetscReal n[3])
-{
-  *node = s->couplings.node + s->couplings.start[spring->number];
-  for (int i = 0; i < 3; i++) {
-    const PetscInt p = 3 * (*node)[0] + i;
-    const PetscInt q = 3 * (*node)[1] + i;
-
-    n[i] = s->node_x[q] + u[q] - s->node_x[p] - u[p];
-  }
-  return SbNormalise(n) - LENGTH;
-}
-
-static PetscErrorCode force_spring(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
-{
-  const TestSpring *spring = (const TestSpring *)e->data;
-  const PetscInt *node;
-  PetscReal n[3];
-
-  PetscFunctionBeginUser;
-  if (spring->number >= 0) {
-    const PetscReal N = STIFFNESS * elongation(spring, s, stage->u, &node, n);
-
-    for (int i = 0; i < 3; i++) {
-      f[3 * node[0] + i] += N * n[i];
-      f[3 * node[1] + i] -= N * n[i];
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode tangent_spring(SbEffect e, SbSpace s, const SbStage *stage, Mat A)
-{
-  const TestSpring *spring = (const TestSpring *)e->data;
-  const PetscInt *node;
-  PetscReal n[3], K[36];
-
-  PetscFunctionBeginUser;
-  if (spring->number >= 0) {
-    const PetscReal d = elongation(spring, s, stage->u, &node, n);
-    const PetscReal across = STIFFNESS * d / (d + LENGTH);
-
-    for (int k = 0; k < 36; k++) {
-      const int i = k / 6 % 3;
-      const int j = k % 3;
-      const PetscReal sign = k / 18 == k % 6 / 3 ? 1. : -1.;
-
-      K[k] = stage->shift_k * sign * ((STIFFNESS - across) * n[i] * n[j] + (i == j) * across);
-    }
-    PetscCall(SbSpaceAddCoupling(s, A, spring->number, K));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const SbEffectType type = {
-  .name = "test_spring",
-  .size = sizeof(TestSpring),
-  .ops = {.setfromoptions = options_spring,
-          .couplings = couplings_spring,
-          .force = force_spring,
-          .tangent = tangent_spring},
-};
+/* From the one over a pulley of the ground to the other, and back. */
+static const char cable[] =
+  ",pull -effect_pull_type cable -effect_pull_points "
+  "a:0.9,0.7,0.6;ground:2,0.5,2;b:3.1,0.2,0.9;a:0.6,1,0.4 -effect_pull_stiffness 300 "
+  "-effect_pull_tension 20";
 
 /* ------------------------------------------------------------------ the scene */
 
@@ -269,7 +171,6 @@ int main(int argc, char **argv)
   TestScene t;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbEffectRegister(&type));
   PetscCall(open_scene(PETSC_COMM_WORLD, "p1", "", &t));
   SB_CHECK(!t.model->space->couplings.n && !t.model->space->coupled &&
              t.model->space->nnode == t.model->space->nnode_cell && !t.model->space->plan->coupling,
@@ -278,11 +179,14 @@ int main(int argc, char **argv)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(elements); k++) {
     PetscReal force[3], alone[3];
 
-    PetscCall(open_scene(PETSC_COMM_WORLD, elements[k], ",pull -effect_pull_type test_spring", &t));
+    PetscCall(open_scene(PETSC_COMM_WORLD, elements[k], cable, &t));
+    PetscCall(check_tangent(t.model, elements[k]));
+    PetscCall(test_scene_close(&t));
+    PetscCall(open_scene(PETSC_COMM_WORLD, elements[k], spring, &t));
     PetscCall(check_tangent(t.model, elements[k]));
     PetscCall(solve(&t, elements[k], force));
     PetscCall(test_scene_close(&t));
-    PetscCall(open_scene(PETSC_COMM_SELF, elements[k], ",pull -effect_pull_type test_spring", &t));
+    PetscCall(open_scene(PETSC_COMM_SELF, elements[k], spring, &t));
     PetscCall(solve(&t, elements[k], alone));
     PetscCall(test_scene_close(&t));
     for (int i = 0; i < 3; i++)
