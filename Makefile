@@ -109,11 +109,11 @@ deps:
 	@scripts/install-deps run
 
 demo: deps ## install missing packages, build, run scenarios/demo.opts on 2 ranks, draw it: out/demo
-	$(AGAIN) bin/supple meshes/organ_coarse.msh
+	$(AGAIN) bin/supple meshes/lobe.msh
 	@scripts/venv
 	@scripts/mpi 2 bin/supple scenarios/demo.opts
-	@scripts/render out/demo
-	@scripts/render out/demo --animate out/demo/animation.gif
+	@scripts/render out/demo --obstacles
+	@scripts/render out/demo --obstacles --animate out/demo/animation.gif
 	@echo "open out/demo/fields.vtkhdf in ParaView (5.12 or newer; older: fields.xmf); out/demo/picture.png and animation.gif show the run"
 
 pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/pictures/*.png and out/*/animation.gif (1 to 2 minutes)

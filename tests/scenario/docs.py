@@ -20,7 +20,7 @@ MPI = os.environ["SB_MPI"]
 SUPPLE = (TOP / os.environ["SB_SUPPLE"]).resolve()
 # What makes a scenario short; the last value of an option counts.
 SHORT = {
-    "demo": "-ts_max_time 0.02", "hanging": "-ts_max_time 0.02 -body_thing_tet_size 0.006", "scan":
+    "demo": "-ts_max_time 0.1", "organ": "-ts_max_time 0.02", "finger": "-ts_max_time 0.05", "hanging": "-ts_max_time 0.02 -body_thing_tet_size 0.006", "scan":
     "-body_organ_element p1 -body_organ_tet_size 0.006 -static_steps 1 -effect_tool_displacement '0;0;-0.001*t'", "indent":
     "-body_tissue_mesh box:0.1,0.06,0.04:4 -ts_dt 0.05 -ts_max_time 0.1", "pile": "-ts_max_time 0.09", "fold": "-ts_max_time 0.05", "press": "-ts_max_time 0.1",
     "drop": "-ts_max_time 0.13", "rubber": "-body_block_mesh box:0.06,0.06,0.04:1 -static_steps 1", "relax": "-ts_max_time 0.1",
