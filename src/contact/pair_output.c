@@ -335,6 +335,7 @@ PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal
   const SbEffect e = contact->effect;
   const PetscReal *x = b->motion.x;
   const Active *least = NULL;
+  PetscBool held = PETSC_FALSE;
   struct {
     double gap;
     int rank;
@@ -358,10 +359,13 @@ PetscErrorCode SbContactNearest_Surfaces(SbContact contact, SbSpace s, PetscReal
 
     for (int k = 0; k < 2; k++)
       name[k] = part[k] < s->mesh->nbody ? s->mesh->body[part[k]].name : "the obstacle";
-    PetscCall(PetscSNPrintf(text, size,
-                            "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m",
-                            e->name, name[0], name[1], first.gap, (double)x[3 * pair->v[0]],
-                            (double)x[3 * pair->v[0] + 1], (double)x[3 * pair->v[0] + 2]));
+    for (int k = 0; k < 4 && !pair->side; k++)
+      held = (PetscBool)(held || (b->surface->part[pair->v[k]] < s->mesh->nbody &&
+                                  b->surface->driven[pair->v[k]]));
+    SbFormat(size, text, "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m%s", e->name,
+             name[0], name[1], first.gap, (double)x[3 * pair->v[0]], (double)x[3 * pair->v[0] + 1],
+             (double)x[3 * pair->v[0] + 2],
+             held ? ", beside nodes that a support holds, which cannot give way" : "");
   }
   PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, first.rank, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -58,6 +58,12 @@ supports("f2", "f1", "0.001;0;0", said=("f2 and f1", "0.001 and 0 m", "f2 counts
 supports("f1", "f2", "0;z*t;0")  # nothing where they meet
 supports("f1", "f2", "0;0;0.001*t", said=("f1 and f2", "direction z"))
 
+# an obstacle that is driven onto nodes that a support holds
+for n in (1, 2):
+    case("held", ["-bodies", "b", *BOX[:2], "-sets", "held", "-set_held_at", "box:-1,-1,0.09,0.06,1,1", "-effects", "clamp,tool", "-effect_clamp_type", "fixed", "-effect_clamp_on",
+                  "held", "-effect_tool_type", "contact", "-effect_tool_obstacle", "sphere:0.055,0.05,0.131,0.03", "-effect_tool_displacement", "0;0;-t", "-ts_dt", "0.01",
+                  "-ts_max_time", "0.02", "-time_max_halvings", "0"], ranks=n, said=("effect tool: the obstacle and b", "a support holds, which cannot give way"), error=True)
+
 # a body that goes farther than its size in a step and meets another one; one that meets nothing, and one in shorter steps
 for n, speed, dt, said in ((1, "20", "0.01", ("warning", "t = 0 s: b would go 0.2 m", "1.2 times its size of 0.173 m", "-ts_dt below 0.0087")), (2, "-20", "0.01", ()), (1, "20", "0.005", ())):
     case(f"way {speed} {dt}", ["-bodies", "b,c", *BOX[:2], "-body_c_mesh", "box:0.1,0.1,0.1:2", "-body_c_material", "corotated", "-body_c_young", "1e5", "-body_c_poisson", "0.4", "-body_c_density", "1000",
