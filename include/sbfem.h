@@ -231,6 +231,11 @@ PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
   SbSpaceViscousStored  - energy of the branches of a body, -1: of all, J. Not collective.
   SbSpaceGetHistory     - for checkpoints, x[viscous ncell_owned]. Not collective.
   SbSpaceSetHistory     - the same
+  SbSpaceMeanHistory    - in the record x of an owned cell, from SbSpaceGetHistory(), the branches
+  of
+                          its points become their mean, first in the record; back: the points of a
+                          cell of another mesh get it, and its last step is that of
+                          SbSpaceViscousStart(), to be called then. Not collective.
 */
 PetscErrorCode SbSpaceViscousStart(SbSpace space, Vec U);
 PetscErrorCode SbSpaceViscousAt(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
@@ -239,6 +244,8 @@ PetscErrorCode SbSpaceViscousWork(SbSpace space, const Vec U[2], const Vec V[2],
 PetscReal SbSpaceViscousStored(SbSpace space, PetscInt body);
 PetscErrorCode SbSpaceGetHistory(SbSpace space, PetscReal x[]);
 PetscErrorCode SbSpaceSetHistory(SbSpace space, const PetscReal x[]);
+PetscErrorCode SbSpaceMeanHistory(SbSpace space, const PetscBool of_body[], PetscBool back,
+                                  PetscInt stride, PetscReal x[]);
 
 /* matrices and their assembly */
 

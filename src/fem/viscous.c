@@ -508,3 +508,34 @@ PetscErrorCode SbSpaceSetHistory(SbSpace s, const PetscReal own[])
   s->viscous_began = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpaceMeanHistory(SbSpace s, const PetscBool of_body[], PetscBool back,
+                                  PetscInt stride, PetscReal x[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
+    const SbRegion *region = s->batch_region[b];
+    const struct _p_SbStressHistory *h = region->history;
+
+    if (!h || !of_body[region->body])
+      continue;
+
+    // a point has the numbers of the last step, then those of the branches
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt n = h->width * region->material->viscous->n;
+      PetscReal *record = x + stride * (s->batch_cell[b] + l);
+      PetscReal mean[SB_WIDTH * SB_PRONY_TERMS] = {0.};
+
+      for (PetscInt k = 0; k < n * h->npoint && !back; k++)
+        mean[k % n] += record[(h->width + n) * (k / n) + h->width + k % n] / h->npoint;
+      if (back)
+        PetscCall(PetscArraycpy(mean, record, n));
+      PetscCall(PetscArrayzero(record, stride));
+      if (!back)
+        PetscCall(PetscArraycpy(record, mean, n));
+      for (PetscInt k = 0; k < n * h->npoint && back; k++)
+        record[(h->width + n) * (k / n) + h->width + k % n] = mean[k % n];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -137,6 +137,8 @@ PetscErrorCode SbViscousRead(SbMaterial m, const SbScope *scope)
              "%s has %" PetscInt_FMT
              " times and no coefficients: give prony_shear, prony_bulk, or both",
              option, v->n);
+  if (sum[0] == 0. && sum[1] == 0.)
+    v->n = 0;
   PetscCall(SbOptionReal(scope, "viscosity", &v->viscosity[0]));
   PetscCall(SbOptionReal(scope, "viscosity_bulk", &v->viscosity[1]));
   if (!v->n && v->viscosity[0] == 0. && v->viscosity[1] == 0.) {

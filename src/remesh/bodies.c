@@ -323,6 +323,8 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
     for (int a = 0; a < 4; a++)
       p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c] & w->groups;
   }
+  for (PetscInt c = 0; c < m->ncell; c++)
+    result->from[cell1 + c] = w->cell0 + m->within[c];
   if (w->done) {
     for (PetscInt c = 0; c < m->ncell; c++)
       PetscCall(new_values(w, c, value + each * (size_t)c));
@@ -358,6 +360,7 @@ PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *r)
   PetscCall(PetscFree2(r->in_memory, r->outcome));
   PetscCall(SbGatheredDestroy(&r->next));
   PetscCall(PetscFree2(r->renamed.from, r->renamed.to));
+  PetscCall(PetscFree(r->from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -438,6 +441,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   r->next.ncell = r->next.cell0[g->nbody];
   PetscCall(PetscMalloc1((size_t)(r->next.width * r->next.nfield * 3) * (size_t)r->next.ncell,
                          &r->next.value));
+  PetscCall(PetscMalloc1(r->next.ncell, &r->from));
   PetscCall(PetscMalloc2(room, &r->renamed.from, room, &r->renamed.to));
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(finish_body(&work[b], step, r));

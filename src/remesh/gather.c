@@ -236,12 +236,13 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbViscousHandOver(SbRun from, SbRun to)
+PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
+                                 const PetscBool due[])
 {
   const SbModel a = from->model;
   const SbModel b = to->model;
-  const PetscInt n = a->space->viscous;
-  PetscReal *own, *all[2];
+  const PetscInt n = PetscMax(a->space->viscous, b->space->viscous);
+  PetscReal *own, *record, *all[2];
   PetscMPIInt rank;
   PetscSF sf;
 
@@ -252,38 +253,46 @@ PetscErrorCode SbViscousHandOver(SbRun from, SbRun to)
   PetscCall(
     PetscCalloc2(rank ? 0 : n * a->mesh->Ncell, &all[0], rank ? 0 : n * b->mesh->Ncell, &all[1]));
 
-  // by original numbers on rank 0
-  PetscCall(PetscMalloc1(n * a->mesh->ncell_owned, &own));
+  // a record of n numbers per cell; of bodies with a new mesh the mean over the points of a cell
+  PetscCall(PetscMalloc1(a->space->viscous * a->mesh->ncell_owned, &own));
+  PetscCall(PetscCalloc1(n * a->mesh->ncell_owned, &record));
   PetscCall(SbSpaceGetHistory(a->space, own));
+  for (PetscInt c = 0; c < a->mesh->ncell_owned; c++)
+    PetscCall(PetscArraycpy(record + n * c, own + a->space->viscous * c, a->space->viscous));
+  PetscCall(PetscFree(own));
+  PetscCall(SbSpaceMeanHistory(a->space, due, PETSC_FALSE, n, record));
+
+  // by original numbers on rank 0, and to the cells of the new mesh
   PetscCall(SbForestCreate(a->comm, rank ? 0 : a->mesh->Ncell, a->mesh->ncell_owned,
                            a->mesh->cell_orig, &sf));
-  PetscCall(SbForestReduce(sf, n, MPIU_REAL, own, all[0]));
+  PetscCall(SbForestReduce(sf, n, MPIU_REAL, record, all[0]));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(PetscFree(own));
+  PetscCall(PetscFree(record));
+  for (PetscInt c = 0; c < b->mesh->Ncell && !rank; c++)
+    PetscCall(PetscArraycpy(all[1] + n * c, all[0] + n * result->from[c], n));
 
-  // viscoelastic bodies keep their cells, but other numbers may have changed
-  for (PetscInt body = 0, first[2] = {0, 0}; body < a->nbody; body++) {
-    const PetscInt count[2] = {a->body[body].ncell, b->body[body].ncell};
-
-    if (!rank && count[0] == count[1])
-      PetscCall(PetscArraycpy(all[1] + n * first[1], all[0] + n * first[0], n * count[0]));
-    for (int k = 0; k < 2; k++)
-      first[k] += count[k];
-  }
-
-  // to the owners of cells
-  PetscCall(PetscMalloc1(n * b->mesh->ncell_owned, &own));
+  // to their owners
+  PetscCall(PetscMalloc1(n * b->mesh->ncell_owned, &record));
   PetscCall(SbForestCreate(b->comm, rank ? 0 : b->mesh->Ncell, b->mesh->ncell_owned,
                            b->mesh->cell_orig, &sf));
-  PetscCall(SbForestBroadcast(sf, n, MPIU_REAL, all[1], own));
+  PetscCall(SbForestBroadcast(sf, n, MPIU_REAL, all[1], record));
   PetscCall(PetscSFDestroy(&sf));
+  PetscCall(SbSpaceMeanHistory(b->space, due, PETSC_TRUE, n, record));
+  PetscCall(PetscMalloc1(b->space->viscous * b->mesh->ncell_owned, &own));
+  for (PetscInt c = 0; c < b->mesh->ncell_owned; c++)
+    PetscCall(PetscArraycpy(own + b->space->viscous * c, record + n * c, b->space->viscous));
   PetscCall(SbSpaceSetHistory(b->space, own));
   PetscCall(PetscFree(own));
+  PetscCall(PetscFree(record));
   PetscCall(PetscFree2(all[0], all[1]));
+
+  // the law at the last step is that of the new mesh, the same bit for bit where that is the old
+  // one
+  b->space->viscous_began = PETSC_FALSE;
+  PetscCall(SbSpaceViscousStart(b->space, to->state.U));
   for (PetscInt k = 0; k < a->nmaterial; k++)
     if (a->material[k]->viscous)
       PetscCall(PetscArraycpy(b->material[k]->viscous->stored, a->material[k]->viscous->stored,
                               SB_PRONY_TERMS));
-  PetscCall(SbSpaceViscousAt(b->space, 0., PETSC_FALSE, to->state.U, to->state.V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

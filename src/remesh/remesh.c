@@ -66,21 +66,6 @@ const SbOption SbRemeshBodyRows[] = {
   {0},
 };
 
-/* A new mesh has no history of stresses. */
-static PetscErrorCode check_viscous(SbModel m, PetscInt b)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = -1; k < m->body[b].ninclusion && m->dynamic; k++) {
-    const SbMaterial law = m->material[k < 0 ? b : m->body[b].inclusion[k].material];
-
-    PetscCheck(!law->viscous || !law->viscous->n, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "-%s_%s_prony_times: re-meshing cannot take the history of a viscoelastic body to "
-               "another mesh; leave '%s' out of -remesh_bodies",
-               k < 0 ? "body" : "inclusion", law->name, m->body[b].name);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
   PetscBool named = PETSC_FALSE;
@@ -181,9 +166,6 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;
   r->meshes = (PetscBool)(any || r->ntime || r->failed);
-  for (PetscInt b = 0; b < m->nbody && r->meshes; b++)
-    if (r->named[b])
-      PetscCall(check_viscous(m, b));
   if (!r->meshes && !r->nchange)
     PetscCall(SbRemeshDestroy(remesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -365,6 +347,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   // transfer the state
   PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
+  PetscCall(SbViscousHandOver(before, run, result, r->due));
   PetscCall(prescribe(r, &s));
 
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations
@@ -381,7 +364,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   }
   PetscCall(PetscFree(momenta));
   PetscCall(SbEffectsHandOver(before, run, &result->renamed));
-  PetscCall(SbViscousHandOver(before, run));
+  if (s.model->dynamic)
+    PetscCall(SbSpaceViscousAt(s.model->space, 0., PETSC_FALSE, run->state.U, run->state.V));
 
   // penalty of CR and DG for the new state, before accelerations and energies are computed
   if (run->solve.J && s.model->dynamic && run->solve.preset != SB_TIME_ALPHA2)

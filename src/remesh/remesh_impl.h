@@ -117,6 +117,7 @@ typedef struct {
   SbMemoryMesh **in_memory; /* [nbody] meshes of all bodies, on rank 0; NULL: elsewhere, or taken */
   SbRemeshOutcome *outcome; /* [nbody] numbers, quality and message of each body */
   SbGathered next;          /* next scene with its state; X, vert_set and so on are not set */
+  PetscInt *from;           /* [next.ncell] old cell that holds the centroid of each; on rank 0 */
   SbRenamed renamed;        /* renumbered nodes of the surfaces of all bodies */
 } SbRemeshResult;           /* SbRemeshResultDestroy() */
 PetscErrorCode SbRemeshResultCreate(const SbGathered *g, SbRemeshResult *result);
@@ -136,5 +137,7 @@ PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool nam
 
 /* gather.c: transfers the history variables of effects to the new model. Collective. */
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);
-/* The history of viscoelastic cells, to the same cells of the new model. Collective. */
-PetscErrorCode SbViscousHandOver(SbRun from, SbRun to);
+/* The history of viscoelastic cells at the end of a step, from the cells result->from: bodies with
+   due[nbody] have new meshes. Collective. */
+PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
+                                 const PetscBool due[]);
