@@ -23,6 +23,8 @@ static const int SbPairB[SB_PAIRS] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3, 4, 4, 4, 4, 
   opposite vertex a. CR shares a node between the two cells of a face; in DG each cell has its own.
   They differ in `tabulate`, in the mass, and in the face terms (src/fem/jump.c). P2 is quadratic:
   it has six more nodes at the edges, and is a P1 cell at each of its points (src/element/p2.c).
+  All cells of a rigid body have the same four nodes, the corners of a tet of their own, whose
+  barycentric coordinates are the basis (src/fem/rigid.c).
 */
 typedef struct _p_SbElement *SbElement;
 typedef struct {
@@ -50,6 +52,7 @@ struct _p_SbElement {
     mean_volume; /* P2: most of the volumetric part of the energy is that of the mean of the cell */
   PetscBool
     weak; /* DG: a prescribed boundary face gets a node of its own, to which the cell is tied */
+  PetscBool rigid; /* of a rigid body: no nodes per vertex, edge, face or cell */
   SbElementOps ops;
 };
 /* An element by name, and what it is with its options at their defaults. */
@@ -74,7 +77,16 @@ const SbElementType *SbElementFind(const char *name);
    examined); owned by the caller. Error: PETSC_ERR_USER for an unknown name, and what the option
    readers refuse. */
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *e);
+/* The element of rigid bodies, which has no name in the registry: -body_<name>_rigid asks for
+   it. */
+#define SB_ELEMENT_RIGID "rigid"
+PetscErrorCode SbElementCreateRigid(SbElement *e);
 PetscErrorCode SbElementDestroy(SbElement *e);
+/* Whether it has its nodes at faces: CR and DG. */
+static inline PetscBool SbElementHasFaces(const struct _p_SbElement *e)
+{
+  return (PetscBool)(e->nodes_per[2] || e->nodes_per[3]);
+}
 
 /* F = one I + sum_a u_a (x) grad phi_a; one: 1, or 0 for the gradient of a velocity. g[3*(a-1)+j] =
    d phi_a / dX_j, a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */

@@ -74,13 +74,18 @@ struct _p_SbSpace {
     *edge_node; /* [ncell][6] local nodes at edges of P2 cells, -1: none; NULL without a P2 body */
   PetscReal *node_x; /* [nnode][3] rest position of each node, m */
   /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex; Nvert +
-     4 cell_orig + a of node a of a cell, the lower of two that share it, 4 Ncell more for its
+     4 cell_orig + a of node a of a cell, the lowest of those that share it, 4 Ncell more for its
      support; Nvert + 8 Ncell + 6 cell_orig + e of edge e, the lowest of those that share it */
   PetscInt *node_orig;
   PetscInt *node_body; /* [nnode] */
   uint64_t *node_set; /* [nnode] SB_SET_BIT(k) when constrained with set k; of a face its support */
   PetscBool view_displacement; /* -displacement_view is given */
   PetscBool faces;             /* some body has its nodes at faces */
+  PetscBool rigid;             /* some body is rigid */
+  PetscInt *rigid_first;       /* [nbody] first local cell of a rigid body, -1: none, or it is not
+                                  rigid; NULL without a rigid body */
+  PetscReal (*rigid_basis)[4]; /* [nvert] weights of a rigid body's nodes at its vertices, which are
+                                  right outside of their tet as well; NULL without a rigid body */
   PetscBool vertices;          /* all have them at vertices only: nodes are the mesh's vertices */
   PetscInt
     *dirichlet_node; /* [ncell][4] massless node that a DG face is tied to, -1: none; or NULL */
@@ -364,12 +369,21 @@ PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const Pet
    most. Collective, after SbSpacePrescribeDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
+/* rigid bodies (src/fem/rigid.c) */
+
+/* The largest strain |F^T F - I| / 2 of this rank's rigid bodies at u[nnode][3], m, and whose it
+   is, -1: there are none. Not collective. */
+PetscReal SbSpaceRigidStrain(SbSpace space, const PetscReal u[], PetscInt *body);
+/* Gives rigid bodies that are not prescribed, with velocities v[nnode_owned][3], m/s (NULL:
+   static), the stretch of their spin: changes u[nnode_owned][3], m. Not collective. Errors
+   (PETSC_ERR_USER_INPUT): u or v strains one. */
+PetscErrorCode SbSpaceRigidStart(SbSpace space, PetscReal u[], const PetscReal v[]);
+
 /* places: facets, curved cells, sets */
 
 /*
   A boundary facet. face = 0..3, opposite local vertex `face`. The displacement of its corner k is
-  sum_a element->ops.vertex[corner[k]][a] u[cell_node[4 cell + a]], the element being that of the
-  cell's body.
+  sum_a SbSpaceCornerBasis(space, cell, corner[k])[a] u[cell_node[4 cell + a]].
 */
 typedef struct {
   PetscInt cell, face;
@@ -390,6 +404,15 @@ PetscReal SbSpaceCurvedIntegrals(SbSpace space, PetscInt cell, const SbFacet *fa
 static inline SbElement SbSpaceCellElement(SbSpace space, PetscInt cell)
 {
   return space->element[space->mesh->cell_body[cell]];
+}
+/* Values of the basis functions of a local cell at its corner 0..3, [4]; not of P2, whose nodes are
+   its corners. */
+static inline const PetscReal *SbSpaceCornerBasis(SbSpace space, PetscInt cell, PetscInt corner)
+{
+  const SbElement e = SbSpaceCellElement(space, cell);
+
+  return e->rigid ? space->rigid_basis[space->mesh->cell[4 * cell + corner]]
+                  : e->ops.vertex[corner];
 }
 /* Node a = 0..9 of a P2 cell, 0..3 of another one. */
 static inline PetscInt SbSpaceCellNode(SbSpace space, PetscInt cell, PetscInt a)

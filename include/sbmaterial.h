@@ -209,8 +209,11 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
    Errors: PETSC_ERR_USER for an unknown law and for one with own_moduli. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu,
                                        PetscReal density, SbMaterial *m);
-/* For `setfromoptions`: the stiffness at rest by Lame's parameters, mu > 0 and lambda > -2/3 mu,
-   Pa. Not collective. */
+/* The law that keeps a rigid body rigid, stvk with nu = 0, its density from the options; its
+   modulus is set once the scene is known. Owned by the caller. Not collective. */
+PetscErrorCode SbMaterialCreateRigid(const SbScope *body, SbMaterial *m);
+/* For `setfromoptions`, and of rigid bodies: the stiffness at rest by Lame's parameters, mu > 0 and
+   lambda > -2/3 mu, Pa. Not collective. */
 void SbMaterialSetLame(SbMaterial m, PetscReal lambda, PetscReal mu);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);

@@ -79,6 +79,8 @@ typedef struct {
   PetscInt refine;           /* how often each tet is divided into eight after reading */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
   PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
+  PetscBool rigid;           /* all cells share four nodes: needs them on one rank */
+  PetscReal rigid_stiffness; /* Young's modulus of a rigid body, Pa; 0: by the scene */
   PetscBool
     edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
   char material[SB_NAME_MAX];    /* a law's name (SbMaterialNames) */

@@ -61,6 +61,7 @@ struct _p_SbModel {
   SbContactSet contacts; /* those effects that are contacts */
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
+  PetscBool strained;    /* it was warned of a rigid body that is strained */
   PetscBool
     barrier_apart; /* residuals of solves leave potentials of contact out: SbContactSetGradient() */
   PetscReal mass;  /* kg */
@@ -105,6 +106,8 @@ PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
+/* Warns, once, of a rigid body that is strained by more than 1e-3 at U, m. Collective. */
+PetscErrorCode SbModelWarnStrained(SbModel model, PetscReal t, Vec U);
 /* The speed v of a step from t to t + dt, m/s, the scale of contact's tolerances: m v^2 / 2 is the
    kinetic and strain energy of the bodies, of mass m, at its start U, V, plus half of the work of
    all loads and support forces along the size of the smallest body. 0 in a static run (V NULL).

@@ -2,13 +2,13 @@
   contact_surface.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles: of
   each rank its own features, to which contact_halo.c adds those of other ranks that may meet them.
 
-  A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose
-  displacement is discontinuous, the mean over the cells behind the facets around it, so that the
-  surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its
-  six nodes: its corners and the middles of its sides are vertices. The rank that owns the vertex in
-  the mesh knows all facets around it (the overlap), makes its list of nodes and moves it; a star
-  forest brings its position to the ranks that hold it, too. Numbers follow the original ones:
-  nothing depends on the partition.
+  A vertex of a body moves by a weighted mean of nodes: with P1 its own node, of a rigid body its
+  four; with CR and DG, whose displacement is discontinuous, the mean over the cells behind the
+  facets around it, so that the surface is closed and linear fields are reproduced. A facet of P2 is
+  four flat triangles over its six nodes: its corners and the middles of its sides are vertices. The
+  rank that owns the vertex in the mesh knows all facets around it (the overlap), makes its list of
+  nodes and moves it; a star forest brings its position to the ranks that hold it, too. Numbers
+  follow the original ones: nothing depends on the partition.
 
   The whole surface is on every rank while it is set up, and released then. A rank keeps the
   vertices that have a node of it, the triangles around these, and the edges and vertices of them.
@@ -97,7 +97,7 @@ static PetscErrorCode list_own(SbContactSurface m, PetscInt n, const SbFacet fac
       record[6] += f->area / (npoint_of(s, f) == 3 ? 3. : middle < 0 ? 12. : 4.);
       if (middle >= 0)
         continue;
-      w = SbSpaceCellElement(s, f->cell)->ops.vertex[f->corner[ring[i] % 6]];
+      w = SbSpaceCornerBasis(s, f->cell, f->corner[ring[i] % 6]);
       for (int a = 0; a < 4; a++) {
         const PetscReal g = (PetscReal)s->gnode[s->cell_node[4 * f->cell + a]];
         PetscInt j = 0;

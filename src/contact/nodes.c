@@ -53,6 +53,12 @@ static PetscErrorCode setup_nodes(SbEffect e, SbSpace space)
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++)
     slot[i] = -1;
+  for (PetscInt i = 0; i < n; i++)
+    PetscCheck(
+      !SbSpaceCellElement(space, facet[i].cell)->rigid, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "effect %s: body '%s' is rigid, which has no nodes on its surface: take "
+      "-effect_%s_response barrier, with -time euler_implicit, newmark, genalpha or static",
+      e->name, space->mesh->body[space->mesh->cell_body[facet[i].cell]].name, e->name);
 
   /* nodes of the facets with their shares of area and stiffness; slot[]: their indices, -1: none
      yet */

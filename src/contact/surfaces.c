@@ -84,6 +84,11 @@ static PetscErrorCode setup_surfaces(SbEffect e, SbSpace s)
   PetscCall(SbPartnerSetUp(e, s->comm, &b->contact.partner));
   PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
   PetscCall(SbContactSurfaceCreate(s, n, facet, b->contact.partner.obstacle, &b->surface));
+  for (PetscInt i = 0; i < n && !is_barrier(b); i++)
+    PetscCheck(!SbSpaceCellElement(s, facet[i].cell)->rigid, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "effect %s: body '%s' is rigid, whose contact has the response barrier: leave "
+               "-effect_%s_response out",
+               e->name, s->mesh->body[s->mesh->cell_body[facet[i].cell]].name, e->name);
   PetscCall(PetscFree(facet));
   nobstacle = 3 * (b->surface->nvertex - b->surface->nbody_vertex);
   s->coupled = PETSC_TRUE;

@@ -63,16 +63,17 @@ PetscErrorCode SbPlaceFind(SbSpace space, const char *option, PetscInt body,
 PetscErrorCode SbPlaceDestroy(SbPlace *place);
 
 /* Basis functions of a cell at the barycentric coordinates L; returns their number. */
-static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
+static inline PetscInt SbCellBasis(SbSpace space, PetscInt cell, const PetscReal L[4],
+                                   PetscReal phi[SB_CELL_NODES])
 {
-  if (e->nodes_per[1]) {
+  if (SbSpaceCellElement(space, cell)->nodes_per[1]) {
     SbQuadraticBasis(L, phi);
     return SB_CELL_NODES;
   }
   for (int a = 0; a < 4; a++) {
     phi[a] = 0;
     for (int c = 0; c < 4; c++)
-      phi[a] += L[c] * e->ops.vertex[c][a];
+      phi[a] += L[c] * SbSpaceCornerBasis(space, cell, c)[a];
   }
   return 4;
 }

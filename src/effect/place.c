@@ -51,7 +51,7 @@ static PetscErrorCode gather(SbSpace s, PetscInt body, const PetscReal x[3], Par
 
     if ((body >= 0 && mesh->cell_body[c] != body) || !holds(mesh, c, x, L))
       continue;
-    n = SbCellBasis(SbSpaceCellElement(s, c), L, phi);
+    n = SbCellBasis(s, c, L, phi);
     PetscCall(SbReserve(list->n + n, sizeof(*list->part), &list->size, &list->part));
     for (PetscInt a = 0; a < n; a++)
       list->part[list->n++] = (Part){(PetscReal)s->gnode[SbSpaceCellNode(s, c, a)], V * phi[a]};

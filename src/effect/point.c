@@ -9,7 +9,7 @@ PetscInt SbEffectPoint(SbSpace space, PetscInt cell, const PetscReal L[4],
                        PetscReal phi[SB_CELL_NODES], PetscReal x[3], PetscReal corner[4][3])
 {
   const SbMesh mesh = space->mesh;
-  const PetscInt n = SbCellBasis(SbSpaceCellElement(space, cell), L, phi);
+  const PetscInt n = SbCellBasis(space, cell, L, phi);
 
   for (int k = 0; k < 3; k++)
     x[k] = 0;

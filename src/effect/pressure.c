@@ -123,7 +123,7 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
 /* Whether it does not share edges with other facets (CR, DG). */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
-  return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
+  return SbElementHasFaces(SbSpaceCellElement(space, facet->cell));
 }
 
 /* Side c of a facet of P1 or P2. */
@@ -306,20 +306,19 @@ static inline int first_point(SbSpace space, const SbFacet *facet)
 
 static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *p)
 {
-  const SbElement e = SbSpaceCellElement(space, facet->cell);
   const PetscInt *v = facet->corner;
   PetscReal L[4] = {0};
   PetscReal corner[3][SB_CELL_NODES];
 
   for (int c = 0; c < 3; c++)
     L[v[c]] = SbRuleFacet.L[q][c];
-  p->n = SbCellBasis(e, L, p->phi);
+  p->n = SbCellBasis(space, facet->cell, L, p->phi);
   p->weight = p->n == 4 ? 0.5 : 0.5 * SbRuleFacet.weight[q];
   for (int a = 0; a < p->n; a++) {
     p->node[a] = SbSpaceCellNode(space, facet->cell, a);
     for (int c = 0; c < 3; c++) {
       if (p->n == 4)
-        corner[c][a] = e->ops.vertex[v[c]][a];
+        corner[c][a] = SbSpaceCornerBasis(space, facet->cell, v[c])[a];
       else if (a < 4)
         corner[c][a] = a == v[c] ? 4 * L[a] - 1 : 0;
       else
@@ -523,6 +522,11 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   if (e->steady)
     PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
+  for (PetscInt k = 0; k < p->nfacet; k++)
+    PetscCheck(!SbSpaceCellElement(space, p->facet[k].cell)->rigid, PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT,
+               "%s: body '%s' is rigid, which has no pressure: give it a traction", e->on.option,
+               mesh->body[mesh->cell_body[p->facet[k].cell]].name);
   PetscCall(PetscCalloc1(mesh->nbody, &p->share));
 
   /* those of bodies with nodes at faces behind the others */

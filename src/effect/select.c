@@ -8,7 +8,7 @@
 
   Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an
   edge of such a body holds none of its nodes. Ignoring it would silently drop a constraint, so it
-  is an error.
+  is an error. A rigid body is in a set as a whole, or its nodes are not.
 */
 #include "effect_impl.h"
 
@@ -95,6 +95,10 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
     b++;
   nvert = b < mesh->nbody ? count[2 * b] : 0;
   PetscCall(PetscFree(count));
+  PetscCheck(!nvert || !space->element[b]->rigid, space->comm, PETSC_ERR_USER_INPUT,
+             "%s selects %" PetscInt_FMT " vertices of body %s, which is rigid and is supported as "
+             "a whole: take the body, or a set with all of its surface; a foundation holds a part",
+             on->option, nvert, mesh->body[b].name);
   PetscCheck(!nvert, space->comm, PETSC_ERR_USER_INPUT,
              "%s selects %" PetscInt_FMT " vertices of body %s but none of its triangles, where "
              "element %s has its nodes: take a set that "
@@ -113,7 +117,7 @@ PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind,
 
   PetscFunctionBeginUser;
   PetscCall(find_sets(space, on, kind, k, &mask));
-  if (kind == SB_ON_NODES && space->faces)
+  if (kind == SB_ON_NODES && (space->faces || space->rigid))
     PetscCall(check_nodes(space, on, mask));
   *n = 0;
   PetscCall(PetscMalloc1(count[kind], items));

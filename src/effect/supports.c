@@ -112,7 +112,7 @@ static PetscErrorCode list_corners(Support *d, SbSpace space)
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     const PetscInt support = space->dirichlet_node ? space->dirichlet_node[i] : -1;
 
-    if (SbSpaceCellElement(space, i / 4)->nodes_per[0] ||
+    if (!SbElementHasFaces(SbSpaceCellElement(space, i / 4)) ||
         !in[support >= 0 ? support : space->cell_node[i]])
       continue;
     for (int k = 0; k < 3; k++) {

@@ -188,6 +188,20 @@ PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbElementCreateRigid(SbElement *e)
+{
+  /* V is that of a cell; masses are those of points at the nodes */
+  static const SbElementOps ops = {tabulate_vertex, 1. / 4, 1. / 4, 0., 0., VERTEX_BASIS};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(e));
+  PetscCall(PetscStrncpy((*e)->name, SB_ELEMENT_RIGID, sizeof((*e)->name)));
+  (*e)->rigid = PETSC_TRUE;
+  (*e)->ops = ops;
+  PetscCall(SbLogNamed("Elem", SB_ELEMENT_RIGID, &(*e)->event));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbElementDestroy(SbElement *e)
 {
   PetscFunctionBeginUser;

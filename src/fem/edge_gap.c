@@ -98,7 +98,7 @@ static PetscErrorCode number_edges(SbSpace s, SbEdgeGaps g)
     const PetscInt a = mesh->cell[4 * (i / 6) + SbTetEdge[i % 6][0]];
     const PetscInt b = mesh->cell[4 * (i / 6) + SbTetEdge[i % 6][1]];
 
-    low[i] = SbSpaceCellElement(s, i / 6)->nodes_per[0] || g->slides[mesh->cell_body[i / 6]]
+    low[i] = !SbElementHasFaces(SbSpaceCellElement(s, i / 6)) || g->slides[mesh->cell_body[i / 6]]
                ? -1
                : PetscMin(a, b);
     g->cell_edge[i] = OPEN;
@@ -229,7 +229,7 @@ static PetscErrorCode list_mirrors(SbSpace s, SbEdgeGaps g, const PetscInt held[
     PetscBool owned = PETSC_FALSE;
     PetscInt axis, wall;
 
-    if (mesh->neighbour[i] >= 0 || SbSpaceCellElement(s, cell)->nodes_per[0] ||
+    if (mesh->neighbour[i] >= 0 || !SbElementHasFaces(SbSpaceCellElement(s, cell)) ||
         g->slides[mesh->cell_body[cell]])
       continue;
     axis = SbFaceWallAxis(s, i, &wall);
@@ -435,7 +435,7 @@ static inline PetscBool has_gaps(SbSpace s, PetscInt b, const uint8_t slides[])
 {
   const SbRegion *region = s->batch_region[b];
 
-  return (PetscBool)(!region->element->nodes_per[0] && !region->material->linear &&
+  return (PetscBool)(SbElementHasFaces(region->element) && !region->material->linear &&
                      !slides[region->body]);
 }
 
@@ -445,7 +445,8 @@ PetscErrorCode SbEdgeGapsFindSliding(SbSpace s, uint8_t slides[])
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     PetscInt node;
 
-    if (SbSpaceCellElement(s, i / 4)->nodes_per[0] || !(s->mesh->face_set[i] & SB_ON_BOUNDARY))
+    if (!SbElementHasFaces(SbSpaceCellElement(s, i / 4)) ||
+        !(s->mesh->face_set[i] & SB_ON_BOUNDARY))
       continue;
     if (!SbFaceIsHeld(s, i, &node) && s->fixed[node] && SbFaceWallAxis(s, i, &node) == SB_NO_WALL)
       slides[s->mesh->cell_body[i / 4]] = 1;

@@ -13,6 +13,13 @@ PetscErrorCode SbLayoutNodes(SbSpace space);
 PetscErrorCode SbLayoutCliques(SbSpace space);
 PetscErrorCode SbLayoutDestroy(SbSpace space);
 
+/* rigid.c: of the rigid bodies, in the order of the layout: their first cells; once the nodes have
+   numbers, these nodes and the basis at the vertices. Nothing without a rigid body. Not
+   collective. */
+PetscErrorCode SbRigidCreate(SbSpace space);
+PetscErrorCode SbRigidDescribe(SbSpace space);
+PetscErrorCode SbRigidDestroy(SbSpace space);
+
 /* jump.c: face terms of CR and DG, as stiffness or times the body's beta. Not collective. */
 typedef enum {
   SB_JUMP_STIFFNESS,

@@ -209,7 +209,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 
   /* list the faces with an owned node, sorted by body */
   for (PetscInt body = 0; body < mesh->nbody; body++) {
-    for (PetscInt i = 0; i < 4 * mesh->ncell && !s->element[body]->nodes_per[0]; i++) {
+    for (PetscInt i = 0; i < 4 * mesh->ncell && SbElementHasFaces(s->element[body]); i++) {
       SbFace *face = &j->face[nface];
       const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
       PetscInt node[8];
@@ -676,7 +676,7 @@ static PetscBool follow(SbSpace s, const PetscReal x[], const PetscReal even[], 
 
   s->jump->renew = PETSC_FALSE;
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    if (s->batch_region[b]->element->nodes_per[0] || s->batch_region[b]->material->linear)
+    if (!SbElementHasFaces(s->batch_region[b]->element) || s->batch_region[b]->material->linear)
       continue;
     follow_batch(s, b, x, even ? even[s->batch_region[b]->body] : 0., factor,
                  (PetscBool)(steps == SB_STEPS_UNDAMPED));

@@ -4,7 +4,8 @@
 
   P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices, and its
   arrays are borrowed. P2 also has nodes at the edges. CR has one node per face, DG four per cell,
-  on its faces; node a of a cell lies opposite vertex a.
+  on its faces; node a of a cell lies opposite vertex a. A rigid body has four nodes, at the first
+  of its cells, which all of them share (rigid.c).
 
   A boundary face of a DG cell that an effect prescribes in all directions has an additional node,
   the support node, which the effect prescribes. It acts as a rigid neighbour: the mean of the two
@@ -60,6 +61,10 @@ static Place place_of(SbSpace s, uint64_t prescribed, PetscInt c, PetscInt slot)
   const SbElement e = SbSpaceCellElement(s, c);
   const PetscInt face = 4 * c + slot / 2;
   const Place none = {UNKNOWN, 0};
+
+  // rigid bodies
+  if (e->rigid)
+    return slot < 8 && slot % 2 == 0 ? (Place){s->rigid_first[mesh->cell_body[c]], slot / 2} : none;
 
   // edges
   if (slot >= 8)
@@ -275,6 +280,8 @@ static PetscErrorCode describe_nodes(SbSpace s)
     const PetscInt face = i % 4;
     PetscReal *x = s->node_x + 3 * node;
 
+    if (SbSpaceCellElement(s, i / 4)->rigid)
+      continue;
     s->node_body[node] = mesh->cell_body[i / 4];
     if (SbSpaceCellElement(s, i / 4)->nodes_per[0]) {
       s->node_set[node] = mesh->vert_set[v[face]];
@@ -296,6 +303,7 @@ static PetscErrorCode describe_nodes(SbSpace s)
         x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
+  PetscCall(SbRigidDescribe(s));
   if (s->edge_node)
     PetscCall(describe_edges(s));
 
@@ -324,13 +332,14 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
   PetscSection section;
 
   PetscFunctionBeginUser;
+  PetscCall(SbRigidCreate(s));
   for (PetscInt b = 0; b < mesh->nbody; b++) {
-    if (!s->element[b]->nodes_per[0])
+    if (SbElementHasFaces(s->element[b]))
       s->faces = PETSC_TRUE;
     if (s->element[b]->nodes_per[1])
       quadratic = PETSC_TRUE;
   }
-  s->vertices = (PetscBool)(!s->faces && !quadratic);
+  s->vertices = (PetscBool)(!s->faces && !quadratic && !s->rigid);
   if (s->vertices) {
     s->Nnode = mesh->Nvert;
     s->nnode_owned = mesh->nvert_owned;
@@ -368,6 +377,7 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
 PetscErrorCode SbLayoutDestroy(SbSpace s)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbRigidDestroy(s));
   PetscCall(DMDestroy(&s->dm));
   if (!s->vertices)
     PetscCall(PetscFree(s->cell_node));

@@ -150,6 +150,15 @@ static PetscErrorCode tabulate_batches(SbSpace s)
         for (PetscInt k = 0; k < 12; k++)
           x[k / 3][k % 3] = s->mesh->x[3 * s->mesh->cell[4 * cell + k / 3] + k % 3];
         region->element->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+
+        /* the gradients of a rigid body are those of the tet of its nodes */
+        if (region->element->rigid) {
+          PetscReal unused;
+
+          for (PetscInt k = 0; k < 12; k++)
+            x[k / 3][k % 3] = s->node_x[3 * s->cell_node[4 * cell + k / 3] + k % 3];
+          region->element->ops.tabulate((const PetscReal(*)[3])x, g, &unused);
+        }
         for (PetscInt k = 0; k < 9; k++)
           s->batch_g[9 * b + k][l] = g[k / 3][k % 3];
         s->batch_V[b][l] = l < s->batch_n[b] ? V : 0.;
@@ -213,11 +222,12 @@ static PetscErrorCode read_view(SbSpace s)
   if (s->view_displacement)
     PetscCall(check_view(s->comm, viewer));
   for (PetscInt b = 0; b < s->mesh->nbody; b++)
-    PetscCheck(
-      strncmp(viewer, "vtk", 3) || !s->element[b]->nodes_per[2], s->comm, PETSC_ERR_USER_INPUT,
-      "-displacement_view %s: body '%s' has its displacements at faces, which VTK files do "
-      "not have; take hdf5:FILE, or the fields of -output_fields",
-      viewer, s->mesh->body[b].name);
+    PetscCheck(strncmp(viewer, "vtk", 3) || (!s->element[b]->nodes_per[2] && !s->element[b]->rigid),
+               s->comm, PETSC_ERR_USER_INPUT,
+               "-displacement_view %s: body '%s' has its displacements %s, which VTK files do "
+               "not have; take hdf5:FILE, or the fields of -output_fields",
+               viewer, s->mesh->body[b].name,
+               s->element[b]->rigid ? "at four nodes of its own" : "at faces");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

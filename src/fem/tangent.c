@@ -431,7 +431,7 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const PetscReal inertia = s->consistent_mass ? m->density * shift : 0.;
   const Factors factors =
     factors_of(region, stage->shift_k, stage->shift_v * s->beta[region->body]);
-  const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
+  const PetscBool faces = SbElementHasFaces(region->element);
   Split kept;
   Split *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 

@@ -125,7 +125,7 @@ PetscErrorCode SbSpaceVertexPositions(SbSpace s, Vec U, PetscReal x[])
           x[3 * vertex + k] = u[3 * node[v] + k];
         for (int i = 0; !e->nodes_per[0] && i < 12; i++)
           x[3 * vertex + i % 3] +=
-            s->batch_V[b][l] * e->ops.vertex[v][i / 3] * u[3 * node[i / 3] + i % 3];
+            s->batch_V[b][l] * SbSpaceCornerBasis(s, c, v)[i / 3] * u[3 * node[i / 3] + i % 3];
       }
     }
   }

@@ -67,7 +67,7 @@ PetscErrorCode SbWallsFind(SbSpace s, SbWalls *walls)
     PetscInt axis, own;
     SbWall *wall;
 
-    if (mesh->neighbour[i] >= 0 || SbSpaceCellElement(s, i / 4)->nodes_per[0])
+    if (mesh->neighbour[i] >= 0 || !SbElementHasFaces(SbSpaceCellElement(s, i / 4)))
       continue;
     axis = SbFaceWallAxis(s, i, &own);
     for (int a = 0; a < 4; a++)

@@ -63,6 +63,11 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscCall(SbOptionReal(&SbRunScope, "step_time_budget", &budget));
   if (!named && accuracy == 0. && budget == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt b = 0; b < run->model->nbody; b++)
+    PetscCheck(!run->model->body[b].rigid, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-body_%s_rigid: errors are not estimated in scenes with rigid bodies: leave "
+               "-ledger, -accuracy and -step_time_budget out",
+               run->model->body[b].name);
   PetscCheck(run->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the "
              "same method");

@@ -185,6 +185,20 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbMaterialCreateRigid(const SbScope *body, SbMaterial *material)
+{
+  const SbMaterialType *type = SbMaterialFind("stvk");
+  PetscReal density;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionReal(body, "density", &density));
+  PetscCall(create(type, 1., 0., density, material));
+  PetscCall(PetscStrncpy((*material)->name, body->instance, sizeof((*material)->name)));
+  (*material)->adaptive = PETSC_TRUE;
+  PetscCall(SbMaterialSetTangent(*material, SB_TANGENT_EXACT_SPD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbMaterialDestroy(SbMaterial *m)
 {
   PetscFunctionBeginUser;

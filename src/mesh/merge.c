@@ -159,6 +159,8 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(w, sizeof(*w)));
+  w->nbody = nbody;
+  w->body = body;
   PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
 
   // bodies that are read in slabs, decided on rank 0

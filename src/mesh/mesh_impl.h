@@ -148,6 +148,8 @@ typedef struct {
 /* Merged mesh of all bodies before it is distributed: some cells on each rank, with all their
    vertices. A vertex of cells on several ranks is stored on each of them with the same data. */
 typedef struct {
+  PetscInt nbody;
+  const SbBody *body;    /* [nbody] borrowed; NULL: no body has to be on one rank */
   PetscInt Nvert, Ncell; /* global counts */
   PetscInt nvert, ncell;
   SbVertexData *vertex; /* [nvert] ascending original numbers */

@@ -411,7 +411,39 @@ static PetscErrorCode create_graph(MPI_Comm comm, const SbMergedMesh *w, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, PetscMPIInt part[])
+/* All cells of a rigid body to the rank of its first one: they have their nodes in common, and few
+   of them cost anything. */
+static PetscErrorCode keep_together(MPI_Comm comm, const SbMergedMesh *w, PetscMPIInt part[])
+{
+  PetscBool some = PETSC_FALSE;
+  PetscInt *first, *rank;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; w->body && b < w->nbody; b++)
+    some = (PetscBool)(some || w->body[b].rigid);
+  if (!some)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(w->nbody, &first, w->nbody, &rank));
+  for (PetscInt b = 0; b < w->nbody; b++) {
+    first[b] = PETSC_MAX_INT;
+    rank[b] = 0;
+  }
+  for (PetscInt c = 0; c < w->ncell; c++)
+    first[w->data[c].body] = PetscMin(first[w->data[c].body], w->data[c].orig);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, first, (PetscMPIInt)w->nbody, MPIU_INT, MPI_MIN, comm));
+  for (PetscInt c = 0; c < w->ncell; c++)
+    if (w->data[c].orig == first[w->data[c].body])
+      rank[w->data[c].body] = part[c];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rank, (PetscMPIInt)w->nbody, MPIU_INT, MPI_MAX, comm));
+  for (PetscInt c = 0; c < w->ncell; c++)
+    if (w->body[w->data[c].body].rigid)
+      part[c] = (PetscMPIInt)rank[w->data[c].body];
+  PetscCall(PetscFree2(first, rank));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode partition(PetscPartitioner partitioner, const SbMergedMesh *w,
+                                PetscMPIInt part[])
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)partitioner);
   PetscMPIInt size, *block;
@@ -474,5 +506,13 @@ PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, 
     PetscCall(SbForestBroadcast(forest, 1, MPI_INT, block, part));
   PetscCall(PetscSFDestroy(&forest));
   PetscCall(PetscFree(block));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *w, PetscMPIInt part[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(partition(partitioner, w, part));
+  PetscCall(keep_together(PetscObjectComm((PetscObject)partitioner), w, part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

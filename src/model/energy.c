@@ -42,11 +42,31 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
     SbCross(x, p + 3 * i, L);
     for (PetscInt k = 0; k < 3; k++)
       sum.angular[k] += L[k];
-    extreme[1] = PetscMax(extreme[1], SbDot3(u + 3 * i, u + 3 * i));
-    if (!v)
+    if (v)
+      sum.kinetic += 0.5 * SbDot3(v + 3 * i, p + 3 * i);
+    if (s->element[s->node_body[i]]->rigid)
       continue;
-    extreme[0] = PetscMax(extreme[0], SbDot3(v + 3 * i, v + 3 * i));
-    sum.kinetic += 0.5 * SbDot3(v + 3 * i, p + 3 * i);
+    extreme[1] = PetscMax(extreme[1], SbDot3(u + 3 * i, u + 3 * i));
+    if (v)
+      extreme[0] = PetscMax(extreme[0], SbDot3(v + 3 * i, v + 3 * i));
+  }
+
+  /* extremes of rigid bodies are at their vertices */
+  for (PetscInt i = 0; s->rigid && i < 4 * s->mesh->ncell_owned; i++) {
+    const PetscReal *basis = SbSpaceCornerBasis(s, i / 4, i % 4);
+    const PetscInt *node = s->cell_node + 4 * (i / 4);
+    PetscReal there[2][3] = {{0.}};
+
+    if (!SbSpaceCellElement(s, i / 4)->rigid)
+      continue;
+    for (PetscInt a = 0; a < 4; a++) {
+      for (PetscInt k = 0; k < 3; k++) {
+        there[0][k] += v ? basis[a] * v[3 * node[a] + k] : 0.;
+        there[1][k] += basis[a] * u[3 * node[a] + k];
+      }
+    }
+    for (int k = 0; k < 2; k++)
+      extreme[k] = PetscMax(extreme[k], SbDot3(there[k], there[k]));
   }
   PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(PetscFree(p));

@@ -143,6 +143,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
       if (!strcmp(m->set[k % m->nset].name, effect->on.name[k / m->nset]))
         m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
+  PetscCall(SbModelStiffenRigid(m));
   PetscCall(SbFibresFind(m->mesh, m->material));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   PetscCall(SbSpaceWarnShapes(m->space));
@@ -447,7 +448,7 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
 {
   SbSpace s = m->space;
   PetscReal(*centre)[4];
-  PetscScalar *v;
+  PetscScalar *u, *v;
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(U));
@@ -460,8 +461,12 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   }
   PetscCall(VecRestoreArray(U, &v));
   PetscCall(SbModelPrescribe(m, 0., U));
-  if (!V)
+  if (!V) {
+    PetscCall(VecGetArray(U, &v));
+    PetscCall(SbSpaceRigidStart(s, v, NULL));
+    PetscCall(VecRestoreArray(U, &v));
     PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMalloc1(m->nbody, &centre));
   PetscCall(SbModelCentres(m, NULL, centre));
   PetscCall(VecGetArray(V, &v));
@@ -482,6 +487,9 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
         v[3 * i + k] = 0.;
     }
   }
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(SbSpaceRigidStart(s, u, v));
+  PetscCall(VecRestoreArray(U, &u));
   PetscCall(VecRestoreArray(V, &v));
   PetscCall(PetscFree(centre));
   PetscFunctionReturn(PETSC_SUCCESS);

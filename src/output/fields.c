@@ -88,12 +88,11 @@ static PetscErrorCode find_areas(SbSpace s, Vec U, Vec A)
   PetscCall(VecGetArray(A, &area));
   for (PetscInt i = 0; i < n; i++) {
     const SbFacet *f = &facet[i];
-    const SbElement element = SbSpaceCellElement(s, f->cell);
     const PetscBool quadratic = (PetscBool)(s->edge_node && s->edge_node[6 * f->cell] >= 0);
     PetscReal x[3][3], side[2][3], normal[3];
 
     for (int k = 0; k < 3; k++) {
-      const PetscReal *w = element->ops.vertex[f->corner[k]];
+      const PetscReal *w = SbSpaceCornerBasis(s, f->cell, f->corner[k]);
 
       for (int c = 0; c < 3; c++) {
         x[k][c] = s->mesh->x[3 * f->vertex[k] + c];
@@ -112,7 +111,7 @@ static PetscErrorCode find_areas(SbSpace s, Vec U, Vec A)
         continue;
       if (a < 4)
         for (int k = 0; k < 3; k++)
-          part += element->ops.vertex[f->corner[k]][a] / (quadratic ? 12. : 3.);
+          part += SbSpaceCornerBasis(s, f->cell, f->corner[k])[a] / (quadratic ? 12. : 3.);
       else if (SbTetEdge[a - 4][0] != f->face && SbTetEdge[a - 4][1] != f->face)
         part = 0.25;
       for (int c = 0; c < 3; c++)

@@ -11,6 +11,9 @@
   the face, which keeps its resultant and its moment. Where a node belongs to several cells and
   these have points of their own, each has an equal part. What a DG cell does to the support of a
   face is a force of that face, too. P2 has points at its nodes, with the values there.
+
+  The vertices of a rigid body move with its four nodes. Of a force on it the resultant is known:
+  each corner of each of its cells has the same part of it.
 */
 #include "output_impl.h"
 
@@ -83,6 +86,7 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
 {
   const SbElement e = SbSpaceCellElement(s, corner / 4);
   const PetscInt *node = s->cell_node + 4 * (corner / 4);
+  const PetscReal *basis = SbSpaceCornerBasis(s, corner / 4, corner % 4);
 
   for (int k = 0; k < 3; k++) {
     if (e->nodes_per[0]) {
@@ -91,7 +95,7 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
     }
     value[k] = 0.;
     for (int a = 0; a < 4; a++)
-      value[k] += e->ops.vertex[corner % 4][a] * x[3 * node[a] + k];
+      value[k] += basis[a] * x[3 * node[a] + k];
   }
 }
 
@@ -168,6 +172,12 @@ static void add_corner_force(SbSpace s, const PetscReal r[], const PetscReal val
     add_force(r, node[corner % 4], 1. / valence[node[corner % 4]], value);
     return;
   }
+
+  // a rigid body: each corner has the same part of the resultant
+  for (int a = 0; a < 4 && SbSpaceCellElement(s, corner / 4)->rigid; a++)
+    add_force(r, node[a], 1. / (4. * valence[node[a]]), value);
+  if (SbSpaceCellElement(s, corner / 4)->rigid)
+    return;
 
   // node a lies opposite vertex a: this corner belongs to the faces of the others
   for (int a = 0; a < 4; a++) {

@@ -222,7 +222,7 @@ static PetscErrorCode add_cell(const SbSpace s, SbProbe *probe, PetscInt cell, P
     PetscReal w = quadratic ? Q[a] : 0.;
 
     for (int c = 0; c < 4 && !quadratic; c++)
-      w += e->ops.vertex[c][a] * L[c];
+      w += SbSpaceCornerBasis(s, cell, c)[a] * L[c];
     PetscCall(add(&probe->nodes, SbSpaceCellNode(s, cell, a), w));
     if (probe->kind == SB_PROBE_POINT)
       PetscCall(add(&probe->stresses, SB_CELL_NODES * cell + a, quadratic ? w : L[a]));

@@ -368,6 +368,14 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     char line[3 * SB_NAME_MAX];
     const SbBody *body = &run->model->body[i];
 
+    // a rigid body has no element in the options
+    if (body->rigid) {
+      SbFormat(sizeof(line), line, "-body_%s_element ",
+               body->copy_of[0] ? body->copy_of : body->name);
+      same = (PetscBool)!strstr(options, line);
+      continue;
+    }
+
     SbFormat(sizeof(line), line, "-body_%s_element %s\n",
              body->copy_of[0] ? body->copy_of : body->name, body->element);
     same = (PetscBool)(strstr(options, line) != NULL);

@@ -109,6 +109,11 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     if (effect->until > 0. && effect->until < PETSC_MAX_REAL)
       r->change[r->nchange++] = effect->until;
   }
+  for (PetscInt b = 0; b < m->nbody; b++)
+    PetscCheck(!m->body[b].rigid || !named, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-body_%s_rigid: scenes with rigid bodies are not re-meshed: leave the options "
+               "-remesh_ out",
+               m->body[b].name);
   if (!named && !r->nchange)
     PetscCall(SbRemeshDestroy(remesh));
   if (*remesh)

@@ -56,6 +56,12 @@ const SbOption SbBodyRows[] = {
    "where the "
    "solution is smooth"},
   {"material", SB_OPTION_STRING, 1, "", "", SbMaterialNames, "material law, required"},
+  {"rigid", SB_OPTION_BOOL, 1, "", "false", "",
+   "the body is rigid: it moves by forces and contact as a whole, with mass, centre and moments of "
+   "inertia of its mesh; element and material are not read, contact needs response barrier"},
+  {"rigid_stiffness", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
+   "of a rigid body: Young's modulus of the energy that keeps it rigid; 0: 1e4 times the largest "
+   "of Young's moduli of soft bodies and of the pressures of motions in the scene"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
    "sets or volume groups whose tets have another material, -inclusion_<name>_..."},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0,0,0", "",
@@ -197,10 +203,37 @@ static PetscErrorCode is_moved(const SbStart *start, PetscBool *moved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_body(SbModel model, PetscInt i)
+/* Element and material of a body; a rigid one has its own. */
+static PetscErrorCode read_element_and_material(SbModel model, PetscInt i, const SbScope *scope)
 {
   SbBody *body = &model->body[i];
   const char *elements[SB_ELEMENT_TYPES], *laws[SB_MATERIAL_TYPES];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionBool(scope, "rigid", &body->rigid));
+  PetscCall(SbOptionReal(scope, "rigid_stiffness", &body->rigid_stiffness));
+  if (body->rigid) {
+    PetscCall(PetscStrncpy(body->element, SB_ELEMENT_RIGID, sizeof(body->element)));
+    PetscCall(SbElementCreateRigid(&model->element[i]));
+    PetscCall(SbMaterialCreateRigid(scope, &model->material[i]));
+    PetscCall(PetscStrncpy(body->material, model->material[i]->type->name, sizeof(body->material)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(body->rigid_stiffness == 0., PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_rigid_stiffness is of rigid bodies, and this one is soft: give "
+             "-body_%s_rigid yes, or leave it out",
+             body->name, body->name);
+  PetscCall(read_type(scope, "element", SbElementTypes(elements), elements, body->element));
+  PetscCall(read_type(scope, "material", SbMaterialTypes(laws), laws, body->material));
+  PetscCall(SbElementCreate(body->element, scope, &model->element[i]));
+  PetscCall(SbMaterialCreate(body->material, scope, &model->material[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_body(SbModel model, PetscInt i)
+{
+  SbBody *body = &model->body[i];
+  const char *laws[SB_MATERIAL_TYPES];
   char(*inclusions)[SB_NAME_MAX], law[SB_NAME_MAX];
   PetscInt n;
   SbScope scope;
@@ -222,10 +255,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
              "angle in degrees",
              body->name);
   PetscCall(SbOptionReals(&scope, "translate", body->translate));
-  PetscCall(read_type(&scope, "element", SbElementTypes(elements), elements, body->element));
-  PetscCall(read_type(&scope, "material", SbMaterialTypes(laws), laws, body->material));
-  PetscCall(SbElementCreate(body->element, &scope, &model->element[i]));
-  PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
+  PetscCall(read_element_and_material(model, i, &scope));
   body->density = model->material[i]->density;
   PetscCall(read_start(&scope, "displacement", model->start[i].displacement));
   PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
@@ -249,6 +279,10 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCheck(n <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d",
              body->name, n, SB_INCLUSION_MAX);
+  PetscCheck(!n || !body->rigid, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_inclusions: a rigid body has no materials: leave them out, or make it of "
+             "several bodies",
+             body->name);
   PetscCall(
     PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
   for (PetscInt k = 0; k < n; k++) {

@@ -39,13 +39,13 @@ PetscErrorCode SbSolverFindFacts(SbSpace s, SbSolverFacts *f)
 
   /* of the regions of all ranks: Poisson's ratios, is one DG, may a tangent be indefinite */
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscInt *nodes_per = s->region[r].element->nodes_per;
+    const SbElement element = s->region[r].element;
     const SbMaterial m = s->region[r].material;
 
     most[0] = PetscMax(most[0], SbMaterialPoisson(m));
-    if (!nodes_per[0])
+    if (SbElementHasFaces(element))
       most[1] = PetscMax(most[1], SbMaterialPoisson(m));
-    if (nodes_per[3])
+    if (element->nodes_per[3])
       most[2] = 1.;
     if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT)
       most[3] = 1.;
@@ -66,8 +66,9 @@ PetscErrorCode SbSolverFindFacts(SbSpace s, SbSolverFacts *f)
   f->unknowns = 3 * s->Nnode;
   f->ranks = s->size;
   f->faces = s->faces;
-  f->p2 = (PetscBool)(s->edge_node && !s->faces);
-  f->cr_dg = (PetscBool)(s->faces && !s->edge_node);
+  f->rigid = s->rigid;
+  f->p2 = (PetscBool)(s->edge_node && !s->faces && !s->rigid);
+  f->cr_dg = (PetscBool)(s->faces && !s->edge_node && !s->rigid);
   f->constraints = (PetscBool)(s->constraints != NULL);
   f->coupled = s->coupled;
   PetscCall(SbDirectPackage(s->comm, f->unknowns, (PetscBool)!f->indefinite, &f->package));
@@ -155,6 +156,11 @@ static PetscBool static_p2_nearly_incompressible(const SbSolverFacts *f)
                      f->unknowns <= DIRECT_NEXT);
 }
 
+static PetscBool rigid_bodies(const SbSolverFacts *f)
+{
+  return (PetscBool)(f->package && f->rigid && f->unknowns <= DIRECT_NEXT);
+}
+
 static PetscBool p1_locked(const SbSolverFacts *f)
 {
   return (PetscBool)(f->package && !f->problem.dynamic && !f->faces && f->nu > NU_LOCKED &&
@@ -220,6 +226,8 @@ static const struct {
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
   {static_p2_nearly_incompressible, FACTOR,
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
+  {rigid_bodies, FACTOR,
+   "{count} with rigid bodies, which are far stiffer than others: a factorisation{indefinite}"},
   {p1_locked, FACTOR,
    "{count}, nu up to {nu}, {slivers}: a factorisation, iterations hardly get there"},
   {p2_nearly_incompressible, "pressure",
@@ -334,6 +342,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, const SbSolverProblem *problem, size_t 
                         problem->choice, f.interface_most, f.interface));
 
   *preset = SbSolverChooseByFacts(&f, size, reason);
+  PetscCheck(!s->rigid || !*preset ||
+               (strcmp((*preset)->name, "cg_p_multigrid") && strcmp((*preset)->name, "pressure")),
+             s->comm, PETSC_ERR_USER, "-solver %s does not know rigid bodies: take direct, or auto",
+             (*preset)->name);
   PetscCheck(
     *preset, s->comm, PETSC_ERR_USER,
     "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "

@@ -8,7 +8,8 @@ typedef struct {
   /* the system */
   PetscInt unknowns;
   PetscMPIInt ranks;
-  PetscBool p2;          /* some body is P2, none is CR or DG */
+  PetscBool rigid;       /* some body is rigid */
+  PetscBool p2;          /* some body is P2, none is CR, DG or rigid */
   PetscBool cr_dg;       /* some body is CR or DG, none is P2 */
   PetscBool faces;       /* some body is CR or DG */
   PetscBool dg;          /* some body is DG */

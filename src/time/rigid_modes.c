@@ -381,7 +381,7 @@ static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *pa
   for (PetscInt k = 0; k < s->nfixed; k++)
     nfixed += s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nfixed, 1, MPIU_INT, MPI_SUM, s->comm));
-  if (nfixed && nfixed <= 2 && !s->element[part->body]->nodes_per[0])
+  if (nfixed && nfixed <= 2 && SbElementHasFaces(s->element[part->body]))
     SbAppend(size, text,
              "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
              ": three that are not in line hold it",

@@ -89,6 +89,18 @@ static PetscErrorCode check_viscous(const SbMaterial m, PetscBool body, SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Integrators that rigid bodies do not go with. */
+static PetscErrorCode check_rigid(const SbBody *body, SbRun r)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(!body->rigid || (!SbRunIsExplicit(r) && r->solve.preset != SB_TIME_ALPHA2),
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_rigid: rigid bodies go with -time euler_implicit, newmark, genalpha and "
+             "static; explicit steps would be too short, and alpha2 is genalpha",
+             body->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -120,6 +132,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     r->solve.reject_inverted = (PetscBool)(r->solve.reject_inverted || model->material[k]->softens);
   for (PetscInt k = 0; k < model->nmaterial; k++)
     PetscCall(check_viscous(model->material[k], (PetscBool)(k < model->nbody), r));
+  for (PetscInt b = 0; b < model->nbody; b++)
+    PetscCall(check_rigid(&model->body[b], r));
   PetscCheck(!r->solve.reject_inverted || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
              PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "

@@ -260,6 +260,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
       PetscCall(VecDuplicate(run->state.U, &run->state.reaction));
     PetscCall(SbRunReactions(run, t, run->state.reaction));
   }
+  PetscCall(SbModelWarnStrained(run->model, t, run->state.U));
   now.R = run->state.reaction;
   now.energies = run->state.energies;
 
