@@ -195,6 +195,7 @@ PetscErrorCode SbMaterialCreateRigid(const SbScope *body, SbMaterial *material)
   PetscCall(create(type, 1., 0., density, material));
   PetscCall(PetscStrncpy((*material)->name, body->instance, sizeof((*material)->name)));
   (*material)->adaptive = PETSC_TRUE;
+  (*material)->softens = PETSC_FALSE; /* at strains that it does not have */
   PetscCall(SbMaterialSetTangent(*material, SB_TANGENT_EXACT_SPD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

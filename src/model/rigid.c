@@ -2,12 +2,12 @@
   The stiffness of rigid bodies, and how far they are strained.
 
   The energy that keeps a rigid body rigid (fem/rigid.c) has a Young's modulus,
-  -body_<name>_rigid_stiffness. Unless given, it is STIFFER times the largest pressure that the scene
-  lets expect: of soft bodies Young's modulus, for contact with them; of motions rho (v^2 + w^2 R^2 +
-  2 g H), with the velocity v and the angular velocity w at the start, half the diagonal R of the
-  body, the one H of all bodies, from which something may fall, and g = 9.81 m/s^2. The strain is
-  the pressure over the modulus, 1e-4 or less. Loads and supports may need more: a strain above
-  STRAINED is warned of, once.
+  -body_<name>_rigid_stiffness. Unless given, it is STIFFER times the largest pressure that the
+  scene lets expect: of soft bodies Young's modulus, for contact with them; of motions rho (v^2 +
+  w^2 R^2 + 2 g H), with the velocity v and the angular velocity w at the start, half the diagonal R
+  of the body, the one H of all bodies, from which something may fall, and g = 9.81 m/s^2. The
+  strain is the pressure over the modulus, 1e-4 or less. Loads and supports may need more: a strain
+  above STRAINED is warned of, once.
 
   Not stiffer: a box of 0.2 by 0.4 by 0.6 m that spins freely, 0.1 rad in each of 100 steps of
   Newmark's method, with moduli of 2e3, 2e4 and 2e5 times rho w^2 R^2, takes 4, 4 and 5 iterations

@@ -457,6 +457,10 @@ PetscErrorCode SbOutputLoadState(SbRun run)
       take_checkpoint(run, option, b, m->start[b].state, sizeof(frame), frame, &checkpoint));
     if (checkpoint)
       continue;
+    PetscCheck(!m->body[b].rigid, out->comm, PETSC_ERR_USER_INPUT,
+               "%s: a rigid body takes its state from a checkpoint of the same bodies, meshes and "
+               "elements, not from a frame",
+               option);
     SB_CATCH(&caught, read_other(option, frame, &m->body[b], &o));
     if (!caught.code)
       PetscCall(take_over(run, option, b, &o));
