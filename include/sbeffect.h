@@ -86,7 +86,7 @@ typedef struct {
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
   SbEffectPointForce, SbEffectFoundation, SbEffectSpring, SbEffectCable, SbEffectFixed,
-  SbEffectPrescribedDisplacement, SbEffectDamping;
+  SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];

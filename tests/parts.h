@@ -72,6 +72,8 @@ static const Part parts[] = {
   {"effect", "point_force",
    "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1",
    NULL, NULL, PETSC_TRUE},
+  {"effect", "torque", "-effects twist -effect_twist_type torque -effect_twist_vector 0.01;0;0",
+   NULL, NULL, PETSC_FALSE},
   {"effect", "fixed", "-effects clamp -effect_clamp_type fixed -effect_clamp_on end", NULL, NULL,
    PETSC_TRUE},
   {"effect", "prescribed_displacement",

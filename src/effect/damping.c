@@ -38,40 +38,18 @@ static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
 {
   const Damping *d = (const Damping *)e->data;
-  const SbMesh mesh = space->mesh;
+  PetscBool *in;
 
   PetscFunctionBeginUser;
-
-  /* an error with the nearest names where there is no such body */
-  for (PetscInt i = 0; i < e->on.n; i++) {
-    PetscInt b = 0;
-
-    while (b < mesh->nbody && strcmp(mesh->body[b].name, e->on.name[i]))
-      b++;
-    if (b == mesh->nbody) {
-      const char **names;
-      char near[512];
-
-      PetscCall(PetscMalloc1(mesh->nbody, &names));
-      for (b = 0; b < mesh->nbody; b++)
-        names[b] = mesh->body[b].name;
-      SbSuggestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near);
-      PetscCall(PetscFree(names));
-      SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
-              "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", e->on.option,
-              e->on.name[i], near[0] ? "; did you mean " : "", near);
-    }
-  }
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    PetscInt i = 0;
-
-    while (i < e->on.n && strcmp(mesh->body[b].name, e->on.name[i]))
-      i++;
-    if (e->on.n && i == e->on.n)
+  PetscCall(PetscMalloc1(space->mesh->nbody, &in));
+  PetscCall(SbEffectBodies(space, &e->on, in));
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+    if (!in[b])
       continue;
     space->alpha[b] += d->alpha;
     space->beta[b] += d->beta;
   }
+  PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -62,6 +62,10 @@ PetscErrorCode SbPlaceFind(SbSpace space, const char *option, PetscInt body,
                            const PetscReal point[3], SbPlace *place);
 PetscErrorCode SbPlaceDestroy(SbPlace *place);
 
+/* in[nbody]: whether a body is named, all if none is. Error (PETSC_ERR_USER_INPUT, alike on all
+   ranks): a name is that of no body. Not collective. */
+PetscErrorCode SbEffectBodies(SbSpace space, const SbEffectOn *on, PetscBool in[]);
+
 /* Basis functions of a cell at the barycentric coordinates L; returns their number. */
 static inline PetscInt SbCellBasis(SbSpace space, PetscInt cell, const PetscReal L[4],
                                    PetscReal phi[SB_CELL_NODES])

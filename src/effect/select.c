@@ -126,3 +126,35 @@ PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind,
       (*items)[(*n)++] = i;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbEffectBodies(SbSpace space, const SbEffectOn *on, PetscBool in[])
+{
+  const SbMesh mesh = space->mesh;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    in[b] = (PetscBool)!on->n;
+  for (PetscInt i = 0; i < on->n; i++) {
+    PetscInt b = 0;
+
+    while (b < mesh->nbody && strcmp(mesh->body[b].name, on->name[i]))
+      b++;
+
+    /* an error with the nearest names where there is no such body */
+    if (b == mesh->nbody) {
+      const char **names;
+      char near[512];
+
+      PetscCall(PetscMalloc1(mesh->nbody, &names));
+      for (b = 0; b < mesh->nbody; b++)
+        names[b] = mesh->body[b].name;
+      SbSuggestNames(on->name[i], mesh->nbody, names, sizeof(near), near);
+      PetscCall(PetscFree(names));
+      SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
+              "%s: there is no body %s%s%s; this effect acts on bodies, see -bodies", on->option,
+              on->name[i], near[0] ? "; did you mean " : "", near);
+    }
+    in[b] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

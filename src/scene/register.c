@@ -14,7 +14,8 @@ PetscErrorCode SbRegisterAll(void)
     &SbEffectFoundation, &SbEffectSpring,
     &SbEffectCable,      &SbEffectPointForce,
     &SbEffectFixed,      &SbEffectPrescribedDisplacement,
-    &SbEffectDamping,    &SbEffectContact};
+    &SbEffectTorque,     &SbEffectDamping,
+    &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;

@@ -58,6 +58,7 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectFixed));
   PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
   PetscCall(SbEffectRegister(&SbEffectDamping));
+  PetscCall(SbEffectRegister(&SbEffectTorque));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

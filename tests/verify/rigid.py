@@ -1,7 +1,7 @@
 """Rigid bodies.
 
-A torque-free asymmetric top keeps energy and angular momentum, a symmetric one precesses under a force on its axis as its closed form says. A block
-slides down a slope, another one sticks. A rigid box lies on a soft block, which bears its weight, the same on 1 and 2 ranks, and after a restart on
+A torque-free asymmetric top keeps energy and angular momentum, a symmetric one precesses under a force on its axis as its closed form says; a torque
+gives a box its angular momentum. A block slides down a slope, another one sticks. A rigid box lies on a soft block, which bears its weight, the same on 1 and 2 ranks, and after a restart on
 other ranks; supports hold a rigid body as a whole, let go of it, and press it on the block in a static run. A house of cards stands, a row of
 dominoes falls. What rigid bodies do not go with is an error, a stiffness that is too low a warning.
 """
@@ -58,6 +58,14 @@ axis = numpy.array([found[f"tip_u{k}"] - found[f"back_u{k}"] + (0.1 if k == "x" 
 near(numpy.unwrap(numpy.arctan2(axis[1], axis[0]))[-1] / 0.5 / (couple / axial), 1, 1e-3, "precession")
 near(numpy.abs(axis[2]).max() / 0.1, 0, 1e-3, "nutation")
 near(found["centre_z"][-1], -0.5 * 1000 / 8 * 0.25, 1e-3, "fall of the centre")
+
+# a torque in space on a box at rest: its angular momentum is that times t, with no force; and the work is the energy
+run("torque", box + "-bodies b -body_b_rigid yes -effects motor -effect_motor_type torque -effect_motor_vector 1;0;2 -time newmark -ts_max_time 1 "
+    "-ts_dt 0.01 -snes_rtol 1e-10")
+found = history("torque")
+near(numpy.abs(momentum(found, -1) - (1, 0, 2)).max(), 0, 1e-3, "angular momentum of a torque less torque times time")
+near(found["centre_x"][-1], 0.1, 1e-9, "centre of what a torque turns")
+near(found["load_work"][-1] / (found["kinetic"][-1] + found["strain"][-1]), 1, 1e-3, "work of the torque")
 
 # two blocks on slopes of 14 and 20 degrees with friction 0.3, as in scenarios/incline.opts: implicit Euler slides a t (t + dt) / 2
 slope = ("-bodies held,gone -body_default_rigid yes -body_held_mesh box:0.1,0.1,0.05:2 -body_held_rotate 0,1,0,14 -body_gone_mesh box:0.1,0.1,0.05:2 "
