@@ -95,10 +95,12 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
     b++;
   nvert = b < mesh->nbody ? count[2 * b] : 0;
   PetscCall(PetscFree(count));
-  PetscCheck(!nvert || !space->element[b]->rigid, space->comm, PETSC_ERR_USER_INPUT,
-             "%s selects %" PetscInt_FMT " vertices of body %s, which is rigid and is supported as "
-             "a whole: take the body, or a set with all of its surface; a foundation holds a part",
-             on->option, nvert, mesh->body[b].name);
+  PetscCheck(
+    !nvert || !space->element[b]->rigid, space->comm, PETSC_ERR_USER_INPUT,
+    "%s selects %" PetscInt_FMT " vertices of body %s, which is rigid and is supported as "
+    "a whole: take the body, or a set with all of its surface; foundations and springs hold "
+    "parts",
+    on->option, nvert, mesh->body[b].name);
   PetscCheck(!nvert, space->comm, PETSC_ERR_USER_INPUT,
              "%s selects %" PetscInt_FMT " vertices of body %s but none of its triangles, where "
              "element %s has its nodes: take a set that "

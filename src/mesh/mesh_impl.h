@@ -206,8 +206,8 @@ PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
 #define SB_PARTITIONER_METIS "metis"
 #define SB_PARTITIONER_BISECTION "bisection"
 PetscErrorCode SbPartitionerPrepare(MPI_Comm comm);
-/* Owner rank of each cell: part[ncell]; the type: that of the option, or metis for small meshes,
-   else bisection. Collective. */
+/* Owner rank of each cell: part[ncell], one rank for all cells of a rigid body; the type: that of
+   the option, or metis for small meshes, else bisection. Collective. */
 PetscErrorCode SbPartition(PetscPartitioner partitioner, const SbMergedMesh *merged,
                            PetscMPIInt part[]);
 

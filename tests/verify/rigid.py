@@ -1,7 +1,7 @@
 """Rigid bodies.
 
 A torque-free asymmetric top keeps energy and angular momentum, a symmetric one precesses under a force on its axis as its closed form says; a torque
-gives a box its angular momentum. A block slides down a slope, another one sticks. A rigid box lies on a soft block, which bears its weight, the same on 1 and 2 ranks, and after a restart on
+gives a box its angular momentum, another one swings on a spring. A block slides down a slope, another one sticks. A rigid box lies on a soft block, which bears its weight, the same on 1 and 2 ranks, and after a restart on
 other ranks; supports hold a rigid body as a whole, let go of it, and press it on the block in a static run. A house of cards stands, a row of
 dominoes falls. What rigid bodies do not go with is an error, a stiffness that is too low a warning.
 """
@@ -66,6 +66,13 @@ found = history("torque")
 near(numpy.abs(momentum(found, -1) - (1, 0, 2)).max(), 0, 1e-3, "angular momentum of a torque less torque times time")
 near(found["centre_x"][-1], 0.1, 1e-9, "centre of what a torque turns")
 near(found["load_work"][-1] / (found["kinetic"][-1] + found["strain"][-1]), 1, 1e-3, "work of the torque")
+
+# a box of 2 kg on a spring, let go: it falls by 2 m g / k, and is back after 2 pi sqrt(m / k)
+run("spring", "-bodies b -body_b_rigid yes -body_b_density 2000 -body_b_mesh box:0.1,0.1,0.1:2 -effects gravity,s -effect_s_type spring -effect_s_points "
+    "0.05,0.05,0.1;ground:0.05,0.05,0.4 -effect_s_stiffness 500 -time newmark -ts_dt 0.002 -ts_max_time 0.5 -snes_rtol 1e-10")
+found = history("spring")
+near(found["s_length"].max() - 0.3, 2 * 2 * 9.81 / 500, 1e-5, "way of a box on a spring")
+near(found["time"][100 + found["s_length"][100:].argmin()], 2 * math.pi * math.sqrt(2 / 500), 2e-3, "its period")
 
 # two blocks on slopes of 14 and 20 degrees with friction 0.3, as in scenarios/incline.opts: implicit Euler slides a t (t + dt) / 2
 slope = ("-bodies held,gone -body_default_rigid yes -body_held_mesh box:0.1,0.1,0.05:2 -body_held_rotate 0,1,0,14 -body_gone_mesh box:0.1,0.1,0.05:2 "
