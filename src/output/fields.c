@@ -53,6 +53,21 @@ static PetscErrorCode reaction(const SbField *f, SbRun run, const SbStep *step, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not a number at the points of rigid bodies: what acts on a vertex of them is not known from their
+   four nodes. */
+static void blank_rigid(SbRun run, SbOutput out, PetscInt ncomp, PetscReal values[])
+{
+  const SbSpace s = run->model->space;
+
+  for (PetscInt i = 0; s->rigid && i < out->point.nowned; i++) {
+    const PetscInt vertex = SbPointsPlace(run, out, i).vertex;
+
+    for (PetscInt k = 0; vertex >= 0 && s->element[s->mesh->vert_body[vertex]]->rigid && k < ncomp;
+         k++)
+      values[ncomp * i + k] = (PetscReal)NAN;
+  }
+}
+
 /* Force, or gap: of obstacles and other bodies. */
 static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
@@ -67,6 +82,7 @@ static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, P
   } else {
     PetscCall(SbContactSetGap(&run->model->contacts, step->t, step->U, x));
     PetscCall(SbPointsValues(run, out, x, values));
+    blank_rigid(run, out, 3, values);
   }
   PetscCall(VecDestroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -159,6 +175,7 @@ static PetscErrorCode contact_pressure(const SbField *f, SbRun run, const SbStep
     face = SbDot3(A, N);
     values[i] = face != 0. ? -SbDot3(F, N) / face : 0.;
   }
+  blank_rigid(run, out, 1, values);
   PetscCall(PetscFree3(force, area, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,8 +8,10 @@ dominoes falls. What rigid bodies do not go with is an error, a stiffness that i
 import math
 import sys
 
+import h5py
 import numpy
 
+from output_common import OUT
 from scene_common import check, history, start
 
 COMMON = "-quiet -output_fields none -output_precision double "
@@ -107,6 +109,23 @@ run("fall1", fall + "-restart latest -ts_max_time 0.52", 2)
 run("fall2", fall + "-ts_max_time 0.52 -output_overwrite")
 one, two = history("fall1"), history("fall2")
 near(one["centre_z"][-1], two["centre_z"][-1], 1e-12, "centre after a restart")
+
+# fields of its mesh: it keeps its shape, the contact forces add up to its weight, and what is not known is not a number
+start("fields", fall + "-quiet -output_precision double -output_fields position,contact_force,contact_pressure,contact_gap,stress", 2)
+with h5py.File(OUT / "fields" / "fields.h5") as file:
+    points = numpy.unique(file["mesh/cells"][...][file["mesh/body"][...] == 1])
+    rest = file["mesh/x"][...][points]
+    steps = file["step"][max(file["step"])]
+    frame = {name: values[...] for name, values in steps[max(steps)].items()}
+place = frame["position"][points]
+turn = numpy.linalg.lstsq(numpy.c_[rest, numpy.ones(len(rest))], place, rcond=None)[0]
+near(numpy.abs(turn[:3] @ turn[:3].T - numpy.eye(3)).max(), 0, 1e-5, "shape of the box in the frames")
+near(frame["contact_force"][points].sum(axis=0)[2], weight, 1e-4, "contact force in the frames")
+near(frame["contact_force"].sum(axis=0)[2], 0, 1e-4, "contact force of box and block")
+for name in "contact_pressure", "contact_gap":
+    check(numpy.isnan(frame[name][points]).all(), f"{name} of a rigid body")
+    check(numpy.isfinite(numpy.delete(frame[name], points, axis=0)).all(), f"{name} of a soft body")
+count += 2
 
 # held as a whole, turned and pressed, then let go
 hand = (bed.format("gravity,hold,hand,meet") + "-body_box_translate 0.03,0.03,0.052 -effect_hand_type prescribed_displacement -effect_hand_on box "
