@@ -57,10 +57,10 @@ typedef struct {
   PetscInt n;        /* its nodes */
   PetscInt *gnode;   /* [n] global numbers, ascending; alike on all ranks */
   PetscReal *weight; /* [n] of the mean, sum 1 */
-} SbPlace;
+} SbMeanPlace;
 PetscErrorCode SbPlaceFind(SbSpace space, const char *option, PetscInt body,
-                           const PetscReal point[3], SbPlace *place);
-PetscErrorCode SbPlaceDestroy(SbPlace *place);
+                           const PetscReal point[3], SbMeanPlace *place);
+PetscErrorCode SbPlaceDestroy(SbMeanPlace *place);
 
 /* in[nbody]: whether a body is named, all if none is. Error (PETSC_ERR_USER_INPUT, alike on all
    ranks): a name is that of no body. Not collective. */

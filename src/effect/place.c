@@ -112,7 +112,7 @@ static int compare_parts(const void *a, const void *b)
 }
 
 /* The parts of all ranks, one for each node, over the volume. */
-static PetscErrorCode merge(SbSpace s, const Parts *list, PetscReal volume, SbPlace *place)
+static PetscErrorCode merge(SbSpace s, const Parts *list, PetscReal volume, SbMeanPlace *place)
 {
   PetscMPIInt mine = (PetscMPIInt)(2 * list->n);
   PetscMPIInt *count, *start;
@@ -148,7 +148,7 @@ static PetscErrorCode merge(SbSpace s, const Parts *list, PetscReal volume, SbPl
 }
 
 PetscErrorCode SbPlaceFind(SbSpace s, const char *option, PetscInt body, const PetscReal point[3],
-                           SbPlace *place)
+                           SbMeanPlace *place)
 {
   const SbMesh mesh = s->mesh;
   Parts list = {0};
@@ -186,7 +186,7 @@ PetscErrorCode SbPlaceFind(SbSpace s, const char *option, PetscInt body, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPlaceDestroy(SbPlace *place)
+PetscErrorCode SbPlaceDestroy(SbMeanPlace *place)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree2(place->gnode, place->weight));

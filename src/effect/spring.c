@@ -223,7 +223,7 @@ static PetscErrorCode couplings_line(SbEffect e, SbSpace space)
   Line *line = (Line *)e->data;
   const SbMesh mesh = space->mesh;
   char option[3 * SB_NAME_MAX];
-  SbPlace *place;
+  SbMeanPlace *place;
   PetscInt *gnode;
   PetscInt n = 0;
 
