@@ -188,8 +188,9 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
 
   /* of different bodies, one of them the obstacle if there is one, or self-contact, which a rigid
      body has not; not both prescribed */
-  if (one != two ? m->nvertex > m->nbody_vertex && one != obstacle && two != obstacle
-                 : !m->self || one == obstacle || m->space->element[one]->rigid)
+  if (one != two
+        ? m->nvertex > m->nbody_vertex && one != obstacle && two != obstacle
+        : !m->self || one == obstacle || (m->space->rigid && m->space->element[one]->rigid))
     PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 4; k++) {
     driven[k >= split] += m->driven[pair.v[k]];

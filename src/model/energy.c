@@ -44,7 +44,7 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
       sum.angular[k] += L[k];
     if (v)
       sum.kinetic += 0.5 * SbDot3(v + 3 * i, p + 3 * i);
-    if (s->element[s->node_body[i]]->rigid)
+    if (s->rigid && s->element[s->node_body[i]]->rigid)
       continue;
     extreme[1] = PetscMax(extreme[1], SbDot3(u + 3 * i, u + 3 * i));
     if (v)
