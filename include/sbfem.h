@@ -45,7 +45,8 @@ typedef struct {
   PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
   SbPack *axes;         /* [batches][9] SbMaterial.axes of a law with fibres, else NULL; owned */
   SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
-  struct _p_SbStressHistory *history; /* of a viscoelastic material, else NULL; owned */
+  struct _p_SbStressHistory *history;   /* of a viscoelastic material, else NULL; owned */
+  struct _p_SbContraction *contraction; /* of fibres that contract, else NULL; owned */
 } SbRegion;
 
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
@@ -139,6 +140,9 @@ struct _p_SbSpace {
   PetscInt viscous;   /* history variables of a cell at most, all ranks; 0: no viscoelastic body */
   PetscBool viscous_began;     /* they have values */
   PetscLogEvent viscous_event; /* SbMat_viscous, around their updates */
+  PetscBool active;            /* some fibres contract, on any rank, */
+  PetscBool active_rates;      /* and with a force that depends on their velocity */
+  PetscLogEvent active_event;  /* SbMat_active, around the evaluation of their tensions */
   SbPack
     *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
@@ -251,6 +255,29 @@ PetscErrorCode SbSpaceGetHistory(SbSpace space, PetscReal x[]);
 PetscErrorCode SbSpaceSetHistory(SbSpace space, const PetscReal x[]);
 PetscErrorCode SbSpaceMeanHistory(SbSpace space, const PetscBool of_body[], PetscBool back,
                                   PetscInt stride, PetscReal x[]);
+
+/*
+  Fibres that contract (src/fem/active.c); nothing without any.
+
+  SbSpaceActiveAt      - stresses and tangents are from now on those with the tensions at a time, s;
+                         those that do not depend on it are multiplied by load. Not collective.
+                         Errors: those of SbActiveTension()
+  SbSpaceActiveRates   - with a relation of force and velocity: as SbSpaceViscousAt(). Collective.
+  SbSpaceActiveMost    - for SbSpaceStableStep(), the largest tensions between two times, s, of 201
+                         that are evaluated. Not collective.
+  SbSpaceActiveEnergy  - energy of these tensions over this rank's cells at u[nnode][3], m; J. Its
+                         derivative is their force. Not collective.
+  SbSpaceAddActiveForce - f[nnode][3] += the force of the fibres on the nodes, N, right on owned
+                         ones. Not collective.
+  SbSpaceActiveTension - per owned cell: the tension times its factors by length and velocity, Pa,
+                         value[ncell_owned]; 0: none. Not collective.
+*/
+PetscErrorCode SbSpaceActiveAt(SbSpace space, PetscReal t, PetscReal load);
+PetscErrorCode SbSpaceActiveMost(SbSpace space, PetscReal from, PetscReal to);
+PetscErrorCode SbSpaceActiveRates(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
+PetscReal SbSpaceActiveEnergy(SbSpace space, const PetscReal u[]);
+void SbSpaceAddActiveForce(SbSpace space, const PetscReal u[], PetscReal f[]);
+void SbSpaceActiveTension(SbSpace space, const PetscReal u[], PetscReal value[]);
 
 /* matrices and their assembly */
 

@@ -14,6 +14,7 @@
 typedef struct _p_SbMaterial *SbMaterial;
 typedef struct _p_SbFibres *SbFibres;   /* directions of the axes of a law with fibres */
 typedef struct _p_SbViscous *SbViscous; /* of a viscoelastic material */
+typedef struct _p_SbActive *SbActive;   /* of fibres that contract */
 
 /* polar.c, spectral.c: 3x3 matrices of a batch */
 
@@ -149,8 +150,9 @@ struct _p_SbMaterial {
   SbMaterial point;      /* SbMaterialGetPointwise(), likewise */
   SbMaterial stiffest;   /* SbMaterialGetStiffest(), likewise */
   void *data;            /* the law's own constants; freed with the material */
-  SbFibres fibres;       /* of a law with fibres, else NULL; owned */
+  SbFibres fibres;       /* of a law with fibres, or that contract, else NULL; owned */
   SbViscous viscous;     /* of a viscoelastic material, else NULL; owned */
+  SbActive active;       /* of fibres that contract, else NULL; owned */
   /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
      state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
   const SbPack *axes;
@@ -167,6 +169,28 @@ struct _p_SbFibres {
   char surface[SB_FIBRE_SURFACES][SB_NAME_MAX];
   PetscReal angle[4]; /* rad, alpha inside and outside, beta inside and outside */
 };
+
+/* A tension along the fibres (src/material/active.c). */
+typedef enum {
+  SB_LENGTH_NONE,
+  SB_LENGTH_PARABOLA,
+  SB_LENGTH_GAUSSIAN
+} SbLengthRelation;
+struct _p_SbActive {
+  char option[3 * SB_NAME_MAX]; /* name of its option, */
+  SbFormula tension;            /* which it has, Pa */
+  PetscBool steady;             /* not a formula of t */
+  SbLengthRelation length;      /* of force and length, */
+  PetscReal optimum, width;     /* the stretch of the largest force, and a measure of its range */
+  PetscReal velocity; /* of shortening without force, 1/s; 0: force does not depend on it */
+  PetscReal curvature, eccentric; /* of Hill's hyperbola; largest force in lengthening */
+};
+/* At a point in a step: the stretch of the fibres at its start, that expected at the time of the
+   evaluation, and v = v + slope (stretch - start), rates over the velocity. */
+typedef struct {
+  SbPack start, expected, v;
+  PetscReal slope; /* 0: the rate is known */
+} SbFibreRate;
 
 /* A Prony series and a viscosity, with the state that follows from the time since the last step
    (src/material/viscous.c). The law of the material is the instantaneous one. */
@@ -231,6 +255,15 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m);
 /* The law of a viscoelastic material after this time since the last step, s, inf: relaxed; sets
    m->viscous->scale, ->step and the factors of the history. Not collective. */
 void SbViscousSetElapsed(SbMaterial m, PetscReal elapsed);
+/* The tension of the fibres at a time, s, or load factor, at a place x, m, at rest; Pa. Errors:
+   PETSC_ERR_USER_INPUT with option, value, time and place where it is negative or no number. Not
+   collective. */
+PetscErrorCode SbActiveTension(const struct _p_SbActive *active, PetscReal t, const PetscReal x[3],
+                               PetscReal *tension);
+/* At the strain E = (l^2 - 1)/2 of fibres: their energy phi over the tension, the factor G of the
+   stress, and c = l dG/dl. rate: NULL without a velocity. Not collective. */
+void SbActiveFactors(const struct _p_SbActive *active, const SbPack E, const SbFibreRate *rate,
+                     SbPack phi, SbPack G, SbPack c);
 /* The axes of a law with fibres at a place x, m, at rest: Q[9], orthonormal, its columns the fibre,
    the sheet and their normal. given[6]: fibre and sheet by fields or by the rule, or NULL. Errors:
    PETSC_ERR_USER_INPUT with option and place where a direction is zero, or the sheet is along the

@@ -12,6 +12,7 @@ typedef struct {
   PetscReal
     load_work; /* by loads since the start (constant: minus the change of their potential), J */
   PetscReal prescribed_work; /* work done by moving supports since the start, J */
+  PetscReal active_work;     /* by fibres that contract since the start, J */
   PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
   PetscReal relaxation_loss; /* dissipated by Prony series of materials since the start, J */
   PetscReal viscosity_loss;  /* by viscosities of materials, J */
@@ -117,12 +118,18 @@ PetscErrorCode SbModelStepSpeed(SbModel model, PetscReal t, PetscReal dt, Vec U,
 /* Share of the volume of the law `linear` that is turned by more than `angle`, rad; 0 without that
    law. Collective. */
 PetscErrorCode SbModelTurned(SbModel model, Vec U, PetscReal angle, PetscReal *share);
-/* Strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N (may be
-   NULL), and how many tets are inverted there. Collective. */
+/* Strain energy at U, J, with that of the tensions of fibres that contract, its gradient, the
+   internal forces without damping, F[nnode][3] N (may be NULL), and how many tets are inverted
+   there. Collective. */
 PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi,
                                    PetscInt *ninverted);
 /* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive
    semi-definite, or the exact ones. Not collective. */
 PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
+/* Fibres that contract have from now on the tensions at t, s; static: the load factor. Residuals
+   and tangents do it by themselves. Not collective. */
+PetscErrorCode SbModelActiveAt(SbModel model, PetscReal t);
+/* Their force on the nodes at t, F[nnode][3] N. Collective. */
+PetscErrorCode SbModelActiveForce(SbModel model, PetscReal t, Vec U, Vec F);
 /* Power dissipated by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

@@ -77,6 +77,7 @@ typedef struct {
 
   /* at the last step, for the works of the next one; with monitors.want_energies, else NULL */
   Vec loads;               /* f_ext, N */
+  Vec active;              /* force of fibres that contract, N; NULL: none */
   Vec reaction;            /* residual without constraints, N; also with monitors.want_residual */
   Vec previous;            /* displacement, m */
   PetscReal damping_power; /* W */

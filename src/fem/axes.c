@@ -1,7 +1,7 @@
 /*
-  Directions of the cells of laws with fibres: evaluated once, at the centres of the straight tets
-  at rest, of owned cells and ghosts alike, so that nothing is sent. A re-meshed body evaluates them
-  for its new tets, and a restarted run again.
+  Directions of the cells of laws with fibres, or that contract: evaluated once, at the centres of
+  the straight tets at rest, of owned cells and ghosts alike, so that nothing is sent. A re-meshed
+  body evaluates them for its new tets, and a restarted run again.
 */
 #include "fem_impl.h"
 
@@ -32,12 +32,11 @@ PetscErrorCode SbSpaceFindAxes(SbSpace s)
   for (PetscInt b = 0; b < s->mesh->nbody; b++)
     for (PetscInt i = -1; i < s->mesh->body[b].ninclusion; i++)
       any =
-        (PetscBool)(any ||
-                    s->material[i < 0 ? b : s->mesh->body[b].inclusion[i].material]->type->fibres);
+        (PetscBool)(any || s->material[i < 0 ? b : s->mesh->body[b].inclusion[i].material]->fibres);
   if (!any)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt r = 0; r < s->nregion && !caught.code; r++)
-    if (s->region[r].material->type->fibres)
+    if (s->region[r].material->fibres)
       SB_CATCH(&caught, find(s, &s->region[r]));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -297,6 +297,27 @@ void SbViscousPressure(const SbRegion *region, PetscInt b, int q, SbPack p);
 void SbViscousMean(const SbRegion *region, PetscInt b, PetscBool energy, PetscReal *factor,
                    const PetscReal **constant);
 
+/* active.c: tensions of the fibres of a region that contract, and what they are of: the time, or
+   the load. */
+struct _p_SbContraction {
+  SbPack *tension; /* [batches] Pa */
+  SbPack *most;    /* [batches] their largest values by SbSpaceActiveMost(), or 0 */
+  PetscReal at;
+  PetscBool known;
+  int npoint;
+  SbFibreRate *rate; /* [batches][npoint] with a velocity, else NULL */
+  PetscBool moving;  /* it is known: not in static runs */
+};
+PetscErrorCode SbActiveCreate(SbSpace space);
+PetscErrorCode SbActiveDestroyRegion(SbRegion *region);
+/* At point q of batch b of such a region with F: adds to P and to the blocks K of the tangent of a
+   law, W: the volume times the factor of the stiffness. */
+void SbActiveStress(const SbRegion *region, PetscInt b, int q, const SbPack F[9], SbPack P[9]);
+void SbActiveBlocks(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                    const SbPack g[9], const SbPack W, const SbPack F[9], SbPack K[10][9]);
+/* f += their tangent at rest with the largest tensions, or those of the largest force, times x. */
+void SbActiveStiffest(SbSpace space, const SbRegion *region, const PetscReal x[], PetscReal f[]);
+
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
@@ -320,7 +341,7 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
   return at->step ? at->rule : &SbRuleCubic;
 }
 /* Evaluates the law at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be
-   NULL. */
+   NULL. P has the stress of fibres that contract, psi is what is stored. */
 void SbBatchState(SbSpace space, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS]);
 /* linear_stress.c: C = the tangent of a law at F with the linearised stress. Pressures of P2's

@@ -301,6 +301,8 @@ static void follow_batch(SbSpace s, PetscInt b, const PetscReal x[], PetscReal e
   m->ops.stress(m, (const SbPack *)F, P);
   if (s->batch_region[b]->history)
     SbViscousStress(s->batch_region[b], m, b, 0, (const SbPack *)F, P);
+  if (s->batch_region[b]->contraction)
+    SbActiveStress(s->batch_region[b], b, 0, (const SbPack *)F, P);
   for (PetscInt l = 0; l < n && (even != 0. || tension); l++) {
     const PetscReal less = tension ? tension[s->batch_cell[b] + l] : 0.;
     PetscReal one[9], cofactor[9];

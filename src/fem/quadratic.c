@@ -205,6 +205,8 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
       SbMaterialPressure(region->history ? law : m, (const SbPack *)F[q], pressure[q]);
     if (region->history && P)
       SbViscousStress(region, law, b, q, (const SbPack *)F[q], P[q]);
+    if (region->contraction && P)
+      SbActiveStress(region, b, q, (const SbPack *)F[q], P[q]);
     if (region->history && psi)
       SbViscousEnergy(region, law, b, q, (const SbPack *)F[q], psi[q]);
     if (region->history && pressure)

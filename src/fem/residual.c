@@ -69,6 +69,8 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
         law->ops.stress(law, (const SbPack *)F[q], P);
       if (elastic && region->history)
         SbViscousStress(region, law, b, q, (const SbPack *)F[q], P);
+      if (elastic && region->contraction)
+        SbActiveStress(region, b, q, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
         if (mean)

@@ -254,6 +254,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(tabulate_batches(s));
   PetscCall(SbSpaceFindAxes(s));
   PetscCall(SbViscousCreate(s));
+  PetscCall(SbActiveCreate(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
     PetscCall(SbJumpCreate(s, &s->jump));
@@ -328,6 +329,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
     PetscCall(PetscFree(s->region[r].stress));
     PetscCall(PetscFree(s->region[r].axes));
     PetscCall(SbViscousDestroy(&s->region[r]));
+    PetscCall(SbActiveDestroyRegion(&s->region[r]));
   }
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));

@@ -14,6 +14,8 @@
   The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1
   for CR and DG, which bounds w for a consistent mass.
 
+  Fibres that contract make a body stiffer across them: their largest tensions are part of K.
+
   Not handled: frequencies that increase where a body is compressed, or its fibres are stretched.
 */
 #include "fem_impl.h"
@@ -81,6 +83,10 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
           PetscCall(SbMaterialGetPointwise(region.material, &region.pointwise));
       }
       SbRegionForces(s, &region, PETSC_FALSE, 1., &stage, f);
+      if (region.contraction && !s->region[r].material->linear) {
+        region.material = s->region[r].material;
+        SbActiveStiffest(s, &region, stage.v, f);
+      }
     }
     if (s->jump)
       SbJumpAdd(s, stage.v, SB_JUMP_STIFFNESS, f);

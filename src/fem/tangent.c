@@ -264,15 +264,19 @@ static PetscReal mean_history(const SbRegion *region, PetscInt b, const Factors 
                        : (x->stiffness * factor + damping) * lambda / (x->stiffness + damping);
 }
 
-/* What the history of a viscoelastic material adds to the blocks of a point. */
-static void add_history(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
-                        const SbPack *g, const SbPack V, PetscReal stiffness, const SbPack F[9],
-                        SbPack K[10][9])
+/* What the history of a viscoelastic material, and fibres that contract, add to the blocks of a
+   point. */
+static void add_to_law(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
+                       const SbPack *g, const SbPack V, PetscReal stiffness, const SbPack F[9],
+                       SbPack K[10][9])
 {
   SbPack W;
 
   scaled_volumes(V, stiffness, W);
-  SbViscousBlocks(region, law, b, q, g, W, F, K);
+  if (region->history)
+    SbViscousBlocks(region, law, b, q, g, W, F, K);
+  if (region->contraction)
+    SbActiveBlocks(region, law, b, q, g, W, F, K);
 }
 
 /* Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off.
@@ -336,9 +340,9 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     if (region->history && point_pressure(region, batch, q, of_mean, pressure))
       at.pressure = (const SbPack *)&pressure;
     law_blocks(local, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
-    if (region->history)
-      add_history(region, local, batch, q, points.g + points.step * q, W, shift_k,
-                  (const SbPack *)F[q], B[q]);
+    if (region->history || region->contraction)
+      add_to_law(region, local, batch, q, points.g + points.step * q, W, shift_k,
+                 (const SbPack *)F[q], B[q]);
   }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal both = x->stiffness + (one_D ? x->damping : 0.);
@@ -454,9 +458,9 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       if (region->history && point_pressure(region, b, 0, NULL, pressure))
         at.pressure = (const SbPack *)&pressure;
       law_blocks(law, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
-      if (region->history)
-        add_history(region, law, b, 0, s->batch_g + 9 * b, s->batch_V[b], stage->shift_k,
-                    (const SbPack *)F[0], K);
+      if (region->history || region->contraction)
+        add_to_law(region, law, b, 0, s->batch_g + 9 * b, s->batch_V[b], stage->shift_k,
+                   (const SbPack *)F[0], K);
 
       /* b_a = V D grad psi_a, as the force of a stress D */
       for (int l = 0; out && l < SB_BATCH; l++) {

@@ -61,7 +61,7 @@ void SbFibreClear(int level, SbFibreEnergy *w);
 */
 PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet);
 
-/* Option rows of every law with fibres. */
+/* Option rows of the directions of fibres. */
 #define SB_FIBRE_ROWS                                                                             \
   {"fibre",                                                                                       \
    SB_OPTION_FORMULA,                                                                             \
@@ -69,8 +69,8 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
    "",                                                                                            \
    "1,0,0",                                                                                       \
    "",                                                                                            \
-   "direction of the fibres, of any length but 0: numbers or formulas of the rest position x, "   \
-   "y, z, at the centre of each tet"},                                                            \
+   "direction of the fibres, of laws that have them and of bodies that contract, of any length "  \
+   "but 0: numbers or formulas of the rest position x, y, z, at the centre of each tet"},         \
     {"sheet",                                                                                     \
      SB_OPTION_FORMULA,                                                                           \
      3,                                                                                           \

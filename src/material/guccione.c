@@ -77,7 +77,6 @@ static const SbOption rows[] = {
   {"bf", SB_OPTION_REAL, 1, "", NULL, "(0, inf)", "factor in Q of the strain along the fibres"},
   {"bt", SB_OPTION_REAL, 1, "", NULL, "(0, inf)", "of strains across them, in two directions"},
   {"bfs", SB_OPTION_REAL, 1, "", NULL, "(0, inf)", "of shear between along and across"},
-  SB_FIBRE_ROWS,
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialGuccione = {

@@ -94,7 +94,6 @@ static const SbOption rows[] = {
   {"angles", SB_OPTION_STRING, 1, "degree", "0", "",
    "one number for each family of fibres, up to 8 with commas: the angle of its direction to "
    "`fibre`, in the plane of fibre and sheet"},
-  SB_FIBRE_ROWS,
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialHolzapfelGasserOgden = {

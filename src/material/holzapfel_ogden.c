@@ -76,7 +76,6 @@ static const SbOption rows[] = {
   {"b_s", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "how fast they stiffen"},
   {"a_fs", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)", "of shear between fibre and sheet"},
   {"b_fs", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "how fast it stiffens"},
-  SB_FIBRE_ROWS,
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialHolzapfelOgden = {

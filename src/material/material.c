@@ -3,7 +3,7 @@
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
-#include "material_impl.h"
+#include "fibrous.h"
 #include "sbbase.h"
 
 #define LISTED(law) &law,
@@ -33,6 +33,26 @@ static const SbOption body_rows[] = {
    "Kelvin-Voigt: viscosity beside the elastic law, of changes of shape"},
   {"viscosity_bulk", SB_OPTION_REAL, 1, "Pa s", "0", "[0, inf)",
    "Kelvin-Voigt: viscosity of changes of volume"},
+  {"active_tension", SB_OPTION_FORMULA, 1, "Pa", "0", "",
+   "fibres that contract: second Piola-Kirchhoff stress along them beside that of the law, at "
+   "least "
+   "0; a formula of the time and the rest position, or table:FILE; 0: they do not"},
+  {"active_length", SB_OPTION_CHOICE, 1, "", "none", "none|parabola|gaussian",
+   "factor on the tension at a stretch l of the fibres, with z = (l - active_optimum) / "
+   "active_width: parabola, max(0, 1 - z^2); gaussian, exp(-z^2)"},
+  {"active_optimum", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
+   "stretch of the fibres at which this factor is 1"},
+  {"active_width", SB_OPTION_REAL, 1, "", "0.5", "(0, inf)",
+   "difference to that stretch at which it is 0 (parabola) or 1/e (gaussian)"},
+  {"active_velocity", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)",
+   "Hill: rate of the stretch of fibres that shorten without force; dynamic runs only; 0: the "
+   "force "
+   "does not depend on the rate"},
+  {"active_curvature", SB_OPTION_REAL, 1, "", "0.25", "(0, inf)",
+   "Hill: k of the factor (1 + v) / (1 - v/k) on the tension, v the rate over active_velocity"},
+  {"active_eccentric", SB_OPTION_REAL, 1, "", "1.5", "[1, inf)",
+   "this factor of fibres that lengthen fast"},
+  SB_FIBRE_ROWS,
 };
 
 PetscErrorCode SbMaterialRegister(const SbMaterialType *type)
@@ -172,6 +192,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
     choice += m->ops.spin ? SB_TANGENT_WARPED - 1 : SB_TANGENT_EXACT - 1;
     PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)choice));
   }
+  PetscCall(SbActiveRead(m, &scope));
   PetscCall(SbViscousRead(m, &scope));
   if (m->viscous) {
     SbMaterial *const laws_of[2] = {&m->viscous->step, &m->viscous->relaxed};
@@ -209,6 +230,7 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscCall(SbMaterialDestroy(&(*m)->point));
   PetscCall(SbMaterialDestroy(&(*m)->stiffest));
   PetscCall(SbFibresDestroy(&(*m)->fibres));
+  PetscCall(SbActiveDestroy(&(*m)->active));
   if ((*m)->viscous) {
     PetscCall(SbMaterialDestroy(&(*m)->viscous->step));
     PetscCall(SbMaterialDestroy(&(*m)->viscous->relaxed));

@@ -68,7 +68,6 @@ static const SbOption rows[] = {
   {"mu_fibre", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "shear modulus along the fibres"},
   {"young_fibre", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)",
    "Young's modulus along the fibres, of an incompressible body; 3 mu: they do not stiffen it"},
-  SB_FIBRE_ROWS,
   SB_ISOCHORIC_ROWS};
 
 const SbMaterialType SbMaterialTransverselyIsotropic = {

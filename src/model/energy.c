@@ -141,6 +141,8 @@ PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, Pets
   PetscFunctionBeginUser;
   PetscCall(SbEvaluationBegin(m, 0., &at));
   SbSpaceStrainEnergy(m->space, at.stage.u, NULL, &sum[0], &unused[0], ninverted, &unused[1]);
+  if (m->space->active)
+    sum[0] += SbSpaceActiveEnergy(m->space, at.stage.u);
   if (F)
     PetscCall(SbSpaceAddInternalForce(m->space, &at.stage, at.f));
   PetscCall(SbEvaluationEnd(m, &at));

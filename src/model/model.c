@@ -276,12 +276,32 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelActiveAt(SbModel m, PetscReal t)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceActiveAt(m->space, t, m->dynamic ? 1. : t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, Vec F)
+{
+  SbEvaluation e = {.U = U, .F = F};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelActiveAt(m, t));
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  SbSpaceAddActiveForce(m->space, e.stage.u, e.f);
+  PetscCall(SbEvaluationEnd(m, &e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain,
                                Vec F)
 {
   SbEvaluation e = {.U = U, .V = V, .A = A, .F = F};
 
   PetscFunctionBeginUser;
+  PetscCall(SbModelActiveAt(m, t));
   PetscCall(SbEvaluationBegin(m, t, &e));
   PetscCall(
     SbModelExternalForces(m, &e.stage, (PetscBool)(constrain && m->barrier_apart), -1., e.f));
@@ -315,6 +335,8 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   SbEvaluation e = {.U = U, .V = V};
 
   PetscFunctionBeginUser;
+  if (shift_k != 0.)
+    PetscCall(SbModelActiveAt(m, t));
   PetscCall(SbEvaluationBegin(m, t, &e));
   e.stage.shift_a = shift_a;
   e.stage.shift_v = shift_v;

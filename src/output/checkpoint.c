@@ -89,7 +89,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 18
+#define NNUMBER 19
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->state.energies;
@@ -112,6 +112,7 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"good_steps", &run->clock.good_steps, PETSC_TRUE},
     {"relaxation_loss", &e->relaxation_loss, PETSC_TRUE},
     {"viscosity_loss", &e->viscosity_loss, PETSC_TRUE},
+    {"active_work", &e->active_work, PETSC_TRUE},
   };
 
   memcpy(number, all, sizeof(all));

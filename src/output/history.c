@@ -79,6 +79,8 @@ static const struct {
 } losses[] = {{"relaxation_loss", AT(energies.relaxation_loss)},
               {"viscosity_loss", AT(energies.viscosity_loss)}};
 
+#define ACTIVE "active_work" /* with fibres that contract */
+
 /* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
 static const struct {
   const char *name, *unit;
@@ -131,6 +133,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     put_column(line, columns[i].unit, "%s%s", i ? "," : "", columns[i].name);
   for (size_t i = 0; run->model->space->viscous && i < PETSC_STATIC_ARRAY_LENGTH(losses); i++)
     put_column(line, "J", ",%s", losses[i].name);
+  if (run->model->space->active)
+    put_column(line, "J", "," ACTIVE);
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     const SbEffect effect = run->model->history[e];
 
@@ -297,7 +301,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   h->last_step = step->step;
   if (h->fd >= 0) {
     const SbEnergies *e = &step->energies;
-    const PetscReal total = e->kinetic + e->strain - e->load_work - e->prescribed_work;
+    const PetscReal total =
+      e->kinetic + e->strain - e->load_work - e->prescribed_work - e->active_work;
 
     rewind(h->text);
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
@@ -314,6 +319,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     for (size_t k = 0; s->viscous && k < PETSC_STATIC_ARRAY_LENGTH(losses); k++)
       (void)fprintf(h->text, ",%.17g",
                     *(const PetscReal *)(const void *)((const char *)step + losses[k].from));
+    if (s->active)
+      (void)fprintf(h->text, ",%.17g", e->active_work);
     for (PetscInt k = 0; k < h->nextra; k++)
       (void)fprintf(h->text, ",%.17g", h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)

@@ -21,8 +21,8 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscCheck(
     frames, s->comm, PETSC_ERR_USER,
     "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the "
-    "materials linear, and corotated with -body_<name>_tangent warped: choose these, or -solver "
-    "rotated");
+    "materials linear, and corotated with -body_<name>_tangent warped and without "
+    "active_tension: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -320,6 +320,8 @@ static PetscErrorCode begin_path(Path *p, PetscReal factor)
     p->delta = m->force[e]->steady ? p->delta : FINE;
   for (PetscInt e = 0; e < m->nprescribe; e++)
     p->delta = m->prescribe[e]->steady ? p->delta : FINE;
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    p->delta = !m->material[k]->active || m->material[k]->active->steady ? p->delta : FINE;
   PetscCall(VecCopy(run->state.U, p->X));
   PetscCall(put_at(p, factor));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -2,11 +2,11 @@
   Energy balance. R: residual without constraints (reaction on prescribed unknowns), f: loads. The
   work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
   change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
-  times angle); damping dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own
-  work (src/contact/surfaces.c), as the energy of its gaps may change much in a step. The rest of
-  the difference between the energies at the start and now was dissipated (negative: added) by the
-  integrator. A stable implicit one adds little; if one adds most of the energy, it is unstable, and
-  the run means nothing from there on.
+  times angle), and by fibres that contract as by loads; damping dissipates (p0 + p1)/2
+  h, p = v . C v. Barrier contact integrates its own work (src/contact/surfaces.c), as the energy of
+  its gaps may change much in a step. The rest of the difference between the energies at the start
+  and now was dissipated (negative: added) by the integrator. A stable implicit one adds little; if
+  one adds most of the energy, it is unstable, and the run means nothing from there on.
 */
 #include "time_impl.h"
 
@@ -51,6 +51,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscReal work[4], power = 0.,
                      own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
+  Vec active = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(SbModelEnergies(m, run->state.U, run->state.V, e));
@@ -63,6 +64,10 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(SbContactSetGradient(&m->contacts, run->state.U, 1., PETSC_FALSE, NULL, loads));
   own[0] += SbContactSetWork(&m->contacts);
   PetscCall(SbRunReactions(run, t, reaction));
+  if (m->space->active) {
+    PetscCall(VecDuplicate(run->state.U, &active));
+    PetscCall(SbModelActiveForce(m, t, run->state.U, active));
+  }
   if (run->solve.damped)
     PetscCall(SbModelDampingPower(m, run->state.U, run->state.V, &power));
   if (!first) {
@@ -75,6 +80,13 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(VecWAXPY(moved, -1., run->state.previous, run->state.U));
     PetscCall(VecDot(loads, moved, &work[0]));
     PetscCall(VecDot(run->state.loads, moved, &work[1]));
+    if (active) {
+      PetscReal of_fibres[2];
+
+      PetscCall(VecDot(active, moved, &of_fibres[0]));
+      PetscCall(VecDot(run->state.active, moved, &of_fibres[1]));
+      e->active_work += 0.5 * (of_fibres[0] + of_fibres[1]);
+    }
     if (!m->space->constraints)
       PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, moved));
     PetscCall(VecDot(reaction, moved, &work[2]));
@@ -104,6 +116,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
                        e->damping_loss - e->remesh_loss - e->kinetic - e->strain;
   if (m->space->viscous)
     e->integrator_loss -= e->relaxation_loss + e->viscosity_loss;
+  e->integrator_loss += e->active_work;
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&
       -e->integrator_loss > GIVEN * run->state.energy_most + rounding(m)) {
@@ -136,7 +149,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   run->state.damping_power = power;
   PetscCall(VecDestroy(&run->state.loads));
   PetscCall(VecDestroy(&run->state.reaction));
+  PetscCall(VecDestroy(&run->state.active));
   run->state.loads = loads;
+  run->state.active = active;
   run->state.reaction = reaction;
   if (!run->state.previous)
     PetscCall(VecDuplicate(run->state.U, &run->state.previous));

@@ -260,6 +260,7 @@ static PetscErrorCode choose_stable_step(SbRun run)
   PetscReal stable;
 
   PetscFunctionBeginUser;
+  PetscCall(SbSpaceActiveMost(m->space, run->clock.t0, run->clock.t_end));
   PetscCall(SbSpaceStableStep(m->space, &stable));
   if (!run->clock.dt_given)
     run->clock.dt = STABLE * stable;

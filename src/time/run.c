@@ -101,6 +101,20 @@ static PetscErrorCode check_rigid(const SbBody *body, SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Integrators that a relation of force and velocity does not go with. */
+static PetscErrorCode check_active(const SbMaterial m, PetscBool body, SbRun r)
+{
+  PetscFunctionBeginUser;
+  if (!m->active || m->active->velocity == 0.)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(!SbRunIsExplicit(r) && r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
+             PETSC_ERR_USER,
+             "-%s_%s_active_velocity: the stable step of explicit integrators, and -time alpha2, "
+             "do not know the rate of fibres; take -time euler_implicit, newmark or genalpha",
+             body ? "body" : "inclusion", m->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -134,6 +148,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(check_viscous(model->material[k], (PetscBool)(k < model->nbody), r));
   for (PetscInt b = 0; b < model->nbody; b++)
     PetscCall(check_rigid(&model->body[b], r));
+  for (PetscInt k = 0; k < model->nmaterial; k++)
+    PetscCall(check_active(model->material[k], (PetscBool)(k < model->nbody), r));
   PetscCheck(!r->solve.reject_inverted || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
              PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
@@ -401,6 +417,8 @@ PetscErrorCode SbRunSolve(SbRun run)
     PetscCall(SbSpaceViscousStart(m->space, run->state.U));
     PetscCall(SbSpaceViscousAt(m->space, 0., PETSC_FALSE, run->state.U, run->state.V));
   }
+  if (m->dynamic)
+    PetscCall(SbSpaceActiveRates(m->space, 0., PETSC_FALSE, run->state.U, run->state.V));
   if (run->solve.ts)
     PetscCall(SbRunIntegrate(run));
   else if (run->clock.arc.on)
@@ -429,6 +447,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
                           &r->state.V,
                           &r->state.A,
                           &r->state.loads,
+                          &r->state.active,
                           &r->state.reaction,
                           &r->state.previous,
                           &r->state.path,

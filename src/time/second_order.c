@@ -465,12 +465,15 @@ static PetscErrorCode choose_length(TS ts, PetscReal *next, PetscBool *accept)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Viscoelastic bodies: stresses are those of a time after the last step, which ended at U, V. */
-static PetscErrorCode viscous_at(SecondOrder *so, PetscReal elapsed, Vec U, Vec V)
+/* Stresses of viscoelastic bodies and of fibres that contract are those of a time after the last
+   step, which ended at U, V. */
+static PetscErrorCode stresses_at(SecondOrder *so, PetscReal elapsed, Vec U, Vec V)
 {
+  const PetscBool second = (PetscBool)(so->set.method == SB_METHOD_GENERALIZED_ALPHA);
+
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceViscousAt(so->run->model->space, elapsed,
-                             (PetscBool)(so->set.method == SB_METHOD_GENERALIZED_ALPHA), U, V));
+  PetscCall(SbSpaceViscousAt(so->run->model->space, elapsed, second, U, V));
+  PetscCall(SbSpaceActiveRates(so->run->model->space, elapsed, second, U, V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -492,7 +495,7 @@ static PetscErrorCode accept_step(TS ts, PetscReal next)
   PetscCall(SbSpaceViscousAdvance(run->model->space, ts->time_step, so->X0, ts->vec_sol,
                                   run->monitors.want_energies ? &run->state.energies.relaxation_loss
                                                               : NULL));
-  PetscCall(viscous_at(so, 0., ts->vec_sol, ts->vec_dot));
+  PetscCall(stresses_at(so, 0., ts->vec_sol, ts->vec_dot));
   ts->ptime += ts->time_step;
   clock->good_steps = next > ts->time_step ? 0 : clock->good_steps + 1;
   clock->stop_reason[0] = 0;
@@ -537,7 +540,7 @@ static PetscErrorCode reject_attempt(TS ts, PetscBool solved, PetscReal next, Pe
   PetscFunctionBeginUser;
   PetscCall(VecCopy(so->X0, ts->vec_sol));
   PetscCall(VecCopy(so->V0, ts->vec_dot));
-  PetscCall(viscous_at(so, 0., so->X0, so->V0));
+  PetscCall(stresses_at(so, 0., so->X0, so->V0));
   ts->reject++;
   run->counters.rejected++;
   clock->good_steps = 0;
@@ -576,7 +579,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     run->clock.may_end_at_impact =
       (PetscBool)(run->model->contacts.ends_step && !halvings && so->undivided == 0.);
     run->clock.time_of_impact = 1.;
-    PetscCall(viscous_at(so, so->set.alpha_f * ts->time_step, so->X0, so->V0));
+    PetscCall(stresses_at(so, so->set.alpha_f * ts->time_step, so->X0, so->V0));
+    PetscCall(SbModelActiveAt(run->model, ts->ptime + so->set.alpha_f * ts->time_step));
     PetscCall(SbRunAttempt(run, &attempt, &ok));
     ts->snes_its = run->counters.newton - run->counters.newton_before + run->counters.newton_step;
     ts->ksp_its = run->counters.linear - run->counters.linear_before + run->counters.linear_step;

@@ -63,6 +63,7 @@ static PetscErrorCode predict(void *ctx)
 
   PetscFunctionBeginUser;
   l->run->model->load = l->factor;
+  PetscCall(SbModelActiveAt(l->run->model, l->factor));
   PetscCall(VecCopy(l->run->state.U, l->X));
   PetscCall(SbModelPrescribe(l->run->model, l->factor, l->X));
   if (l->shift) {

@@ -79,19 +79,29 @@ static PetscErrorCode warn_short(SbRun run, PetscReal dt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Stresses that depend on the step are those of a time after its start, s. */
+static PetscErrorCode stresses_at(SbSpace s, const SbSolvedStep *step, PetscReal elapsed)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceViscousAt(s, elapsed, PETSC_TRUE, step->U0, step->V0));
+  PetscCall(SbSpaceActiveRates(s, elapsed, PETSC_TRUE, step->U0, step->V0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The post-solve callback, which evaluates the end of the step: again, more accurately? */
 static PetscErrorCode ask_about(SbRun run, const SbSolvedStep *step, PetscBool *again)
 {
   const SbSpace s = run->model->space;
   const PetscReal part = run->solve.stage.part;
-  const PetscBool staged = (PetscBool)(s->viscous && step->U0 && step->V0 && part != 1.);
+  const PetscBool staged =
+    (PetscBool)((s->viscous || s->active) && step->U0 && step->V0 && part != 1.);
 
   PetscFunctionBeginUser;
   if (staged)
-    PetscCall(SbSpaceViscousAt(s, step->dt, PETSC_TRUE, step->U0, step->V0));
+    PetscCall(stresses_at(s, step, step->dt));
   PetscCall((*run->monitors.post_solve.fn)(run, step, run->monitors.post_solve.ctx, again));
   if (staged)
-    PetscCall(SbSpaceViscousAt(s, part * step->dt, PETSC_TRUE, step->U0, step->V0));
+    PetscCall(stresses_at(s, step, part * step->dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -261,6 +271,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
     PetscCall(SbRunReactions(run, t, run->state.reaction));
   }
   PetscCall(SbModelWarnStrained(run->model, t, run->state.U));
+  PetscCall(SbModelActiveAt(run->model, t));
   now.R = run->state.reaction;
   now.energies = run->state.energies;
 
