@@ -2,6 +2,7 @@
 /*
   Fibres that contract, against closed forms.
 
+    factors      of length and velocity: their derivatives
     contraction  a free block of the law neohookean, whose fibres run along x: the stretches for
                  which its stress is zero in all directions, with each relation of force and length,
                  all elements; static and, at rest again, dynamic
@@ -24,10 +25,10 @@
 #include <unistd.h>
 #include "verify.h"
 
-#define E 3e4
+#define YOUNG 3e4
 #define NU 0.3
-#define MU (E / (2. * (1. + NU)))
-#define LAMBDA (E * NU / ((1. + NU) * (1. - 2. * NU)))
+#define MU (YOUNG / (2. * (1. + NU)))
+#define LAMBDA (YOUNG * NU / ((1. + NU) * (1. - 2. * NU)))
 #define CUBE                                                                                  \
   "-bodies cube -body_cube_mesh box:1,1,1:1 -body_cube_young 3e4 -body_cube_poisson 0.3 "     \
   "-body_cube_density 1e-3 -body_cube_fibre 1,0,0 -snes_rtol 1e-11 -solver direct -ksp_rtol " \
@@ -36,6 +37,36 @@
   "-effects x,y,z -effect_x_type fixed -effect_x_on xmin -effect_x_components x "       \
   "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed " \
   "-effect_z_on zmin -effect_z_components z "
+
+/* A point with these factors: the derivatives of phi and G by the stretch. */
+static PetscErrorCode check_factors(SbLengthRelation length, const SbFibreRate *rate)
+{
+  const struct _p_SbActive a = {.length = length,
+                                .optimum = 1.05,
+                                .width = 0.4,
+                                .velocity = 1.,
+                                .curvature = 0.3,
+                                .eccentric = 1.4};
+  const PetscReal h = 1e-5;
+  PetscReal worst[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  verify_case("factors, relation %d%s", (int)length, rate ? ", moving" : "");
+  for (int n = 0; n <= 60; n++) {
+    const PetscReal stretch = 0.4037 + n * 0.02;
+    SbPack E, phi, G, c;
+
+    for (int l = 0; l < SB_BATCH; l++)
+      E[l] = (PetscSqr(stretch + (l - 1) * h) - 1.) / 2.;
+    SbActiveFactors(&a, E, rate, phi, G, c);
+    worst[0] = PetscMax(worst[0], PetscAbsReal((phi[2] - phi[0]) / (2. * h) - stretch * G[1]));
+    worst[1] = PetscMax(worst[1], PetscAbsReal((G[2] - G[0]) / (2. * h) - c[1] / stretch));
+    SB_CHECK(G[1] >= 0. && (!rate || c[1] >= 0.), "%s: G = %g, c = %g", verify_title, G[1], c[1]);
+  }
+  VERIFY_LESS(worst[0], 1e-7, "error of the derivative of the energy");
+  VERIFY_LESS(worst[1], 1e-5, "error of the derivative of the factor");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* The displacement of the corner at (1, 1, 1) m at the end of a run, m. */
 static PetscErrorCode corner_of(PetscReal u[3], const char *format, ...)
@@ -660,9 +691,18 @@ int main(int argc, char **argv)
   static const char *const laws[] = {"linear",     "corotated",         "stvk",
                                      "neohookean", "stable_neohookean", "holmes_mow"};
   PetscMPIInt size;
+  SbFibreRate rate = {.slope = 2.5};
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (int l = 0; l < SB_BATCH; l++) {
+    rate.start[l] = rate.expected[l] = 1.;
+    rate.v[l] = -0.2;
+  }
+  for (int k = 0; k < 3; k++) {
+    PetscCall(check_factors((SbLengthRelation)k, NULL));
+    PetscCall(check_factors((SbLengthRelation)k, &rate));
+  }
   for (int k = 0; k < 4; k++)
     PetscCall(check_contraction(elements[k], "none", 1., 1.));
   PetscCall(check_contraction("p1", "parabola", 1.1, 0.6));

@@ -188,6 +188,14 @@ int main(int argc, char **argv)
     "-effects gravity,hold -effect_hold_type fixed -effect_hold_on bar.xmin -time genalpha "
     "-ts_dt 0.01 -ts_max_time 0.2 -snes_rtol 1e-9 -solver direct"));
   PetscCall(
+    check("active", 1e-8,
+          TWO "-body_bar_material neohookean -body_bar_fibre 1;z;0 -body_bar_active_tension "
+              "5e3*(1+x)*sin(8*t)^2 -body_bar_active_velocity 4 -body_bar_element p2 "
+              "-body_block_material stvk -body_block_fibre 0,0,1 -body_block_active_tension 2e3 "
+              "-body_block_active_length gaussian -effects gravity,hold -effect_hold_type fixed "
+              "-effect_hold_on bar.xmin -time genalpha -ts_dt 0.01 -ts_max_time 0.2 -snes_rtol "
+              "1e-9 -solver direct"));
+  PetscCall(
     check("explicit, consistent mass", 1e-10,
           TWO CLAMP
           "-body_bar_material corotated -body_block_material stvk -effects gravity,clamp "
