@@ -218,7 +218,8 @@ static PetscErrorCode check_isometric(const char *law, const char *constants, co
   const PetscReal q[2] = {0.6 * PetscCosReal(angle) - 0.8 * PetscSinReal(angle),
                           0.6 * PetscSinReal(angle) + 0.8 * PetscCosReal(angle)};
   const PetscReal exact[6] = {T * q[0] * q[0], T * q[1] * q[1], 0., T * q[0] * q[1], 0., 0.};
-  PetscReal stress[6];
+  const PetscReal *u;
+  PetscReal stress[6], *tension;
   PetscReal worst = 0.;
   TestScene t;
 
@@ -236,6 +237,16 @@ static PetscErrorCode check_isometric(const char *law, const char *constants, co
   for (int k = 0; k < 6; k++)
     worst = PetscMax(worst, PetscAbsReal(stress[k] - exact[k]));
   VERIFY_LESS(worst / T, 1e-9, "error of the stress over the tension");
+
+  /* the field of the tensions */
+  PetscCall(PetscMalloc1(t.model->mesh->ncell_owned, &tension));
+  PetscCall(SbSpaceGetLocalRead(t.model->space, t.run->state.U, &u));
+  SbSpaceActiveTension(t.model->space, u, tension);
+  PetscCall(SbSpaceRestoreLocalRead(t.model->space, t.run->state.U, &u));
+  for (PetscInt c = 0; c < t.model->mesh->ncell_owned; c++)
+    SB_CHECK(PetscAbsReal(tension[c] - T) < 1e-9 * T, "%s: tension %g Pa", verify_title,
+             tension[c]);
+  PetscCall(PetscFree(tension));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
