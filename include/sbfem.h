@@ -269,6 +269,8 @@ PetscErrorCode SbSpaceMeanHistory(SbSpace space, const PetscBool of_body[], Pets
                          derivative is their force. Not collective.
   SbSpaceAddActiveForce - f[nnode][3] += the force of the fibres on the nodes, N, right on owned
                          ones. Not collective.
+  SbSpaceActiveStrainWork - work of active strains of this rank's cells since the last call, which
+                         ended a step as this one does, J; 0 at the first one. Not collective.
   SbSpaceActiveTension - per owned cell: the tension times its factors by length and velocity, Pa,
                          value[ncell_owned]; 0: none. Not collective.
 */
@@ -276,6 +278,7 @@ PetscErrorCode SbSpaceActiveAt(SbSpace space, PetscReal t, PetscReal load);
 PetscErrorCode SbSpaceActiveMost(SbSpace space, PetscReal from, PetscReal to);
 PetscErrorCode SbSpaceActiveRates(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
 PetscReal SbSpaceActiveEnergy(SbSpace space, const PetscReal u[]);
+PetscReal SbSpaceActiveStrainWork(SbSpace space, const PetscReal u[], PetscBool first);
 void SbSpaceAddActiveForce(SbSpace space, const PetscReal u[], PetscReal f[]);
 void SbSpaceActiveTension(SbSpace space, const PetscReal u[], PetscReal value[]);
 

@@ -156,6 +156,10 @@ struct _p_SbMaterial {
   /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
      state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
   const SbPack *axes;
+  /* of a copy by SbActiveStrain(), else NULL: the law, borrowed; of a batch, along and across its
+     fibres the inverse of their stretch without stress, [2] */
+  const struct _p_SbMaterial *inner;
+  const SbPack *shortening;
 };
 
 /* Where the axes of a law with fibres come from: formulas of the place; fields of the mesh file; or
@@ -180,9 +184,13 @@ struct _p_SbActive {
   char option[3 * SB_NAME_MAX]; /* name of its option, */
   SbFormula tension;            /* which it has, Pa */
   PetscBool steady;             /* not a formula of t */
-  SbLengthRelation length;      /* of force and length, */
-  PetscReal optimum, width;     /* the stretch of the largest force, and a measure of its range */
-  PetscReal velocity; /* of shortening without force, 1/s; 0: force does not depend on it */
+  /* the same of the strain without stress, with the formula 0 where there is none */
+  char strain_option[3 * SB_NAME_MAX];
+  SbFormula strain;
+  PetscBool strain_steady, strains;
+  SbLengthRelation length;  /* of force and length, */
+  PetscReal optimum, width; /* the stretch of the largest force, and a measure of its range */
+  PetscReal velocity;       /* of shortening without force, 1/s; 0: force does not depend on it */
   PetscReal curvature, eccentric; /* of Hill's hyperbola; largest force in lengthening */
 };
 /* At a point in a step: the stretch of the fibres at its start, that expected at the time of the
@@ -260,6 +268,15 @@ void SbViscousSetElapsed(SbMaterial m, PetscReal elapsed);
    collective. */
 PetscErrorCode SbActiveTension(const struct _p_SbActive *active, PetscReal t, const PetscReal x[3],
                                PetscReal *tension);
+/* The same of the strain without stress, above -1, times `load` if it does not depend on t. */
+PetscErrorCode SbActiveStrainAt(const struct _p_SbActive *active, PetscReal t, PetscReal load,
+                                const PetscReal x[3], PetscReal *strain);
+/* Makes m, a copy of `law` with its axes, the law of the elastic part of F: psi(F A), A = a f f^T +
+   b (1 - f f^T), shortening = {a, b}. Not collective. */
+void SbActiveStrain(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,
+                    const SbPack shortening[2]);
+/* Of such a law the derivative of psi by the strain g, a = 1/(1 + g), b = sqrt(1 + g); J/m^3. */
+void SbActiveStrainForce(const struct _p_SbMaterial *m, const SbPack F[9], SbPack force);
 /* At the strain E = (l^2 - 1)/2 of fibres: their energy phi over the tension, the factor G of the
    stress, and c = l dG/dl. rate: NULL without a velocity. Not collective. */
 void SbActiveFactors(const struct _p_SbActive *active, const SbPack E, const SbFibreRate *rate,

@@ -129,7 +129,9 @@ PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
 /* Fibres that contract have from now on the tensions at t, s; static: the load factor. Residuals
    and tangents do it by themselves. Not collective. */
 PetscErrorCode SbModelActiveAt(SbModel model, PetscReal t);
-/* Their force on the nodes at t, F[nnode][3] N. Collective. */
-PetscErrorCode SbModelActiveForce(SbModel model, PetscReal t, Vec U, Vec F);
+/* Their force on the nodes at t, F[nnode][3] N; the work of active strains since the last call, J,
+   0 for the first one. Collective. */
+PetscErrorCode SbModelActiveForce(SbModel model, PetscReal t, Vec U, PetscBool first, Vec F,
+                                  PetscReal *work);
 /* Power dissipated by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

@@ -244,6 +244,22 @@ typedef struct {
   const SbPack *weight;    /* [n] fractions of the volume */
 } SbPoints;
 SbPoints SbBatchPoints(SbSpace space, PetscInt b);
+/* active.c: tensions of the fibres of a region that contract, and what they are of: the time, or
+   the load. */
+struct _p_SbContraction {
+  SbPack *tension; /* [batches] Pa */
+  SbPack *most;    /* [batches] their largest values by SbSpaceActiveMost(), or 0 */
+  PetscReal at;
+  PetscBool known;
+  /* with an active strain, else NULL, [batches]: strains, those of SbActiveStrain() ([2]), and at
+     the last SbSpaceActiveStrainWork() the force on a strain, J, and the strain */
+  SbPack *strain, *shortening, *force, *before;
+  PetscReal strain_at;
+  PetscBool strain_known;
+  int npoint;
+  SbFibreRate *rate; /* [batches][npoint] with a velocity, else NULL */
+  PetscBool moving;  /* it is known: not in static runs */
+};
 /* A law of a region as its operations take it for batch b: itself or, of a law with fibres, `own`,
    a copy with the axes of these cells. */
 SB_INLINE const struct _p_SbMaterial *SbBatchAxes(const SbRegion *region,
@@ -254,6 +270,9 @@ SB_INLINE const struct _p_SbMaterial *SbBatchAxes(const SbRegion *region,
     return law;
   *own = *law;
   own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
+  if (region->contraction && region->contraction->shortening)
+    SbActiveStrain(own, law,
+                   (const SbPack *)region->contraction->shortening + 2 * (b - region->bstart));
   return own;
 }
 /* The same; of a viscoelastic material the law of the step, to which SbViscousStress() and its
@@ -297,17 +316,7 @@ void SbViscousPressure(const SbRegion *region, PetscInt b, int q, SbPack p);
 void SbViscousMean(const SbRegion *region, PetscInt b, PetscBool energy, PetscReal *factor,
                    const PetscReal **constant);
 
-/* active.c: tensions of the fibres of a region that contract, and what they are of: the time, or
-   the load. */
-struct _p_SbContraction {
-  SbPack *tension; /* [batches] Pa */
-  SbPack *most;    /* [batches] their largest values by SbSpaceActiveMost(), or 0 */
-  PetscReal at;
-  PetscBool known;
-  int npoint;
-  SbFibreRate *rate; /* [batches][npoint] with a velocity, else NULL */
-  PetscBool moving;  /* it is known: not in static runs */
-};
+/* active.c */
 PetscErrorCode SbActiveCreate(SbSpace space);
 PetscErrorCode SbActiveDestroyRegion(SbRegion *region);
 /* At point q of batch b of such a region with F: adds to P and to the blocks K of the tangent of a

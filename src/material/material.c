@@ -37,6 +37,9 @@ static const SbOption body_rows[] = {
    "fibres that contract: second Piola-Kirchhoff stress along them beside that of the law, at "
    "least "
    "0; a formula of the time and the rest position, or table:FILE; 0: they do not"},
+  {"active_strain", SB_OPTION_FORMULA, 1, "", "0", "",
+   "fibres that contract, another way: strain at which they are without stress, above -1, negative "
+   "where they shorten, at constant volume; a formula as that of active_tension"},
   {"active_length", SB_OPTION_CHOICE, 1, "", "none", "none|parabola|gaussian",
    "factor on the tension at a stretch l of the fibres, with z = (l - active_optimum) / "
    "active_width: parabola, max(0, 1 - z^2); gaussian, exp(-z^2)"},

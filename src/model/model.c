@@ -283,7 +283,8 @@ PetscErrorCode SbModelActiveAt(SbModel m, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, Vec F)
+PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, PetscBool first, Vec F,
+                                  PetscReal *work)
 {
   SbEvaluation e = {.U = U, .F = F};
 
@@ -291,7 +292,9 @@ PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, Vec F)
   PetscCall(SbModelActiveAt(m, t));
   PetscCall(SbEvaluationBegin(m, t, &e));
   SbSpaceAddActiveForce(m->space, e.stage.u, e.f);
+  *work = SbSpaceActiveStrainWork(m->space, e.stage.u, first);
   PetscCall(SbEvaluationEnd(m, &e));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, work, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

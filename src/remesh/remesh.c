@@ -369,8 +369,11 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   }
   PetscCall(PetscFree(momenta));
   PetscCall(SbEffectsHandOver(before, run, &result->renamed));
-  if (s.model->dynamic)
+  PetscCall(SbModelActiveAt(s.model, run->clock.t));
+  if (s.model->dynamic) {
     PetscCall(SbSpaceViscousAt(s.model->space, 0., PETSC_FALSE, run->state.U, run->state.V));
+    PetscCall(SbSpaceActiveRates(s.model->space, 0., PETSC_FALSE, run->state.U, run->state.V));
+  }
 
   // penalty of CR and DG for the new state, before accelerations and energies are computed
   if (run->solve.J && s.model->dynamic && run->solve.preset != SB_TIME_ALPHA2)

@@ -52,8 +52,10 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
                      own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
   Vec active = NULL;
+  PetscReal strained;
 
   PetscFunctionBeginUser;
+  PetscCall(SbModelActiveAt(m, t));
   PetscCall(SbModelEnergies(m, run->state.U, run->state.V, e));
   PetscCall(VecDuplicate(run->state.U, &loads));
   PetscCall(VecDuplicate(run->state.U, &reaction));
@@ -66,7 +68,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (m->space->active) {
     PetscCall(VecDuplicate(run->state.U, &active));
-    PetscCall(SbModelActiveForce(m, t, run->state.U, active));
+    PetscCall(SbModelActiveForce(m, t, run->state.U, first, active, &strained));
+    e->active_work += strained;
   }
   if (run->solve.damped)
     PetscCall(SbModelDampingPower(m, run->state.U, run->state.V, &power));

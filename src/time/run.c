@@ -101,10 +101,15 @@ static PetscErrorCode check_rigid(const SbBody *body, SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Integrators that a relation of force and velocity does not go with. */
+/* Integrators that an active strain, and a relation of force and velocity, do not go with. */
 static PetscErrorCode check_active(const SbMaterial m, PetscBool body, SbRun r)
 {
   PetscFunctionBeginUser;
+  if (m->active && m->active->strains)
+    PetscCheck(!SbRunIsExplicit(r), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: the stable step of explicit integrators does not know how stiff it makes a "
+               "body; take -time euler_implicit, newmark or genalpha",
+               m->active->strain_option);
   if (!m->active || m->active->velocity == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(!SbRunIsExplicit(r) && r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
@@ -408,6 +413,7 @@ PetscErrorCode SbRunSolve(SbRun run)
     run->clock.wall_start = MPI_Wtime();
   run->clock.paused = PETSC_FALSE;
   run->monitors.last.U = NULL;
+  PetscCall(SbModelActiveAt(m, run->clock.t0));
   PetscCall(start_contacts(run));
   PetscCall(SbSpaceDescribeInverted(m->space, run->state.U, sizeof(inverted), inverted));
   PetscCheck(!inverted[0], m->comm, PETSC_ERR_USER_INPUT, "The run cannot start: %s", inverted);

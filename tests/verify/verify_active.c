@@ -6,6 +6,8 @@
     contraction  a free block of the law neohookean, whose fibres run along x: the stretches for
                  which its stress is zero in all directions, with each relation of force and length,
                  all elements; static and, at rest again, dynamic
+    strain       a free block with an active strain is without stress, and a held one has the stress
+                 of the law at its inverse, all elements
     isometric    a block that is held all around: its stress is that of the tension alone, T f f^T,
                  all laws; turned, it turns along
     velocity     a block whose fibres are stretched and shortened: their stress with a relation of
@@ -162,26 +164,6 @@ static PetscErrorCode check_contraction(const char *element, const char *relatio
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same at the end of a slow motion with damping. */
-static PetscErrorCode check_dynamic(const char *element, const char *time)
-{
-  PetscReal a, b, u[3];
-
-  PetscFunctionBeginUser;
-  verify_case("contraction, %s, %s", element, time);
-  solve_stretches("none", 2e4, 1., 1., &a, &b);
-  PetscCall(corner_of(u,
-                      CUBE FREE
-                      "-body_cube_material neohookean -body_cube_element %s -time %s -ts_dt 0.05 "
-                      "-ts_max_time 2 -body_cube_active_tension 2e4*min(t,1) "
-                      "-effects x,y,z,slow -effect_slow_type damping -effect_slow_on cube "
-                      "-effect_slow_alpha 1e4",
-                      element, time));
-  VERIFY_NEAR(u[0], a - 1., 1e-6, "shortening of the block");
-  VERIFY_NEAR(u[2], b - 1., 1e-6, "its widening");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mean Cauchy stress over the volume, Pa, xx yy zz xy yz xz. */
 static PetscErrorCode mean_stress(TestScene *t, PetscReal mean[6])
 {
@@ -206,6 +188,62 @@ static PetscErrorCode mean_stress(TestScene *t, PetscReal mean[6])
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 7, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   for (int k = 0; k < 6; k++)
     mean[k] = sum[k] / sum[6];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An active strain g alone: a free block has the stretches 1 + g and (1 + g)^(-1/2) and no energy;
+   a held one the stress of F_a^-1, mu (a^2 - 1) along its fibres and mu (1/a - 1) across. */
+static PetscErrorCode check_strain(const char *law, const char *element)
+{
+  const PetscReal g = -0.2;
+  const PetscReal a = 1. / (1. + g);
+  const PetscReal exact[6] = {MU * (a * a - 1.), MU * (1. / a - 1.), MU * (1. / a - 1.)};
+  PetscReal u[3], stress[6];
+  PetscReal worst = 0.;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  verify_case("strain, %s, %s", law, element);
+  PetscCall(corner_of(u,
+                      CUBE FREE "-body_cube_material %s -body_cube_element %s -time static "
+                                "-body_cube_active_strain -0.2 -static_steps 2",
+                      law, element));
+  VERIFY_NEAR(u[0], g, 1e-9, "shortening of the block");
+  VERIFY_NEAR(u[1], 1. / PetscSqrtReal(1. + g) - 1., 1e-9, "its widening in y");
+  VERIFY_NEAR(u[2], 1. / PetscSqrtReal(1. + g) - 1., 1e-9, "its widening in z");
+  if (strcmp(law, "neohookean"))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(test_open(&t,
+                      CUBE "-body_cube_material %s -body_cube_element %s -sets skin -set_skin_at "
+                           "body:cube -effects hold -effect_hold_type fixed -effect_hold_on skin "
+                           "-time static -body_cube_active_strain -0.2*t",
+                      law, element));
+  PetscCall(verify_solve(&t, verify_title));
+  PetscCall(mean_stress(&t, stress));
+  for (int k = 0; k < 6; k++)
+    worst = PetscMax(worst, PetscAbsReal(stress[k] - exact[k]));
+  VERIFY_LESS(worst / MU, 1e-9, "error of the stress of a held block, over mu");
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Contraction at the end of a slow motion with damping. */
+static PetscErrorCode check_dynamic(const char *element, const char *time)
+{
+  PetscReal a, b, u[3];
+
+  PetscFunctionBeginUser;
+  verify_case("contraction, %s, %s", element, time);
+  solve_stretches("none", 2e4, 1., 1., &a, &b);
+  PetscCall(corner_of(u,
+                      CUBE FREE
+                      "-body_cube_material neohookean -body_cube_element %s -time %s -ts_dt 0.05 "
+                      "-ts_max_time 2 -body_cube_active_tension 2e4*min(t,1) "
+                      "-effects x,y,z,slow -effect_slow_type damping -effect_slow_on cube "
+                      "-effect_slow_alpha 1e4",
+                      element, time));
+  VERIFY_NEAR(u[0], a - 1., 1e-6, "shortening of the block");
+  VERIFY_NEAR(u[2], b - 1., 1e-6, "its widening");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -335,7 +373,7 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
 /* Beside a bar that contracts unevenly; moving: in a step whose fibres have a relation of force and
    velocity, too. */
 static PetscErrorCode check_tangent(const char *law, const char *element, const char *relation,
-                                    PetscBool moving)
+                                    PetscBool moving, const char *constants)
 {
   PetscReal error[2], psi[2], slope, size, force;
   PetscInt n;
@@ -343,12 +381,13 @@ static PetscErrorCode check_tangent(const char *law, const char *element, const 
   Vec X, D, R, R0, AD;
 
   PetscFunctionBeginUser;
-  verify_case("tangent, %s, %s, %s%s", law, element, relation, moving ? ", moving" : "");
+  verify_case("tangent, %s, %s, %s%s, %s", law, element, relation, moving ? ", moving" : "",
+              constants);
   PetscCall(test_open(&t, BENT "-body_bar_tangent exact", law, element, relation, 0.9,
                       moving ? "-time genalpha -ts_dt 0.002 -ts_max_time 0.04 "
                                "-body_bar_active_tension 2e4*(1+x)*ramp(50*t) "
                                "-body_bar_active_velocity 3"
-                             : ""));
+                             : constants));
   PetscCall(verify_solve(&t, verify_title));
   if (moving)
     PetscCall(
@@ -448,6 +487,8 @@ static PetscErrorCode check_filtered(const char *law, const char *element)
   "-body_bar_active_tension 5e3*(1+x)*sin(20*t)^2 -body_bar_active_length gaussian -time %s "   \
   "-body_bar_element %s -snes_rtol 1e-10 -solver direct "
 
+#define STRAIN "-body_bar_active_tension 0 -body_bar_active_strain -0.1*(1+x)*sin(20*t)^2"
+
 /* order: of the error of the balance; integrators that damp lose energy themselves. */
 static PetscErrorCode check_balance(const char *element, const char *time, const char *constants,
                                     PetscReal order)
@@ -461,7 +502,8 @@ static PetscErrorCode check_balance(const char *element, const char *time, const
     const SbEnergies *e;
     TestScene t;
 
-    PetscCall(test_open(&t, BAR "-ts_dt %.17g -ts_max_time 0.08", time, element, 0.002 / (1 << k)));
+    PetscCall(test_open(&t, BAR "-ts_dt %.17g -ts_max_time 0.08 %s", time, element,
+                        0.002 / (1 << k), constants));
     t.run->monitors.want_energies = PETSC_TRUE;
     PetscCall(verify_solve(&t, verify_title));
     e = &t.run->state.energies;
@@ -477,8 +519,8 @@ static PetscErrorCode check_balance(const char *element, const char *time, const
   }
   VERIFY_LESS(error[2], 0.02, "error of the balance over the work");
   VERIFY_NEAR(PetscLog2Real(error[1] / error[2]), order, 0.3, "order of the balance");
-  VERIFY_NEAR(PetscLog2Real((u[0][0] - u[1][0]) / (u[1][0] - u[2][0])), order, 0.3,
-              "order of the displacement");
+  VERIFY_LESS(order - PetscLog2Real((u[0][0] - u[1][0]) / (u[1][0] - u[2][0])), 0.3,
+              "order less that of the displacement");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -543,7 +585,7 @@ static PetscErrorCode check_explicit(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_restart(const char *time, const char *element)
+static PetscErrorCode check_restart(const char *time, const char *element, const char *constants)
 {
   const char *folder = getenv("TMPDIR");
   char dir[256];
@@ -555,13 +597,13 @@ static PetscErrorCode check_restart(const char *time, const char *element)
   TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("restart, %s, %s", time, element);
+  verify_case("restart, %s, %s, %s", time, element, constants);
   PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   PetscCall(PetscSNPrintf(dir, sizeof(dir), "%s/active_%d", folder ? folder : "/tmp", id));
   PetscCall(test_open_in(dir, &t,
                          BAR "-ts_dt 0.005 -ts_max_time 0.1 -checkpoint_every_steps 10 "
-                             "-checkpoint_keep 9 -output_fields none -progress false",
-                         time, element));
+                             "-checkpoint_keep 9 -output_fields none -progress false %s",
+                         time, element, constants));
   PetscCall(verify_solve(&t, verify_title));
   n = 3 * verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->state.U, &whole));
@@ -570,8 +612,8 @@ static PetscErrorCode check_restart(const char *time, const char *element)
   PetscCall(
     test_open_in(dir, &t,
                  BAR "-ts_dt 0.005 -ts_max_time 0.1 -checkpoint_every_steps 10 -checkpoint_keep 9 "
-                     "-output_fields none -progress false -restart %s/checkpoint_000010.h5",
-                 time, element, dir));
+                     "-output_fields none -progress false -restart %s/checkpoint_000010.h5 %s",
+                 time, element, dir, constants));
   PetscCall(verify_solve(&t, verify_title));
   PetscCall(verify_gather(t.model, t.run->state.U, &again));
   work[1] = t.run->state.energies.active_work;
@@ -588,20 +630,20 @@ static PetscErrorCode check_restart(const char *time, const char *element)
 }
 
 /* A finer bar, whose mesh hardly matters, is meshed anew on the way. */
-static PetscErrorCode check_remesh(void)
+static PetscErrorCode check_remesh(const char *constants)
 {
   PetscReal work[2], centre[2];
 
   PetscFunctionBeginUser;
-  verify_case("re-meshing");
+  verify_case("re-meshing, %s", constants);
   for (int k = 0; k < 2; k++) {
     TestScene t;
 
     PetscCall(test_open(&t,
                         BAR
                         "-body_bar_mesh box:0.4,0.1,0.1:4 -effects hold -effect_hold_type fixed "
-                        "-effect_hold_on xmin -ts_dt 0.005 -ts_max_time 0.08 %s",
-                        "genalpha", "p2", k ? "-remesh_times 0.04" : ""));
+                        "-effect_hold_on xmin -ts_dt 0.005 -ts_max_time 0.08 %s %s",
+                        "genalpha", "p2", constants, k ? "-remesh_times 0.04" : ""));
     t.run->monitors.want_energies = PETSC_TRUE;
     PetscCall(test_scene_solve(&t));
     SB_CHECK(!t.run->clock.stop_reason[0] && t.run->clock.t > 0.0799, "%s: %g s, %s", verify_title,
@@ -668,6 +710,16 @@ static PetscErrorCode check_errors(void)
      "-body_cube_active_velocity|-time", PETSC_ERR_USER, PETSC_FALSE},
     {"-body_cube_material stvk -body_cube_fibre 1,0,0 -body_cube_active_tension 1e4*x-9e3",
      "-body_cube_active_tension|-", PETSC_ERR_USER_INPUT, PETSC_TRUE},
+    {"-body_cube_material stvk -body_cube_fibre 1,0,0 -body_cube_active_strain -0.1",
+     "-body_cube_active_strain|stvk", PETSC_ERR_USER, PETSC_FALSE},
+    {"-body_cube_material neohookean -body_cube_fibre 1,0,0 -body_cube_active_strain -0.1 "
+     "-body_cube_prony_times 1 -body_cube_prony_shear 0.1",
+     "-body_cube_active_strain|prony_times", PETSC_ERR_USER, PETSC_FALSE},
+    {"-body_cube_material neohookean -body_cube_fibre 1,0,0 -body_cube_active_strain -0.1 "
+     "-time euler_symplectic -ts_max_time 1",
+     "-body_cube_active_strain|-time", PETSC_ERR_USER, PETSC_FALSE},
+    {"-body_cube_material neohookean -body_cube_fibre 1,0,0 -body_cube_active_strain 0-1-x",
+     "-body_cube_active_strain|-1", PETSC_ERR_USER_INPUT, PETSC_TRUE},
     {"-body_cube_material stvk -body_cube_fibre 1,0,0 -body_cube_active_tension log(t-2)",
      "-body_cube_active_tension|log(t-2)|number", PETSC_ERR_USER_INPUT, PETSC_TRUE},
     {"-body_cube_material stvk -body_cube_fibre 1,0,0 -body_cube_active_tension table:none.txt",
@@ -718,6 +770,10 @@ int main(int argc, char **argv)
     PetscCall(check_contraction(elements[k], "none", 1., 1.));
   PetscCall(check_contraction("p1", "parabola", 1.1, 0.6));
   PetscCall(check_contraction("p2", "gaussian", 0.9, 0.4));
+  for (int k = 0; k < 4; k++) {
+    PetscCall(check_strain("neohookean", elements[k]));
+    PetscCall(check_strain(k % 2 ? "isochoric_neohookean" : "stable_neohookean", elements[k]));
+  }
   PetscCall(check_dynamic("p1", "genalpha"));
   PetscCall(check_dynamic("p2", "euler_implicit"));
   PetscCall(check_dynamic("cr", "genalpha"));
@@ -733,27 +789,35 @@ int main(int argc, char **argv)
   PetscCall(check_velocity("cr", "euler_implicit", 0.24, 1.));
   PetscCall(check_load());
   for (int l = 1; l < 6; l++)
-    PetscCall(check_tangent(laws[l], elements[l % 4], relations[l % 3], PETSC_FALSE));
-  PetscCall(check_tangent("corotated", "p1", "parabola", PETSC_FALSE));
-  PetscCall(check_tangent("neohookean", "p2", "gaussian", PETSC_FALSE));
-  PetscCall(check_tangent("stvk", "p1", "none", PETSC_TRUE));
-  PetscCall(check_tangent("stable_neohookean", "p2", "gaussian", PETSC_TRUE));
-  PetscCall(check_tangent("corotated", "dg", "parabola", PETSC_TRUE));
+    PetscCall(check_tangent(laws[l], elements[l % 4], relations[l % 3], PETSC_FALSE, ""));
+  PetscCall(check_tangent("corotated", "p1", "parabola", PETSC_FALSE, ""));
+  PetscCall(check_tangent("neohookean", "p2", "gaussian", PETSC_FALSE, ""));
+  PetscCall(check_tangent("stvk", "p1", "none", PETSC_TRUE, ""));
+  PetscCall(check_tangent("stable_neohookean", "p2", "gaussian", PETSC_TRUE, ""));
+  PetscCall(check_tangent("corotated", "dg", "parabola", PETSC_TRUE, ""));
+  for (int k = 0; k < 4; k++)
+    PetscCall(check_tangent(k % 2 ? "stable_neohookean" : "holmes_mow", elements[k], "none",
+                            PETSC_FALSE, "-body_bar_active_strain -0.15*(1+x)*t"));
+  PetscCall(check_tangent("guccione", "p2", "none", PETSC_FALSE,
+                          "-body_bar_c 2e3 -body_bar_bf 8 -body_bar_bt 2 -body_bar_bfs 4 "
+                          "-body_bar_active_strain -0.15*(1+x)*t"));
   PetscCall(check_filtered("stable_neohookean", "p1"));
   PetscCall(check_filtered("corotated", "p2"));
   if (size == 1) {
     PetscCall(check_balance("p1", "newmark", "", 2.));
     PetscCall(check_balance("p2", "newmark", "-body_bar_active_velocity 2", 2.));
     PetscCall(check_balance("cr", "genalpha", "", 2.));
+    PetscCall(check_balance("p2", "newmark", STRAIN, 2.));
     PetscCall(check_explicit("p1"));
     PetscCall(check_explicit("cr"));
-    PetscCall(check_remesh());
+    PetscCall(check_remesh("-body_bar_active_velocity 3"));
+    PetscCall(check_remesh(STRAIN));
     PetscCall(check_solvers("corotated", "p1"));
     PetscCall(check_solvers("neohookean", "p2"));
   }
   PetscCall(check_inclusion());
-  PetscCall(check_restart("genalpha", "dg"));
-  PetscCall(check_restart("newmark", "p2"));
+  PetscCall(check_restart("genalpha", "dg", STRAIN));
+  PetscCall(check_restart("newmark", "p2", "-body_bar_active_velocity 3"));
   PetscCall(check_errors());
   SB_TEST_END();
 }
