@@ -1,6 +1,6 @@
 /*
-  Fibres that contract (src/material/active.c has the law): the tension of each cell, its stress,
-  energy and tangent at the points of the cell.
+  Fibres that contract (src/material/active.c has the law): the tension and the strain of each cell,
+  their energy, force and work. active_stress.c has the stress and the tangent.
 
   A tension is evaluated at the centre of a tet, where its fibre is, of owned cells and ghosts
   alike, and only when evaluations are of another time than before. In a static run one without t
@@ -16,50 +16,10 @@
 
   An active strain changes the law of a batch (SbBatchAxes()) and the energy that it stores: its
   work in a step is (q_0 + q_1)/2 (g_1 - g_0), q the derivative of the energy by the strain g.
-
-  Laws: at F = 1 + H the strain of a fibre is E = f . H f + |H f|^2 / 2; linear: f . H f, and the
-  stress is T f f^T, constant.
 */
-#include "fem_impl.h"
-#include "sbkernel.h"
+#include "active.h"
 
 #define SAMPLES 200 /* times of a run at which the largest tension is looked for */
-
-/* Fibres at a point: v = F f, linear: f; phi, G and c as SbActiveFactors(). */
-typedef struct {
-  SbPack f[3], v[3], E, phi, G, c;
-} Fibres;
-
-SB_KERNEL static void strain_of(PetscBool linear, const SbPack Q[restrict 9],
-                                const SbPack F[restrict 9], Fibres *restrict x)
-{
-  for (int l = 0; l < SB_BATCH; l++) {
-    const PetscReal f[3] = {Q[0][l], Q[3][l], Q[6][l]};
-    PetscReal h[3];
-
-    for (int i = 0; i < 3; i++) {
-      h[i] = -f[i];
-      for (int j = 0; j < 3; j++)
-        h[i] += F[3 * i + j][l] * f[j];
-      x->f[i][l] = f[i];
-      x->v[i][l] = linear ? f[i] : f[i] + h[i];
-    }
-    x->E[l] = SbDot3(f, h) + (linear ? 0. : SbDot3(h, h) / 2.);
-  }
-}
-
-/* Those of cells of batch b at point q; returns their tensions, Pa. */
-static const PetscReal *fibres_at(const SbRegion *region, PetscInt b, int q, const SbPack F[9],
-                                  Fibres *x)
-{
-  const struct _p_SbContraction *a = region->contraction;
-  const PetscInt k = b - region->bstart;
-
-  strain_of(region->material->linear, (const SbPack *)region->axes + 9 * k, F, x);
-  SbActiveFactors(region->material->active, x->E, a->moving ? &a->rate[a->npoint * k + q] : NULL,
-                  x->phi, x->G, x->c);
-  return a->tension[k];
-}
 
 /* Arrays of an active strain: none. */
 static PetscErrorCode create_strains(const SbRegion *region)
@@ -279,10 +239,10 @@ void SbActiveStiffest(SbSpace s, const SbRegion *region, const PetscReal x[], Pe
       memset(fe, 0, sizeof(fe));
     SbBatchGradients(s, b, x, PETSC_TRUE, U, H);
     for (int q = 0; q < at.n; q++) {
-      Fibres fibres;
+      SbFibrePoint fibres;
 
-      strain_of(PETSC_FALSE, (const SbPack *)region->axes + 9 * (b - region->bstart),
-                (const SbPack *)H[q], &fibres);
+      SbFibresStrain(PETSC_FALSE, (const SbPack *)region->axes + 9 * (b - region->bstart),
+                     (const SbPack *)H[q], &fibres);
       for (int k = 0; k < 9; k++)
         for (int l = 0; l < SB_BATCH; l++)
           P[k][l] = T[l] * PetscMax(1., G[l] + c[l]) * fibres.v[k / 3][l] * fibres.f[k % 3][l];
@@ -290,62 +250,6 @@ void SbActiveStiffest(SbSpace s, const SbRegion *region, const PetscReal x[], Pe
     }
     sb_scatter_strain(s, b, fe, f);
   }
-}
-
-SB_KERNEL static void add_stress(const PetscReal *restrict T, const Fibres *restrict x,
-                                 SbPack P[restrict 9])
-{
-  for (int k = 0; k < 9; k++)
-    for (int l = 0; l < SB_BATCH; l++)
-      P[k][l] += T[l] * x->G[l] * x->v[k / 3][l] * x->f[k % 3][l];
-}
-
-void SbActiveStress(const SbRegion *region, PetscInt b, int q, const SbPack F[9], SbPack P[9])
-{
-  Fibres x;
-  const PetscReal *T = fibres_at(region, b, q, F, &x);
-
-  add_stress(T, &x, P);
-}
-
-/* K_ab += W T (g_a . f) (g_b . f) (g I + c v v^T / l^2); filtered: without negative eigenvalues. */
-SB_KERNEL static void add_blocks(const PetscReal *restrict T, const Fibres *restrict x,
-                                 PetscBool filtered, const SbPack g[restrict 9], const SbPack W,
-                                 SbPack K[restrict 10][9])
-{
-  SbPack s[4], B[9];
-
-  for (int l = 0; l < SB_BATCH; l++) {
-    const PetscReal c = filtered ? PetscMax(x->c[l], -x->G[l]) : x->c[l];
-    const PetscReal square = PetscMax(1. + 2. * x->E[l], PETSC_MACHINE_EPSILON);
-
-    s[0][l] = 0.;
-    for (int a = 1; a < 4; a++) {
-      s[a][l] = 0.;
-      for (int j = 0; j < 3; j++)
-        s[a][l] += g[3 * (a - 1) + j][l] * x->f[j][l];
-      s[0][l] -= s[a][l];
-    }
-    for (int k = 0; k < 9; k++)
-      B[k][l] =
-        W[l] * T[l] * ((k % 4 ? 0. : x->G[l]) + c * x->v[k / 3][l] * x->v[k % 3][l] / square);
-  }
-  for (int p = 0; p < 10; p++)
-    for (int k = 0; k < 9; k++)
-      for (int l = 0; l < SB_BATCH; l++)
-        K[p][k][l] += s[SbPairA[p]][l] * s[SbPairB[p]][l] * B[k][l];
-}
-
-void SbActiveBlocks(const SbRegion *region, const struct _p_SbMaterial *law, PetscInt b, int q,
-                    const SbPack g[9], const SbPack W, const SbPack F[9], SbPack K[10][9])
-{
-  Fibres x;
-  const PetscReal *T;
-
-  if (law->linear)
-    return;
-  T = fibres_at(region, b, q, F, &x);
-  add_blocks(T, &x, (PetscBool)(law->tangent != SB_TANGENT_EXACT), g, W, K);
 }
 
 PetscReal SbSpaceActiveEnergy(SbSpace s, const PetscReal u[])
@@ -356,13 +260,13 @@ PetscReal SbSpaceActiveEnergy(SbSpace s, const PetscReal u[])
     const SbRegion *region = s->batch_region[b];
     const SbPoints at = SbBatchPoints(s, b);
     SbPack U[30], F[SB_POINTS][9];
-    Fibres x;
+    SbFibrePoint x;
 
     if (!region->contraction)
       continue;
     SbBatchGradients(s, b, u, PETSC_FALSE, U, F);
     for (int q = 0; q < at.n; q++) {
-      const PetscReal *T = fibres_at(region, b, q, (const SbPack *)F[q], &x);
+      const PetscReal *T = SbFibresAt(region, b, q, (const SbPack *)F[q], &x);
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++)
         sum += at.weight[q][l] * (*at.V)[l] * T[l] * x.phi[l];
@@ -432,7 +336,7 @@ void SbSpaceActiveTension(SbSpace s, const PetscReal u[], PetscReal value[])
     const SbRegion *region = s->batch_region[b];
     const SbPoints at = SbBatchPoints(s, b);
     SbPack U[30], F[SB_POINTS][9];
-    Fibres x;
+    SbFibrePoint x;
 
     for (PetscInt l = 0; l < s->batch_n[b]; l++)
       value[s->batch_cell[b] + l] = 0.;
@@ -440,7 +344,7 @@ void SbSpaceActiveTension(SbSpace s, const PetscReal u[], PetscReal value[])
       continue;
     SbBatchGradients(s, b, u, PETSC_FALSE, U, F);
     for (int q = 0; q < at.n; q++) {
-      const PetscReal *T = fibres_at(region, b, q, (const SbPack *)F[q], &x);
+      const PetscReal *T = SbFibresAt(region, b, q, (const SbPack *)F[q], &x);
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++)
         value[s->batch_cell[b] + l] += at.weight[q][l] * T[l] * x.G[l];
