@@ -24,6 +24,23 @@ def history(folder):
     return {name: numpy.array([float(row[k]) for row in rows]) for k, name in enumerate(names)}
 
 
+count = 0
+
+
 def check(good, text):
+    """Counts a check, and ends the script with the text where it fails."""
+    global count
+    count += 1
     if not good:
         sys.exit(text)
+
+
+def near(value, expected, tolerance, what):
+    """The same for a number that is to be expected within an absolute tolerance."""
+    print(f"{what}: {value:.9g}, expected {expected:.9g}")
+    check(abs(value - expected) <= tolerance, f"{what} is {value:.12g}, expected {expected:.12g} within {tolerance:g}")
+
+
+def finish():
+    """The last line of a script."""
+    print(f"{count} passed, 0 failed")
