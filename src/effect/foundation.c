@@ -206,6 +206,8 @@ static PetscErrorCode history_foundation(SbEffect e, SbSpace space, const SbStag
 
   PetscFunctionBeginUser;
   (void)residual;
+  if (!SbEffectActs(e, stage->t))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(factor_at(e, stage->t, &s));
   for (PetscInt k = 0; k < b->n; k++) {
     const Point *at = &b->point[k];

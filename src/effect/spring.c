@@ -32,6 +32,7 @@ typedef struct {
   SbFormula length, tension, displacement[3]; /* m, N, m; length NULL: that at rest */
   PetscReal stiffness, damping;               /* N/m, N s/m */
   PetscBool slack;
+  PetscBool given; /* a tension, or the length */
   PetscInt n;
   LinePoint *point; /* [n] */
   PetscReal rest;   /* length at rest, m */
@@ -155,7 +156,7 @@ static PetscErrorCode read_points(SbEffect e, const SbScope *scope)
 static PetscErrorCode options_line(SbEffect e, const SbScope *scope)
 {
   Line *line = (Line *)e->data;
-  PetscBool given[4];
+  PetscBool given[3];
   PetscBool ground = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -180,6 +181,7 @@ static PetscErrorCode options_line(SbEffect e, const SbScope *scope)
     PetscCall(SbEffectFormulas(e, scope, "length", 1, PETSC_FALSE, &line->length));
   PetscCall(SbEffectFormulas(e, scope, "tension", 1, PETSC_FALSE, &line->tension));
   PetscCall(SbEffectFormulas(e, scope, "displacement", 3, PETSC_FALSE, line->displacement));
+  line->given = (PetscBool)(given[0] || given[1]);
   for (PetscInt p = 0; p < line->n; p++)
     ground = (PetscBool)(ground || line->point[p].ground);
   PetscCheck(!given[2] || ground, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -201,6 +203,13 @@ static PetscErrorCode find_body(SbEffect e, SbSpace space, const LinePoint *p, P
 
   PetscFunctionBeginUser;
   *body = -1;
+  for (PetscInt b = 0; b < mesh->nbody && p->ground; b++)
+    PetscCheck(strcmp(mesh->body[b].name, GROUND), space->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_points: `" GROUND ":` is a point in space, and there is a body of that "
+               "name: give the body another one",
+               e->name);
+  if (p->ground)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < mesh->nbody && p->body[0]; b++)
     if (!strcmp(mesh->body[b].name, p->body))
       *body = b;
@@ -234,9 +243,9 @@ static PetscErrorCode couplings_line(SbEffect e, SbSpace space)
     LinePoint *p = &line->point[i];
     PetscInt body;
 
+    PetscCall(find_body(e, space, p, &body));
     if (p->ground)
       continue;
-    PetscCall(find_body(e, space, p, &body));
     PetscCall(SbPlaceFind(space, option, body, p->x, &place[i]));
     if (place[i].off > OUTSIDE * SbBoxDiagonal(mesh->body[place[i].body].bbox))
       PetscCall(
@@ -279,8 +288,17 @@ static PetscErrorCode couplings_line(SbEffect e, SbSpace space)
 
   /* the length at rest */
   line->rest = 0;
-  for (PetscInt i = 1; i < line->n; i++)
-    line->rest += PetscSqrtReal(SbDistance2(line->point[i].x, line->point[i - 1].x));
+  for (PetscInt i = 1; i < line->n; i++) {
+    const PetscReal way = PetscSqrtReal(SbDistance2(line->point[i].x, line->point[i - 1].x));
+
+    PetscCheck(way > 0 || !line->given, space->comm, PETSC_ERR_USER_INPUT,
+               "%s: points %" PetscInt_FMT " and %" PetscInt_FMT
+               " are one place at rest, (%g, %g, %g) m: a tension or another length between them "
+               "has no direction",
+               option, i, i + 1, (double)line->point[i].x[0], (double)line->point[i].x[1],
+               (double)line->point[i].x[2]);
+    line->rest += way;
+  }
   SbFormat(sizeof(e->note), e->note, "%" PetscInt_FMT " points, %.6g m long at rest", line->n,
            (double)line->rest);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -493,6 +511,8 @@ static PetscErrorCode history_line(SbEffect e, SbSpace space, const SbStage *sta
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(find_state(e, space, stage, &now));
   values[0] += now.length;
+  if (!SbEffectActs(e, stage->t))
+    PetscFunctionReturn(PETSC_SUCCESS);
   values[1] += now.tension;
   if (now.extension > 0 || !line->slack)
     values[2] += line->stiffness / 2 * PetscSqr(now.extension);

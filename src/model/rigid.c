@@ -58,6 +58,7 @@ PetscErrorCode SbModelWarnStrained(SbModel m, PetscReal t, Vec U)
   } most;
   PetscInt body;
   PetscMPIInt rank;
+  PetscBool held = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   if (!s->rigid || m->strained)
@@ -71,7 +72,18 @@ PetscErrorCode SbModelWarnStrained(SbModel m, PetscReal t, Vec U)
   if (!(most.strain > STRAINED))
     PetscFunctionReturn(PETSC_SUCCESS);
   m->strained = PETSC_TRUE;
+  for (int a = 0; a < 4 && rank == most.rank; a++)
+    held = (PetscBool)(held && (s->fixed[s->cell_node[4 * s->rigid_first[body] + a]] & 7) == 7);
   PetscCallMPI(MPI_Bcast(&body, 1, MPIU_INT, most.rank, m->comm));
+  PetscCallMPI(MPI_Bcast(&held, 1, SB_MPI_BOOL, most.rank, m->comm));
+  if (held) {
+    PetscCall(SbWarning(m->comm,
+                        "t = %g s: the rigid body '%s' is strained by %.2g by what prescribes its "
+                        "displacement: give a translation without x, y and z, and turn it by "
+                        "-effect_<name>_angle",
+                        (double)t, m->body[body].name, most.strain));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbWarning(
     m->comm,
     "t = %g s: the rigid body '%s' is strained by %.2g: what acts on it is more than its stiffness "

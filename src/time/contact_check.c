@@ -94,6 +94,8 @@ static PetscErrorCode check_fast(SbRun run)
     why = "the response of an effect here has multipliers";
   else if (c->nrestitution)
     why = "an effect here has restitution";
+  else if (run->model->space->rigid)
+    why = "a body here is rigid, whose spin it does not follow";
   else if (run->solve.preset != SB_TIME_EULER_IMPLICIT)
     why = "the integrator here is another one";
   PetscCheck(!why, run->model->comm, PETSC_ERR_USER_INPUT,

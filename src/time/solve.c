@@ -137,6 +137,11 @@ PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool wa
     PetscCall(
       SbContactSetBeginStep(&m->contacts, step->t, step->dt, speed, step->U0, run->state.V));
     PetscCall(SbRunWarnLongWay(run, step));
+
+    /* a run that goes on from a checkpoint knew no contact yet when it found its reactions */
+    if (run->state.reaction && m->contacts.npotential && run->clock.step0 > 0 &&
+        run->clock.step == run->clock.step0)
+      PetscCall(SbRunReactions(run, run->clock.t, run->state.reaction));
   }
   PetscCall(SbPotentialBegin(run->solve.potential, step, warm));
   if (!warm)

@@ -129,9 +129,12 @@ check(found["hand_reaction_z"][turned] < -5, "the hand does not press")
 near(found["hold_reaction_z"][-1], weight + 4.905, 1e-2, "reaction after it is let go")
 
 # static: pressed by a support, and by a force
-run("press", bed.format("hold,hand,meet") + "-body_box_translate 0.03,0.03,0.0501 -effect_hand_type prescribed_displacement -effect_hand_on box "
-    "-effect_hand_displacement 0;0;-0.005*t -time static -static_steps 5")
+press = (bed.format("hold,hand,meet") + "-body_box_translate 0.03,0.03,0.0501 -effect_hand_type prescribed_displacement -effect_hand_on box "
+         "-effect_hand_displacement 0;0;-0.005*t -time static -static_steps 5 -effect_meet_friction 0 -checkpoint_every_steps 2 -checkpoint_keep 9 ")
+run("press", press)
 found = history("press")
+run("press", press + f"-restart {OUT / 'press' / 'checkpoint_000002.h5'}")
+near(history("press")["prescribed_work"][-1] / found["prescribed_work"][-1], 1, 1e-9, "work of a hand that touches, after a restart")
 near(found["hand_reaction_z"][-1], -found["hold_reaction_z"][-1], 1e-6, "reactions of hand and block")
 check(found["hold_reaction_z"][-1] > 30, "the block is not pressed")
 run("push", bed.format("gravity,hold,push,guide,meet") + "-body_box_translate 0.03,0.03,0.05 -effect_push_type traction -effect_push_on box.zmax "
@@ -165,6 +168,8 @@ text = run("soft", spin + box + "-body_b_rigid_stiffness 1e5 -ts_max_time 0.1")
 check("rigid body 'b' is strained" in text, text)
 text = run("stiff", spin + box + "-ts_max_time 0.1")
 check("strained" not in text, text)
+text = run("bent", box + "-bodies b -body_b_rigid yes -effects p -effect_p_type prescribed_displacement -effect_p_on b -effect_p_displacement 0.1*t*x;0;0 -ts_max_time 0.1")
+check("by what prescribes its displacement" in text, text)
 
 for options, words in (("-time euler_explicit", "-time euler_implicit"), ("-time alpha2", "-time euler_implicit"), ("-ledger", "-ledger"),
                        ("-accuracy 0.1", "-accuracy"), ("-remesh_quality 0.1", "-remesh_"), ("-effect_meet_response penalty", "barrier"),
@@ -176,7 +181,7 @@ for options, words in (("-time euler_explicit", "-time euler_implicit"), ("-time
                        ("-effects gravity,hold,meet,f -effect_f_type contact -effect_f_obstacle plane:0,0,1,0 -effect_f_response projected",
                         "barrier"),
                        ("-displacement_view vtk:x.vtu", "-displacement_view"), ("-body_box_state nowhere", "-body_box_state"),
-                       ("-body_box_rigid perhaps", "-body_box_rigid")):
+                       ("-contact_quality fast", "-contact_quality fast"), ("-body_box_rigid perhaps", "-body_box_rigid")):
     text = run("error", fall + "-ts_max_time 0.01 " + options, code=1)
     check("error: " in text and words in text, f"{options}: {text}")
 for options in "-effect_f_response projected", "-effect_f_restitution 0.5":

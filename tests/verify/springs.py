@@ -86,6 +86,9 @@ near(slack["momentum_z"], -1, 1e-9, "slack cable: momentum, N s")
 near(slack["s_tension"] + slack["s_energy"], 0, 0, "slack cable: tension and energy")
 run("push", FREE + "spring")
 near(history("push")["s_tension"][0], -10, 1e-9, "spring that is too long: tension, N")
+run("let-go", FREE + "spring -effect_s_until 0.02")
+near(history("let-go")["s_tension"][2], -10, 1, "spring that lets go, before: tension, N")
+near(abs(history("let-go")["s_tension"][3:]).max() + abs(history("let-go")["s_energy"][3:]).max(), 0, 0, "after: tension and energy")
 
 # given tension, ramped by the load factor, or a shorter length: both lift the guided block onto its support's side
 run("pull", GUIDED.format(body("b", "0.2,0.1,0.05:2", young=1e5), ",feet -effect_feet_type fixed -effect_feet_on zmin")
@@ -107,6 +110,7 @@ ERRORS = (("", "-effect_s_points"), ("-effect_s_points 0.1,0,0", "one point"), (
           ("-effect_s_points 0,0,0;c:1,0,0 -effect_s_stiffness 1", "no body \"c\""),
           ("-effect_s_points ground:0,0,0;ground:1,0,0 -effect_s_stiffness 1", "all points are of the ground"),
           ("-effect_s_points 0,0,0;0.2,0.1,0", "-effect_s_stiffness"),
+          ("-effect_s_points 0,0,0;ground:0,0,0 -effect_s_tension 1", "points 1 and 2 are one place"),
           ("-effect_s_points 0,0,0;0.2,0.1,0 -effect_s_tension 1 -effect_s_length 1", "-effect_s_length"),
           ("-effect_s_points 0,0,0;0.2,0.1,0 -effect_s_tension 1 -effect_s_displacement 1;0;0", "ground: x,y,z"),
           ("-effect_s_points 0,0,0;0.2,0.1,0 -effect_s_stiffness 1 -effect_s_length t-1", "at least 0"),
@@ -117,6 +121,8 @@ for options, words in ERRORS:
 text = run("overlap", "-bodies a,b " + body("a", "0.1,0.1,0.1:2") + body("b", "0.1,0.1,0.1:2") + "-body_b_translate 0.1,0,0 -effects s -effect_s_type spring "
            "-effect_s_points 0.1,0,0;ground:1,0,0 -effect_s_stiffness 1", code=1)
 check("bodies a and b" in text and "b:0.1,0" in text, text)
+text = run("named", "-bodies ground " + body("ground", "0.1,0.1,0.1:2") + "-effects s -effect_s_type spring -effect_s_points 0,0,0;ground:1,0,0 -effect_s_stiffness 1", code=1)
+check("a body of that name" in text, text)
 text = run("outside", "-bodies b " + body("b", "0.1,0.1,0.1:2") + "-effects s -effect_s_type spring -effect_s_points 0.05,0.05,0.13;ground:0,0,1 "
            "-effect_s_stiffness 1 -ts_max_time 0.01")
 check("0.03 m outside of body b" in text, text)

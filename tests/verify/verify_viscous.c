@@ -503,8 +503,6 @@ static PetscErrorCode check_errors(void)
      "-body_cube_prony_bulk|neohookean"},
     {"-body_cube_viscosity 1 -time euler_symplectic", "-body_cube_viscosity|-time"},
     {"-body_cube_viscosity 1 -time alpha2", "-body_cube_viscosity|alpha2"},
-    {"-body_cube_prony_times 1 -body_cube_prony_shear 0.9 -remesh_times 0.1",
-     "-remesh_bodies|cube"},
   };
   TestScene t;
 
