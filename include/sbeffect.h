@@ -85,7 +85,7 @@ typedef struct {
   SbEffectOps ops;
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
-  SbEffectPointForce, SbEffectFoundation, SbEffectSpring, SbEffectCable, SbEffectFixed,
+  SbEffectPointForce, SbEffectFoundation, SbEffectTie, SbEffectSpring, SbEffectCable, SbEffectFixed,
   SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {

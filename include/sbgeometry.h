@@ -82,6 +82,18 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
 PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3],
                         PetscReal *t, PetscReal weight[3], PetscBool *out);
 
+/*
+  SbTriangleOver - the part of triangle w that lies over triangle v, seen along v's normal n[3], of
+  any length.
+
+  Input: corners, m; v counter-clockwise about n. Output: corners of a convex polygon in the plane
+  of w, in w's order. Returns their number, at most SB_OVER, below 3: there is none (Sutherland and
+  Hodgman, 1974).
+*/
+#define SB_OVER 8
+int SbTriangleOver(const PetscReal *const v[3], const PetscReal n[3], const PetscReal *const w[3],
+                   PetscReal corner[SB_OVER][3]);
+
 /* intersection.c */
 
 /*

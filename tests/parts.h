@@ -29,6 +29,11 @@
   "-output_fields none -output_history false -progress false "
 #define PART_TIME \
   "-time euler_implicit -ts_dt 0.0166666666666666667 -ts_max_time 0.13333333333333333 "
+/* A block at the end of the bar. */
+#define PART_BLOCK                                                                      \
+  "-bodies bar,block -body_block_mesh box:0.1,0.1,0.1:1 -body_block_translate 0.4,0,0 " \
+  "-body_block_material corotated -body_block_young 5e4 -body_block_poisson 0.4 "       \
+  "-body_block_density 1000 -set_skin_at body:block "
 /* A plane below the end of the bar, which it hits. */
 #define PART_FLOOR                                                                               \
   "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on " \
@@ -61,6 +66,8 @@ static const Part parts[] = {
   {"effect", "foundation",
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
    NULL, PETSC_FALSE}, /* implicit only */
+  {"effect", "tie", "-effects glue -effect_glue_type tie -effect_glue_on tip -effect_glue_to skin",
+   PART_BLOCK, NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "spring",
    "-effects line -effect_line_type spring -effect_line_points "
    "0.4,0.05,0.05;ground:0.4,0.05,0.5 -effect_line_stiffness 100",

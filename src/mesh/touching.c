@@ -51,48 +51,21 @@ static void facet_of(const PetscReal x[], const PetscInt v[3], Facet *f)
 }
 
 /* Twice the area that triangle w has in common with triangle v, whose normal is n, both in one
-   plane: w is cut by the three sides of v (Sutherland and Hodgman, 1974). */
+   plane. */
 static PetscReal overlap2(const PetscReal x[], const PetscInt v[3], const PetscReal n[3],
                           const PetscInt w[3])
 {
-  PetscReal p[2][8][3];
+  const PetscReal *const of_v[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+  const PetscReal *const of_w[3] = {x + 3 * w[0], x + 3 * w[1], x + 3 * w[2]};
+  PetscReal p[SB_OVER][3];
   PetscReal sum[3] = {0, 0, 0};
-  int count = 3;
-  int from = 0;
+  const int count = SbTriangleOver(of_v, n, of_w, p);
 
-  for (int k = 0; k < 3; k++)
-    for (int i = 0; i < 3; i++)
-      p[0][k][i] = x[3 * w[k] + i];
-  for (int side = 0; side < 3; side++, from = !from) {
-    const PetscReal *a = x + 3 * v[side];
-    PetscReal edge[3], inwards[3];
-    int kept = 0;
-
-    SbSubtract(x + 3 * v[(side + 1) % 3], a, edge);
-    SbCross(n, edge, inwards);
-    for (int k = 0; k < count; k++) {
-      const PetscReal *q = p[from][k];
-      const PetscReal *r = p[from][(k + 1) % count];
-      PetscReal to_q[3], to_r[3], in_q, in_r;
-
-      SbSubtract(q, a, to_q);
-      SbSubtract(r, a, to_r);
-      in_q = SbDot3(inwards, to_q);
-      in_r = SbDot3(inwards, to_r);
-      for (int i = 0; in_q >= 0 && i < 3; i++)
-        p[!from][kept][i] = q[i];
-      kept += in_q >= 0;
-      for (int i = 0; (in_q >= 0) != (in_r >= 0) && i < 3; i++)
-        p[!from][kept][i] = q[i] + in_q / (in_q - in_r) * (r[i] - q[i]);
-      kept += (in_q >= 0) != (in_r >= 0);
-    }
-    count = kept;
-  }
   for (int k = 1; k + 1 < count; k++) {
     PetscReal a[3], b[3], c[3];
 
-    SbSubtract(p[from][k], p[from][0], a);
-    SbSubtract(p[from][k + 1], p[from][0], b);
+    SbSubtract(p[k], p[0], a);
+    SbSubtract(p[k + 1], p[0], b);
     SbCross(a, b, c);
     for (int i = 0; i < 3; i++)
       sum[i] += c[i];

@@ -53,6 +53,7 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectPressure));
   PetscCall(SbEffectRegister(&SbEffectPointForce));
   PetscCall(SbEffectRegister(&SbEffectFoundation));
+  PetscCall(SbEffectRegister(&SbEffectTie));
   PetscCall(SbEffectRegister(&SbEffectSpring));
   PetscCall(SbEffectRegister(&SbEffectCable));
   PetscCall(SbEffectRegister(&SbEffectFixed));

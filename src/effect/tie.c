@@ -1,0 +1,622 @@
+/*
+  tie.c - holds two surfaces together whose meshes need not match: glue, a tendon on a bone, an
+  electrode on a tissue.
+
+  With u_A and u_B the displacements of two bodies at a place x of the rest surface A that lies on
+  the rest surface B, and k a stiffness per area,
+
+    E = 1/2 integral k |u_A(x) - u_B(x)|^2 dA.
+
+  Both are taken from the bases of the cells behind the facets at one and the same place, so that a
+  gap between the surfaces at rest, as of two meshes of a curved wall, is kept: no rigid motion has
+  a force, sum and moment of the forces vanish. Each facet of A is cut by those of B over it, in A's
+  plane, and the rule SbRuleFacet taken in each of the triangles, so that sums over plane surfaces
+  are exact on both sides: an even stress passes through any two meshes.
+
+  E is quadratic. Each patch, the part of a facet of A under one of B, has one number for each pair
+  of its nodes, found at set-up: with s_a the basis of A's nodes and minus that of B's,
+
+    S_ab = integral k s_a s_b dA,   f_a = -sum_b S_ab u_b,   mean_a = integral k s_a dA,
+
+  and the force on A is -sum_a mean_a u_a. A patch is a coupling. Without a stiffness given it is
+  FACTOR E / h, E Young's modulus of the softer body, h the longest side of A's facet: the tie
+  yields as a layer of the body of h / FACTOR does.
+
+  With a strength patches part for good at the end of a step in which their mean traction is above
+  it.
+
+  Every rank has the facets of both surfaces at set-up, and keeps the patches with a node of its
+  own.
+*/
+#include "effect_impl.h"
+#include "sbgeometry.h"
+
+#define FACTOR 100.   /* stiffness of the tie over that of a cell: see docs/reference/effects.md */
+#define NEAR 0.1      /* of a facet's longest side: how far the other surface may be, by default */
+#define FACING -0.5   /* cosine of two outward normals, at most: facets that look at each other */
+#define SLIVER 1e-12  /* of a facet's area: smaller patches are rounding */
+#define ROUNDING 1e-9 /* basis functions below it are those of nodes off the facet */
+#define BESIDE 10.    /* distances within which places that are not held are looked for */
+#define MISSED 0.01   /* of the area that is held: if more of them are there, that is said */
+
+/* A facet with the cell behind it, as ranks send it. */
+typedef struct {
+  PetscReal x[3][3];      /* its corners, counter-clockwise seen from outside, m */
+  PetscReal normal[3];    /* outward unit vector */
+  PetscReal area, size;   /* m^2; longest side, m */
+  PetscReal corner[4][3]; /* those of the cell, m */
+  PetscReal off[18];      /* curved: its edges off their middles, m */
+  PetscReal basis[4][4];  /* without nodes at edges: weights of the nodes in the corners */
+  PetscReal young;        /* Pa; 0: rigid */
+  PetscInt n;             /* nodes */
+  PetscInt gnode[SB_CELL_NODES];
+  PetscInt number; /* 4 cell_orig + face */
+  PetscBool curved;
+} Side;
+
+typedef struct {
+  PetscInt coupling, n; /* its number here, and of its nodes */
+  PetscReal *S;         /* [n][n] N/m */
+  PetscReal *mean;      /* [n] N/m */
+  PetscReal area;       /* m^2 */
+  PetscInt facet[2];    /* Side.number of both */
+  PetscBool parted;
+} Patch;
+
+typedef struct {
+  SbEffectOn to;
+  PetscReal stiffness, distance, strength; /* Pa/m, m, Pa; 0: by default, none */
+  PetscInt n, size;
+  Patch *patch;      /* [n] */
+  PetscReal *work;   /* [9 most^2] of the tangent */
+  PetscReal area[3]; /* of both surfaces, and held, m^2 */
+  PetscReal missed,
+    farthest; /* what faces the other surface beyond `distance`: area, m^2, and how far, m */
+} Tie;
+
+static const SbOption rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "",
+   "sets of boundary facets that are held: the smaller or finer surface"},
+  {"to", SB_OPTION_NAMES, 1, "", NULL, "", "sets of the boundary facets that hold them"},
+  {"stiffness", SB_OPTION_REAL, 1, "Pa/m", "0", "[0, inf)",
+   "stress over the distance by which the surfaces part; 0: a hundred times that of a cell of the "
+   "softer body, E / h"},
+  {"distance", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
+   "largest gap or overlap at rest of what is tied; 0: a tenth of a facet's longest side"},
+  {"strength", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
+   "traction above which places part for good at the end of a step; 0: never"},
+};
+
+static PetscErrorCode options_tie(SbEffect e, const SbScope *scope)
+{
+  Tie *tie = (Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  SbOptionName(scope, "to", sizeof(tie->to.option), tie->to.option);
+  PetscCall(SbOptionNames(scope, "to", &tie->to.n, &tie->to.name));
+  PetscCall(SbOptionReal(scope, "stiffness", &tie->stiffness));
+  PetscCall(SbOptionReal(scope, "distance", &tie->distance));
+  PetscCall(SbOptionReal(scope, "strength", &tie->strength));
+  e->linear = e->steady = PETSC_FALSE;
+  e->stiff = PETSC_TRUE;
+  e->nstate = 2;
+  if (tie->strength > 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  e->ops.accept = NULL;
+  e->ops.save = NULL;
+  e->ops.load = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A facet of an owned cell. */
+static void set_side(SbSpace space, const SbFacet *facet, Side *side)
+{
+  const SbMesh mesh = space->mesh;
+  const PetscInt cell = facet->cell;
+  const SbElement element = SbSpaceCellElement(space, cell);
+
+  *side = (Side){.area = facet->area, .number = 4 * mesh->cell_orig[cell] + facet->face};
+  for (int c = 0; c < 3; c++)
+    for (int k = 0; k < 3; k++)
+      side->x[c][k] = mesh->x[3 * facet->vertex[c] + k];
+  for (int c = 0; c < 3; c++) {
+    side->normal[c] = facet->normal[c];
+    side->size = PetscMax(side->size, PetscSqrtReal(SbDistance2(side->x[c], side->x[(c + 1) % 3])));
+  }
+  for (int c = 0; c < 4; c++) {
+    for (int k = 0; k < 3; k++)
+      side->corner[c][k] = mesh->x[3 * mesh->cell[4 * cell + c] + k];
+    for (int a = 0; a < 4 && !element->nodes_per[1]; a++)
+      side->basis[c][a] = SbSpaceCornerBasis(space, cell, c)[a];
+  }
+  side->curved = (PetscBool)((mesh->cell_set[cell] & SB_CURVED) != 0);
+  for (int k = 0; k < 18 && side->curved; k++)
+    side->off[k] = mesh->edge_off[18 * cell + k];
+  side->young =
+    element->rigid ? 0 : SbMaterialYoungModulus(space->material[mesh->cell_material[cell]]);
+  side->n = element->nodes_per[1] ? SB_CELL_NODES : 4;
+  for (PetscInt a = 0; a < side->n; a++)
+    side->gnode[a] = space->gnode[SbSpaceCellNode(space, cell, a)];
+}
+
+/* The facets of a surface on all ranks, and their area. */
+static PetscErrorCode gather(SbSpace space, const SbEffectOn *on, PetscInt *n, Side **side,
+                             PetscReal *area)
+{
+  SbFacet *facets;
+  Side *mine;
+  PetscInt nfacet;
+  PetscInt nmine = 0;
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFacets(space, on, &nfacet, &facets));
+  PetscCall(PetscMalloc1(nfacet, &mine));
+  for (PetscInt i = 0; i < nfacet; i++)
+    if (facets[i].cell < space->mesh->ncell_owned)
+      set_side(space, &facets[i], &mine[nmine++]);
+  PetscCall(PetscFree(facets));
+  PetscCallMPI(MPI_Type_contiguous((int)sizeof(Side), MPI_BYTE, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(SbAllgatherv(space->comm, type, nmine, mine, n, side, NULL));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(PetscFree(mine));
+  *area = 0;
+  for (PetscInt i = 0; i < *n; i++)
+    *area += (*side)[i].area;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The basis functions of a side's cell at a place, in it or beyond; false: a curved cell has none
+   there. */
+static PetscBool basis_at(const Side *side, const PetscReal x[3], PetscReal phi[SB_CELL_NODES])
+{
+  static const PetscInt own[4] = {0, 1, 2, 3};
+  PetscReal L[4];
+
+  SbTetBarycentric(&side->corner[0][0], own, x, L);
+  if (side->curved && !SbTetCurvedBarycentric(&side->corner[0][0], own, side->off, x, L))
+    return PETSC_FALSE;
+  if (side->n == SB_CELL_NODES) {
+    SbQuadraticBasis(L, phi);
+    return PETSC_TRUE;
+  }
+  for (int a = 0; a < 4; a++) {
+    phi[a] = 0;
+    for (int c = 0; c < 4; c++)
+      phi[a] += L[c] * side->basis[c][a];
+  }
+  return PETSC_TRUE;
+}
+
+/* A patch that is being summed. */
+typedef struct {
+  PetscInt n, gnode[2 * SB_CELL_NODES];
+  PetscInt of_b[SB_CELL_NODES]; /* B's nodes among them */
+  PetscReal S[2 * SB_CELL_NODES][2 * SB_CELL_NODES], mean[2 * SB_CELL_NODES], area;
+  PetscReal missed, farthest; /* what is too far apart: area, m^2, and distance, m */
+} Sum;
+
+/* The nodes of both sides, each once. */
+static void begin_sum(const Side *a, const Side *b, Sum *sum)
+{
+  *sum = (Sum){.n = a->n};
+  for (PetscInt i = 0; i < a->n; i++)
+    sum->gnode[i] = a->gnode[i];
+  for (PetscInt i = 0; i < b->n; i++) {
+    PetscInt k = 0;
+
+    while (k < sum->n && sum->gnode[k] != b->gnode[i])
+      k++;
+    if (k == sum->n)
+      sum->gnode[sum->n++] = b->gnode[i];
+    sum->of_b[i] = k;
+  }
+}
+
+/* Adds a point of the rule: a place x of A's facet, and its area. */
+static void add_point(const Side *a, const Side *b, const PetscReal x[3], PetscReal area,
+                      PetscReal k, Sum *sum)
+{
+  PetscReal phi[2][SB_CELL_NODES];
+  PetscReal s[2 * SB_CELL_NODES] = {0};
+
+  if (!basis_at(a, x, phi[0]) || !basis_at(b, x, phi[1]))
+    return;
+  for (PetscInt i = 0; i < a->n; i++)
+    s[i] += phi[0][i];
+  for (PetscInt i = 0; i < b->n; i++)
+    s[sum->of_b[i]] -= phi[1][i];
+  for (PetscInt i = 0; i < sum->n; i++) {
+    sum->mean[i] += k * area * s[i];
+    for (PetscInt j = 0; j < sum->n; j++)
+      sum->S[i][j] += k * area * s[i] * s[j];
+  }
+  sum->area += area;
+}
+
+/* Sums over the part of A's facet that lies under one of B, no farther from it than `distance`. */
+static void sum_patch(const Side *a, const Side *b, PetscReal distance, PetscReal k, Sum *sum)
+{
+  const PetscReal *const of_a[3] = {a->x[0], a->x[1], a->x[2]};
+  const PetscReal *const of_b[3] = {b->x[0], b->x[1], b->x[2]};
+  PetscReal corner[SB_OVER][3];
+  const int n = SbTriangleOver(of_a, a->normal, of_b, corner);
+
+  begin_sum(a, b, sum);
+  for (int t = 1; t + 1 < n; t++) {
+    PetscReal side[2][3], normal[3];
+
+    SbSubtract(corner[t], corner[0], side[0]);
+    SbSubtract(corner[t + 1], corner[0], side[1]);
+    SbCross(side[1], side[0], normal);
+
+    /* B's triangle is seen from behind: its part in A's plane */
+    const PetscReal area = SbDot3(normal, a->normal) / 2;
+
+    if (!(area > SLIVER * a->area))
+      continue;
+    for (int q = 0; q < SbRuleFacet.n; q++) {
+      const PetscReal *L = SbRuleFacet.L[q];
+      PetscReal x[3], to[3];
+
+      for (int i = 0; i < 3; i++)
+        x[i] = L[0] * corner[0][i] + L[1] * corner[t][i] + L[2] * corner[t + 1][i];
+      SbSubtract(x, a->x[0], to);
+
+      const PetscReal gap = SbDot3(to, a->normal);
+
+      for (int i = 0; i < 3; i++)
+        x[i] -= gap * a->normal[i];
+      if (PetscAbsReal(gap) <= distance) {
+        add_point(a, b, x, area * SbRuleFacet.weight[q], k, sum);
+        continue;
+      }
+      if (PetscAbsReal(gap) > BESIDE * distance)
+        continue;
+      sum->missed += area * SbRuleFacet.weight[q];
+      sum->farthest = PetscMax(sum->farthest, PetscAbsReal(gap));
+    }
+  }
+}
+
+/* Keeps a patch if one of its nodes is owned here. */
+static PetscErrorCode keep(SbSpace space, Tie *tie, const Side *a, const Side *b, const Sum *sum)
+{
+  Patch *patch;
+  PetscInt node[2 * SB_CELL_NODES], gnode[2 * SB_CELL_NODES];
+  PetscReal most = 0;
+  PetscInt n = 0;
+  PetscInt coupling;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < sum->n; i++)
+    most = PetscMax(most, sum->S[i][i]);
+  for (PetscInt i = 0; i < sum->n; i++) {
+    if (sum->S[i][i] <= PetscSqr(ROUNDING) * most)
+      continue;
+    gnode[n] = sum->gnode[i];
+    node[n++] = i;
+  }
+  PetscCall(SbSpaceCouple(space, n, gnode, &coupling));
+  if (coupling < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbReserve(tie->n + 1, sizeof(*tie->patch), &tie->size, &tie->patch));
+  patch = &tie->patch[tie->n++];
+  *patch =
+    (Patch){.coupling = coupling, .n = n, .area = sum->area, .facet = {a->number, b->number}};
+  PetscCall(PetscMalloc2(n * n, &patch->S, n, &patch->mean));
+  for (PetscInt i = 0; i < n; i++) {
+    patch->mean[i] = sum->mean[node[i]];
+    for (PetscInt j = 0; j < n; j++)
+      patch->S[n * i + j] = sum->S[node[i]][node[j]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The stiffness between two facets, Pa/m. */
+static PetscErrorCode stiffness_between(SbEffect e, const Side *a, const Side *b, PetscReal *k)
+{
+  const Tie *tie = (const Tie *)e->data;
+  const PetscReal soft = PetscMin(a->young, b->young);
+
+  PetscFunctionBeginUser;
+  *k = tie->stiffness;
+  if (*k == 0)
+    *k = FACTOR * (soft > 0 ? soft : PetscMax(a->young, b->young)) / a->size;
+  PetscCheck(*k > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "effect %s ties two rigid bodies, which have no stiffness to compare with: give "
+             "-effect_%s_stiffness (Pa/m)",
+             e->name, e->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The distance between two surfaces, from the corners of the first, m. */
+static PetscReal distance_between(PetscInt n, const Side a[], const SbBoxTree *tree, const Side b[])
+{
+  PetscReal least = PETSC_MAX_REAL;
+
+  for (PetscInt i = 0; i < 3 * n; i++) {
+    const PetscReal *x = a[i / 3].x[i % 3];
+    SbBoxNearest nearest;
+    PetscInt j;
+
+    for (SbBoxNearestBegin(tree, (const PetscReal[6]){x[0], x[1], x[2], x[0], x[1], x[2]}, least,
+                           &nearest);
+         SbBoxNearestNext(&nearest, &j);) {
+      const PetscReal *const corner[3] = {b[j].x[0], b[j].x[1], b[j].x[2]};
+      PetscReal weight[3], d2;
+
+      (void)SbTriangleClosestPoint(x, corner, weight, &d2);
+      nearest.limit2 = least = PetscMin(least, d2);
+    }
+  }
+  return PetscSqrtReal(least);
+}
+
+/* All patches of two surfaces. */
+static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const Side a[],
+                                   const SbBoxTree *tree, const Side b[])
+{
+  Tie *tie = (Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < na; i++) {
+    const PetscReal distance = tie->distance > 0 ? tie->distance : NEAR * a[i].size;
+    SbBoxNearest nearest;
+    PetscReal box[6];
+    PetscInt j;
+
+    SbBoxClear(box);
+    for (int c = 0; c < 3; c++)
+      SbBoxAdd(box, a[i].x[c]);
+    for (SbBoxNearestBegin(tree, box, PetscSqr(BESIDE * distance), &nearest);
+         SbBoxNearestNext(&nearest, &j);) {
+      PetscReal k;
+      Sum sum;
+
+      if (a[i].number == b[j].number || SbDot3(a[i].normal, b[j].normal) > FACING)
+        continue;
+      PetscCall(stiffness_between(e, &a[i], &b[j], &k));
+      sum_patch(&a[i], &b[j], distance, k, &sum);
+      tie->missed += sum.missed;
+      tie->farthest = PetscMax(tie->farthest, sum.farthest);
+      if (sum.area <= SLIVER * a[i].area)
+        continue;
+      tie->area[2] += sum.area;
+      PetscCall(keep(space, tie, &a[i], &b[j], &sum));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
+{
+  Tie *tie = (Tie *)e->data;
+  PetscReal(*box)[6];
+  PetscInt na, nb;
+  PetscInt most = 0;
+  SbBoxTree tree;
+  Side *a, *b;
+
+  PetscFunctionBeginUser;
+  PetscCall(gather(space, &e->on, &na, &a, &tie->area[0]));
+  PetscCall(gather(space, &tie->to, &nb, &b, &tie->area[1]));
+  PetscCall(PetscMalloc1(nb, &box));
+  for (PetscInt j = 0; j < nb; j++) {
+    SbBoxClear(box[j]);
+    for (int c = 0; c < 3; c++)
+      SbBoxAdd(box[j], b[j].x[c]);
+  }
+  PetscCall(SbBoxTreeCreate(nb, (const PetscReal(*)[6])box, &tree));
+  PetscCall(find_patches(e, space, na, a, &tree, b));
+  if (tie->area[2] == 0) {
+    const PetscReal apart = distance_between(na, a, &tree, b);
+    const PetscReal allowed = tie->distance > 0 ? tie->distance : NEAR * a[0].size;
+
+    SETERRQ(space->comm, PETSC_ERR_USER_INPUT,
+            "%s: nothing of these surfaces lies on those of %s: the nearest place is %.4g m away, "
+            "and -effect_%s_distance allows %.4g m; they must also face each other, seen along "
+            "their normals",
+            e->on.option, tie->to.option, (double)apart, e->name, (double)allowed);
+  }
+  if (tie->missed > MISSED * tie->area[2])
+    PetscCall(
+      SbWarning(space->comm,
+                "%s: %.3g m^2 are held; %.3g m^2 more face %s at up to %.3g m, and are free: "
+                "set -effect_%s_distance to hold them",
+                e->on.option, (double)tie->area[2], (double)tie->missed, tie->to.option,
+                (double)tie->farthest, e->name));
+  SbFormat(sizeof(e->note), e->note, "%.6g m^2 held, of %.6g and %.6g m^2", (double)tie->area[2],
+           (double)tie->area[0], (double)tie->area[1]);
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree(box));
+  PetscCall(PetscFree(a));
+  PetscCall(PetscFree(b));
+
+  for (PetscInt p = 0; p < tie->n; p++)
+    most = PetscMax(most, tie->patch[p].n);
+  PetscCall(PetscMalloc1(9 * most * most, &tie->work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes of a patch. */
+static const PetscInt *nodes_of(SbSpace space, const Patch *patch)
+{
+  return space->couplings.node + space->couplings.start[patch->coupling];
+}
+
+/* Whether this rank counts a patch. */
+static PetscBool counts(SbSpace space, const Patch *patch)
+{
+  return (PetscBool)(!patch->parted && nodes_of(space, patch)[0] < space->nnode_owned);
+}
+
+/* The force on A, N. */
+static void force_on(SbSpace space, const Patch *patch, const PetscReal u[], PetscReal f[3])
+{
+  const PetscInt *node = nodes_of(space, patch);
+
+  f[0] = f[1] = f[2] = 0;
+  for (PetscInt k = 0; k < 3 * patch->n; k++)
+    f[k % 3] -= patch->mean[k / 3] * u[3 * node[k / 3] + k % 3];
+}
+
+static PetscErrorCode force_tie(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const Tie *tie = (const Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  for (const Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    const PetscInt *node = nodes_of(space, patch);
+
+    for (PetscInt k = 0; k < patch->n * patch->n && !patch->parted; k++)
+      for (int i = 0; i < 3; i++)
+        f[3 * node[k / patch->n] + i] -= patch->S[k] * stage->u[3 * node[k % patch->n] + i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode tangent_tie(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+{
+  const Tie *tie = (const Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  for (const Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    const PetscInt n = patch->n;
+
+    if (patch->parted)
+      continue;
+    PetscCall(PetscArrayzero(tie->work, 9 * n * n));
+    for (PetscInt k = 0; k < n * n; k++)
+      for (int i = 0; i < 3; i++)
+        tie->work[3 * n * (3 * (k / n) + i) + 3 * (k % n) + i] = stage->shift_k * patch->S[k];
+    PetscCall(SbSpaceAddCoupling(space, A, patch->coupling, tie->work));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With a strength: what is torn parts. */
+static PetscErrorCode accept_tie(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Tie *tie = (Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  if (!SbEffectActs(e, stage->t))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    PetscReal f[3];
+
+    force_on(space, patch, stage->u, f);
+    if (PetscSqrtReal(SbDot3(f, f)) > tie->strength * patch->area)
+      patch->parted = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A record: the facets of a patch that has parted. */
+static PetscErrorCode save_tie(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
+{
+  const Tie *tie = (const Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  PetscCall(PetscMalloc1(2 * tie->n, records));
+  for (const Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    if (!patch->parted || nodes_of(space, patch)[0] >= space->nnode_owned)
+      continue;
+    (*records)[2 * *n] = (PetscReal)patch->facet[0];
+    (*records)[2 * *n + 1] = (PetscReal)patch->facet[1];
+    ++*n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode load_tie(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[],
+                               PetscInt n, const PetscReal records[])
+{
+  Tie *tie = (Tie *)e->data;
+  PetscInt found = 0;
+  SbKey *key;
+
+  PetscFunctionBeginUser;
+  (void)t;
+  (void)u;
+  PetscCall(PetscMalloc1(n, &key));
+  for (PetscInt i = 0; i < n; i++)
+    key[i] = (SbKey){SbKeyOfPair((PetscInt)records[2 * i], (PetscInt)records[2 * i + 1]), i};
+  SbKeysSort(n, key);
+  for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    patch->parted =
+      (PetscBool)(SbKeysFind(n, key, SbKeyOfPair(patch->facet[0], patch->facet[1])) >= 0);
+    found += patch->parted && nodes_of(space, patch)[0] < space->nnode_owned;
+  }
+  PetscCall(PetscFree(key));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPIU_INT, MPI_SUM, space->comm));
+  PetscCheck(found == n, space->comm, PETSC_ERR_USER,
+             "effect %s: %" PetscInt_FMT
+             " places of the tie had parted, and the mesh has %" PetscInt_FMT
+             " of them now: a tie with -effect_%s_strength needs the mesh that it began with",
+             e->name, n, found, e->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The force on A, N, the area that holds, m^2, and its energy, J. */
+static PetscErrorCode history_tie(SbEffect e, SbSpace space, const SbStage *stage,
+                                  const PetscReal residual[], PetscReal values[])
+{
+  const Tie *tie = (const Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)residual;
+  if (!SbEffectActs(e, stage->t))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (const Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+    const PetscInt *node = nodes_of(space, patch);
+    PetscReal f[3];
+
+    if (!counts(space, patch))
+      continue;
+    force_on(space, patch, stage->u, f);
+    for (int i = 0; i < 3; i++)
+      values[i] += f[i];
+    values[3] += patch->area;
+    for (PetscInt k = 0; k < patch->n * patch->n; k++)
+      values[4] += patch->S[k] / 2 *
+                   SbDot3(stage->u + 3 * node[k / patch->n], stage->u + 3 * node[k % patch->n]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_tie(SbEffect e)
+{
+  Tie *tie = (Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  for (PetscInt p = 0; p < tie->n; p++)
+    PetscCall(PetscFree2(tie->patch[p].S, tie->patch[p].mean));
+  PetscCall(PetscFree(tie->patch));
+  PetscCall(PetscFree(tie->work));
+  PetscCall(PetscFree(tie->to.name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char *const columns[] = {"force_x", "force_y", "force_z", "area", "energy"};
+
+const SbEffectType SbEffectTie = {
+  .name = "tie",
+  .size = sizeof(Tie),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns),
+  .column = columns,
+  .ops = {.setfromoptions = options_tie,
+          .couplings = couplings_tie,
+          .force = force_tie,
+          .tangent = tangent_tie,
+          .accept = accept_tie,
+          .save = save_tie,
+          .load = load_tie,
+          .history = history_tie,
+          .destroy = destroy_tie},
+};
