@@ -34,6 +34,12 @@
   "-bodies bar,block -body_block_mesh box:0.1,0.1,0.1:1 -body_block_translate 0.4,0,0 " \
   "-body_block_material corotated -body_block_young 5e4 -body_block_poisson 0.4 "       \
   "-body_block_density 1000 -set_skin_at body:block "
+/* A hollow box beside the bar. */
+#define PART_HOLLOW                                                                   \
+  "-bodies bar,box -body_box_mesh tests/data/hollow.msh -body_box_translate 0,0.2,0 " \
+  "-body_box_material corotated -body_box_young 5e4 -body_box_poisson 0.4 "           \
+  "-body_box_density 1000 -sets end,tip,skin,hole -set_hole_at "                      \
+  "box:0.03,0.23,0.03,0.07,0.27,0.07 "
 /* A plane below the end of the bar, which it hits. */
 #define PART_FLOOR                                                                               \
   "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on " \
@@ -63,6 +69,10 @@ static const Part parts[] = {
   {"effect", "pressure",
    "-effects air -effect_air_type pressure -effect_air_on skin -effect_air_value 100", NULL, NULL,
    PETSC_TRUE},
+  {"effect", "cavity",
+   "-effects air -effect_air_type cavity -effect_air_on hole -effect_air_added 1e-6*t "
+   "-effect_air_modulus 101325",
+   PART_HOLLOW, NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "foundation",
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
    NULL, PETSC_FALSE}, /* implicit only */

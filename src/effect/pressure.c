@@ -60,7 +60,7 @@
   With follower = no the pressure acts on the rest area and normal, as small strains have it: no
   tangent.
 */
-#include "mean_surface.h"
+#include "pressure.h"
 #include "sbgeometry.h"
 
 #define MOST \
@@ -68,29 +68,10 @@
 #define STRAIGHT \
   1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
-/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1:
-   none, it is straight). The surface lies to the left, seen from outside. */
+/* Of the effect `pressure`. */
 typedef struct {
-  PetscInt node[3];
-} RimEdge;
-
-typedef struct {
+  SbPressure surface;
   SbFormula value;
-  PetscBool follower;
-  PetscInt nfacet, nedge;
-  PetscReal sign; /* of a closed surface: -1 around a cavity, else 1 */
-  PetscInt nall;  /* with those of bodies with nodes at faces, which follow the others */
-  SbFacet *facet; /* [nall] of owned and ghost cells; the first nfacet act facet by facet */
-  RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
-
-  /* bodies with nodes at faces */
-  PetscReal *share;       /* [nbody] s above; 0 for other bodies */
-  SbMeanSurface *surface; /* of these bodies; NULL: there are none */
-  PetscReal *weight;      /* [surface->nfacet] c - s */
-  PetscBool prisms;       /* the surface is closed, or facets go on behind its rim that are held */
-  PetscBool some;         /* some facet that is not held has a weight, on some rank */
-  PetscReal volume;       /* that history adds, so that the geometric volume results at rest, m^3 */
-  PetscReal *vertex[3];   /* [nvert][3] work arrays */
 } Pressure;
 
 static const SbOption rows[] = {
@@ -104,12 +85,25 @@ static const SbOption rows[] = {
    "amplitude: factor on the pressure, a formula of the time t"},
 };
 
-static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
+static PetscErrorCode pressure_at(SbEffect e, SbSpace space, const SbStage *stage, PetscReal *p)
 {
-  Pressure *p = (Pressure *)e->data;
+  PetscReal factor;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFormulas(e, scope, "value", 1, PETSC_FALSE, &p->value));
+  (void)space;
+  PetscCall(SbFormulaEval(((const Pressure *)e->data)->value, stage->t, NULL, p));
+  PetscCall(SbFormulaEval(e->time, stage->t, NULL, &factor));
+  *p *= factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
+{
+  SbPressure *p = (SbPressure *)e->data;
+
+  PetscFunctionBeginUser;
+  p->at = pressure_at;
+  PetscCall(SbEffectFormulas(e, scope, "value", 1, PETSC_FALSE, &((Pressure *)e->data)->value));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
   e->linear = (PetscBool)!p->follower;
   if (p->follower)
@@ -127,11 +121,11 @@ static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 }
 
 /* Side c of a facet of P1 or P2. */
-static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
+static SbRimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 {
   const PetscInt a = facet->corner[c];
   const PetscInt b = facet->corner[(c + 1) % 3];
-  RimEdge e = {
+  SbRimEdge e = {
     {SbSpaceCellNode(space, facet->cell, a), SbSpaceCellNode(space, facet->cell, b), -1}};
 
   /* edges of a tet: 01 02 03 12 13 23 */
@@ -141,7 +135,7 @@ static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 }
 
 /* Whether the tangent has a part along the edge, not eliminated by supports. */
-static PetscBool is_free(SbSpace space, const RimEdge *edge)
+static PetscBool is_free(SbSpace space, const SbRimEdge *edge)
 {
   PetscReal e[3];
   PetscReal longest = 0;
@@ -164,7 +158,7 @@ static PetscBool is_free(SbSpace space, const RimEdge *edge)
 
 /* The free rim of the facets of P1 and P2: edges that facets go along one way more often than the
    other. */
-static PetscErrorCode find_rim(Pressure *p, SbSpace space)
+static PetscErrorCode find_rim(SbPressure *p, SbSpace space)
 {
   PetscInt n = 0;
   SbKey *edge; /* slot 3 facet + side */
@@ -172,7 +166,7 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * p->nfacet, &edge));
   for (PetscInt i = 0; i < 3 * p->nfacet; i++) {
-    RimEdge e;
+    SbRimEdge e;
 
     if (apart(space, &p->facet[i / 3]))
       continue;
@@ -183,12 +177,12 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   PetscCall(PetscMalloc1(n, &p->rim));
   for (PetscInt i = 0, m; i < n; i += m) {
     PetscInt ways[2] = {0, 0}; /* from the lower node to the higher one, and back */
-    RimEdge e[2] = {{{0}}};
+    SbRimEdge e[2] = {{{0}}};
     PetscBool owned = PETSC_FALSE;
 
     m = SbKeysAlike(n, edge, i);
     for (PetscInt k = i; k < i + m; k++) {
-      const RimEdge side = side_of(space, &p->facet[edge[k].slot / 3], edge[k].slot % 3);
+      const SbRimEdge side = side_of(space, &p->facet[edge[k].slot / 3], edge[k].slot % 3);
       const int back = side.node[0] > side.node[1];
 
       e[back] = side;
@@ -211,7 +205,8 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
 /* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, and of
    those that no facet of a body with nodes at faces goes on behind which is held in its normal
    direction; the middle of the first one by original numbers, m. */
-static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt nrim[2], PetscReal at[3])
+static PetscErrorCode measure_rim(const SbPressure *p, SbMesh mesh, PetscInt nrim[2],
+                                  PetscReal at[3])
 {
   PetscInt n = p->nall; /* facets under pressure, then held ones */
   const SbFacet **facet;
@@ -273,18 +268,6 @@ static PetscErrorCode measure_rim(const Pressure *p, SbMesh mesh, PetscInt nrim[
   for (int k = 0; k < 3 && mine != first; k++)
     at[k] = 0;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, at, 3, MPIU_REAL, MPI_SUM, mesh->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The pressure at time t, Pa. */
-static PetscErrorCode pressure_at(SbEffect e, PetscReal t, PetscReal *p)
-{
-  PetscReal factor;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbFormulaEval(((const Pressure *)e->data)->value, t, NULL, p));
-  PetscCall(SbFormulaEval(e->time, t, NULL, &factor));
-  *p *= factor;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -382,10 +365,8 @@ static void add_prism(const PetscInt v[3], PetscReal factor, const PetscReal X[3
   }
 }
 
-/* This rank's part of the volume inside the surface at the displacements u, m^3; negative in a
-   cavity. */
-static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const PetscReal u[],
-                                    PetscReal *inside)
+PetscErrorCode SbPressureInside(const SbPressure *load, SbSpace space, const PetscReal u[],
+                                PetscReal *inside)
 {
   PetscFunctionBeginUser;
   *inside = 0;
@@ -434,7 +415,7 @@ static PetscErrorCode volume_inside(const Pressure *load, SbSpace space, const P
 }
 
 /* The surface of bodies with nodes at faces, and s and the weights of facets there. Collective. */
-static PetscErrorCode setup_surface(Pressure *p, SbSpace space)
+static PetscErrorCode setup_surface(SbPressure *p, SbSpace space)
 {
   const SbMesh mesh = space->mesh;
   PetscBool *in;       /* [nbody] */
@@ -484,7 +465,7 @@ static PetscErrorCode setup_surface(Pressure *p, SbSpace space)
 }
 
 /* The part of the volume inside the surface, at rest, of bodies with nodes at faces here, m^3. */
-static PetscReal volume_at_rest(const Pressure *p, SbMesh mesh)
+static PetscReal volume_at_rest(const SbPressure *p, SbMesh mesh)
 {
   PetscReal sum = 0;
 
@@ -497,22 +478,23 @@ static PetscReal volume_at_rest(const Pressure *p, SbMesh mesh)
 static PetscErrorCode history_pressure(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[])
 {
-  const Pressure *load = (const Pressure *)e->data;
+  const SbPressure *load = (const SbPressure *)e->data;
 
   PetscFunctionBeginUser;
   (void)residual;
-  PetscCall(volume_inside(load, space, stage->u, values));
+  PetscCall(SbPressureInside(load, space, stage->u, values));
   values[0] *= load->sign;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
+PetscErrorCode SbPressureSetUp(SbEffect e, SbSpace space)
 {
-  Pressure *p = (Pressure *)e->data;
+  SbPressure *p = (SbPressure *)e->data;
   const SbMesh mesh = space->mesh;
   PetscInt nrim[2];
   PetscInt n = 0;
   PetscReal value = 1.;
+  const SbStage none = {0};
   PetscReal at[3], inside, work_inside;
   SbMeanSurface *surface;
   PetscBool some, free;
@@ -520,7 +502,7 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 
   PetscFunctionBeginUser;
   if (e->steady)
-    PetscCall(SbFormulaEval(p->value, 0, NULL, &value));
+    PetscCall((*p->at)(e, space, &none, &value));
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   for (PetscInt k = 0; k < p->nfacet; k++)
     PetscCheck(!SbSpaceCellElement(space, p->facet[k].cell)->rigid, PETSC_COMM_SELF,
@@ -555,6 +537,8 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 
   /* what the surface is, in words; a free rim is known of nodes at vertices only */
   PetscCall(measure_rim(p, mesh, nrim, at));
+  p->nrim = nrim[0];
+  PetscCall(PetscArraycpy(p->rim_at, at, 3));
   p->prisms = (PetscBool)!nrim[1];
   if (nrim[0]) {
     free = (PetscBool)(p->nedge > 0 || (p->some && !p->prisms));
@@ -573,10 +557,10 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
     /* bodies with nodes at faces have the geometric volume at rest; this rank's parts */
     surface = p->surface;
     p->surface = NULL;
-    PetscCall(volume_inside(p, space, NULL, &inside));
+    PetscCall(SbPressureInside(p, space, NULL, &inside));
     inside += volume_at_rest(p, mesh);
     p->surface = surface;
-    PetscCall(volume_inside(p, space, NULL, &work_inside));
+    PetscCall(SbPressureInside(p, space, NULL, &work_inside));
     p->volume = inside - work_inside;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &inside, 1, MPIU_REAL, MPI_SUM, space->comm));
     p->sign = inside < 0 ? -1 : 1;
@@ -587,7 +571,7 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 }
 
 /* f += factor dV_F times the weights of facets, and on held ones what supports bear. */
-static PetscErrorCode add_surface(const Pressure *load, SbSpace space, PetscReal factor,
+static PetscErrorCode add_surface(const SbPressure *load, SbSpace space, PetscReal factor,
                                   const PetscReal u[], PetscReal f[])
 {
   const SbMeanSurface *surface = load->surface;
@@ -619,9 +603,9 @@ static PetscErrorCode add_surface(const Pressure *load, SbSpace space, PetscReal
 }
 
 /* The derivative of add_surface() along x, without held facets. */
-static PetscErrorCode add_surface_derivative(const Pressure *load, SbSpace space, PetscReal factor,
-                                             const PetscReal u[], const PetscReal x[],
-                                             PetscReal f[])
+static PetscErrorCode add_surface_derivative(const SbPressure *load, SbSpace space,
+                                             PetscReal factor, const PetscReal u[],
+                                             const PetscReal x[], PetscReal f[])
 {
   const SbMeanSurface *surface = load->surface;
   PetscReal *y = load->vertex[0];
@@ -655,26 +639,23 @@ static PetscErrorCode add_surface_derivative(const Pressure *load, SbSpace space
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode volume_pressure(SbEffect e, PetscReal t, PetscReal pressure[])
+PetscErrorCode SbPressureVolume(SbEffect e, PetscReal t, PetscReal pressure[])
 {
-  const Pressure *load = (const Pressure *)e->data;
+  const SbPressure *load = (const SbPressure *)e->data;
+  const SbStage stage = {.t = t};
   PetscReal p;
 
   PetscFunctionBeginUser;
-  PetscCall(pressure_at(e, t, &p));
+  PetscCall((*load->at)(e, NULL, &stage, &p));
   for (PetscInt b = 0; b < load->surface->space->mesh->nbody; b++)
     pressure[b] += p * load->share[b];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+PetscErrorCode SbPressureAddForce(const SbPressure *load, SbSpace space, PetscReal p,
+                                  const PetscReal u[], PetscReal f[])
 {
-  const Pressure *load = (const Pressure *)e->data;
-  const PetscReal *u = load->follower ? stage->u : NULL;
-  PetscReal p;
-
   PetscFunctionBeginUser;
-  PetscCall(pressure_at(e, stage->t, &p));
   for (PetscInt b = 0; b < space->mesh->nbody; b++)
     if (load->share[b] > 0)
       PetscCall(SbSpaceAddVolume(space, b, u, -p * load->share[b], f, NULL));
@@ -697,13 +678,24 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+PetscErrorCode SbPressureForce(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
-  const Pressure *load = (const Pressure *)e->data;
+  const SbPressure *load = (const SbPressure *)e->data;
   PetscReal p;
 
   PetscFunctionBeginUser;
-  PetscCall(pressure_at(e, stage->t, &p));
+  PetscCall((*load->at)(e, space, stage, &p));
+  PetscCall(SbPressureAddForce(load, space, p, load->follower ? stage->u : NULL, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureTangent(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+{
+  const SbPressure *load = (const SbPressure *)e->data;
+  PetscReal p;
+
+  PetscFunctionBeginUser;
+  PetscCall((*load->at)(e, space, stage, &p));
   p *= stage->shift_k;
   if (p == 0)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -746,7 +738,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
 
 /* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of 3 points, exact if
    curved. */
-static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const PetscReal u[],
+static void add_rim(SbSpace space, const SbRimEdge *edge, PetscReal factor, const PetscReal u[],
                     const PetscReal w[], PetscReal y[])
 {
   const PetscInt n = edge->node[2] < 0 ? 2 : 3;
@@ -779,14 +771,14 @@ static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const 
   }
 }
 
-static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbStage *stage,
-                                           const PetscReal x[], PetscReal y[])
+PetscErrorCode SbPressureBeside(SbEffect e, SbSpace space, const SbStage *stage,
+                                const PetscReal x[], PetscReal y[])
 {
-  const Pressure *load = (const Pressure *)e->data;
+  const SbPressure *load = (const SbPressure *)e->data;
   PetscReal p;
 
   PetscFunctionBeginUser;
-  PetscCall(pressure_at(e, stage->t, &p));
+  PetscCall((*load->at)(e, space, stage, &p));
   p *= stage->shift_k;
   if (load->some)
     PetscCall(add_surface_derivative(load, space, p, stage->u, x, y));
@@ -795,9 +787,9 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_pressure(SbEffect e)
+PetscErrorCode SbPressureDestroy(SbEffect e)
 {
-  Pressure *p = (Pressure *)e->data;
+  SbPressure *p = (SbPressure *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(PetscFree(p->facet));
@@ -820,11 +812,11 @@ const SbEffectType SbEffectPressure = {
   .ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns),
   .column = columns,
   .ops = {.setfromoptions = options_pressure,
-          .setup = setup_pressure,
-          .force = force_pressure,
-          .tangent = tangent_pressure,
-          .nonsymmetric = unsymmetric_pressure,
-          .volume_pressure = volume_pressure,
+          .setup = SbPressureSetUp,
+          .force = SbPressureForce,
+          .tangent = SbPressureTangent,
+          .nonsymmetric = SbPressureBeside,
+          .volume_pressure = SbPressureVolume,
           .history = history_pressure,
-          .destroy = destroy_pressure},
+          .destroy = SbPressureDestroy},
 };

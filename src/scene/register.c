@@ -8,20 +8,11 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {&SbEffectGravity,
-                                                &SbEffectBodyForce,
-                                                &SbEffectTraction,
-                                                &SbEffectPressure,
-                                                &SbEffectFoundation,
-                                                &SbEffectTie,
-                                                &SbEffectSpring,
-                                                &SbEffectCable,
-                                                &SbEffectPointForce,
-                                                &SbEffectFixed,
-                                                &SbEffectPrescribedDisplacement,
-                                                &SbEffectTorque,
-                                                &SbEffectDamping,
-                                                &SbEffectContact};
+  static const SbEffectType *const effects[] = {
+    &SbEffectGravity, &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
+    &SbEffectCavity,  &SbEffectFoundation, &SbEffectTie,      &SbEffectSpring,
+    &SbEffectCable,   &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
+    &SbEffectTorque,  &SbEffectDamping,    &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;

@@ -51,6 +51,7 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectBodyForce));
   PetscCall(SbEffectRegister(&SbEffectTraction));
   PetscCall(SbEffectRegister(&SbEffectPressure));
+  PetscCall(SbEffectRegister(&SbEffectCavity));
   PetscCall(SbEffectRegister(&SbEffectPointForce));
   PetscCall(SbEffectRegister(&SbEffectFoundation));
   PetscCall(SbEffectRegister(&SbEffectTie));

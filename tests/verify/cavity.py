@@ -1,0 +1,129 @@
+"""The effect cavity: a closed cavity filled with a liquid or a gas.
+
+A hollow sphere is filled beyond the greatest pressure that it bears, which a given pressure cannot pass: the pressure has its maximum where the
+closed form of an incompressible neo-Hookean wall has it. The state under the pressure of the fluid is that under the same pressure given. A gas
+keeps p V^n. A filled ball that swings keeps its energy, and a run that goes on from a checkpoint is the same run. All on 1 and 3 ranks. Open
+surfaces, elements with nodes at faces, more drawn out than there is, and moduli that rounding would decide are errors.
+"""
+import itertools
+
+import numpy
+
+from output_common import OUT
+from scene_common import check, finish, history, near, start
+
+COMMON = "-quiet -output_fields none -output_precision double -reproducible -snes_rtol 1e-10 -ksp_rtol 1e-10 "
+INNER, OUTER = 0.04, 0.05
+
+
+def shell(file):
+    """A hollow sphere: a grid of cubes of 4^3 without the inner 2^3, each shell of it drawn onto a sphere."""
+    points, cells = {}, []
+
+    def vertex(corner):
+        grid = numpy.array(corner, float)
+        shell_number = int(abs(grid).max())
+        way = numpy.tan(grid / shell_number * numpy.pi / 4)
+        return points.setdefault(corner, (len(points), way / numpy.linalg.norm(way) * (INNER, OUTER)[shell_number - 1]))[0]
+
+    for cube in itertools.product(range(-2, 2), repeat=3):
+        if all(-1 <= c < 1 for c in cube):
+            continue
+        for order in itertools.permutations(range(3)):
+            corner = list(cube)
+            cell = [vertex(tuple(corner))]
+            for axis in order:
+                corner[axis] += 1
+                cell.append(vertex(tuple(corner)))
+            cells.append(cell)
+    x = [place for _, place in points.values()]
+    with open(file, "w") as f:
+        f.write(f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(x)}\n")
+        for k, place in enumerate(x):
+            f.write("{} {:.17g} {:.17g} {:.17g}\n".format(k + 1, *place))
+        f.write(f"$EndNodes\n$Elements\n{len(cells)}\n")
+        for k, cell in enumerate(cells):
+            a, b, c, d = cell
+            if numpy.linalg.det([x[b] - x[a], x[c] - x[a], x[d] - x[a]]) < 0:
+                c, d = d, c
+            f.write(f"{k + 1} 4 2 1 1 {a + 1} {b + 1} {c + 1} {d + 1}\n")
+        f.write("$EndElements\n")
+    return str(file), sum(abs(numpy.linalg.det([x[k] - x[cell[0]] for k in cell[1:]])) / 6 for cell in cells)
+
+
+MESH, WALL = shell(OUT / "shell.msh")
+
+
+def ball(element, law):
+    return (f"-bodies s -body_s_mesh {MESH} -body_s_material {law} -body_s_element {element} -body_s_young 1e5 -body_s_poisson 0.49 -body_s_density 1000 "
+            "-effect_air_on inside -set_inside_at sphere:0,0,0,0.0405 ")
+
+
+def scene(effects, element="p2", law="neohookean"):
+    return (ball(element, law) + "-sets inside,px,py,pz -set_px_at plane:1,0,0,0 -set_py_at plane:0,1,0,0 -set_pz_at plane:0,0,1,0 "
+            "-effect_x_type fixed -effect_x_on px -effect_x_components x -effect_y_type fixed -effect_y_on py -effect_y_components y "
+            f"-effect_z_type fixed -effect_z_on pz -effect_z_components z -effects x,y,z,{effects} ")
+
+
+def run(folder, options, ranks=1, code=0):
+    return start(folder, COMMON + options, ranks, code)
+
+
+def last(folder):
+    return {name: values[-1] for name, values in history(folder).items()}
+
+
+# through the limit point; the closed form has the pressure 2 mu (f(b) - f(a)), f = 1/l + 1/(4 l^4), at the stretches a inside and b outside
+run("limit", scene("air") + "-effect_air_type cavity -effect_air_added 1.2e-3 -time static -static_steps 12", 1)
+limit = history("limit")
+p, rest = limit["air_pressure"], limit["air_volume"][0]
+inside = numpy.cbrt(limit["air_volume"] / rest)
+outside = numpy.cbrt(1 + (inside**3 - 1) * rest / (rest + WALL))
+exact = 2 * 1e5 / 2.98 * (1 / outside + 0.25 / outside**4 - 1 / inside - 0.25 / inside**4)
+check(0 < p.argmax() < len(p) - 1 and abs(int(p.argmax()) - int(exact.argmax())) <= 1, f"greatest pressure in row {p.argmax()}, in closed form in {exact.argmax()}")
+near(p.max() / exact.max(), 1, 0.05, "greatest pressure over that of the closed form with these volumes")
+near(abs(limit["air_volume"] * (1 + p / 2.2e9) - rest - limit["time"] * 1.2e-3).max() / rest, 0, 1e-9, "volume that the water should have, over that at rest")
+check(limit["newton"].max() <= 25, f"{limit['newton'].max()} iterations in a load step")
+
+for ranks in (1, 3):
+    for element in ("p1", "p2"):
+        what = f"{element}, {ranks} ranks"
+
+        # the same pressure, given
+        run("filled", scene("air", element) + "-effect_air_type cavity -effect_air_added 5e-5 -time static -static_steps 2", ranks)
+        filled = last("filled")
+        run("given", scene("air", element) + f"-effect_air_type pressure -effect_air_value {filled['air_pressure']:.15g} -time static -static_steps 2", ranks)
+        near(last("given")["air_volume"] / filled["air_volume"], 1, 1e-6, f"{what}: volume under the same pressure")
+        near(last("given")["strain"] / filled["strain"], 1, 1e-6, f"{what}: strain energy")
+
+        # a gas that is pumped in
+        run("gas", scene("air", element) + "-effect_air_type cavity -effect_air_added 5e-5 -effect_air_modulus 101325 -effect_air_exponent 1.4 -time static", ranks)
+        gas = history("gas")
+        full = gas["air_volume"][0] + 5e-5
+        near((gas["air_pressure"][-1] + 101325) * gas["air_volume"][-1] ** 1.4 / (101325 * full**1.4), 1, 1e-9, f"{what}: p V^n of the gas")
+
+# it is let go out of shape, and swings: work of the gas is its energy
+SWING = (ball("p1", "stable_neohookean") + "-sets inside -effects air -effect_air_type cavity -effect_air_modulus 101325 "
+         "-body_s_displacement -0.05*x;0.03*y;0.05*z -time newmark ")
+made = []
+for step in (1e-4, 5e-5):
+    run("swing", SWING + f"-ts_dt {step} -ts_max_time 4e-3", 3)
+    swing = history("swing")
+    total = swing["kinetic"] + swing["strain"] + swing["air_energy"]
+    made.append(abs(total / total[0] - 1).max())
+near(made[1], 0, 2e-3, "swinging: energy")
+near(made[0] / made[1], 4, 1.2, "its error, over that with half the step")
+near(abs(swing["momentum_x"]).max() + abs(swing["momentum_z"]).max(), 0, 1e-9, "swinging: momentum, N s")
+run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 2e-3 -checkpoint_every_time 2e-3", 3)
+run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 4e-3 -checkpoint_every_time 2e-3 -restart latest", 1)
+near(last("swing-on")["air_pressure"], swing["air_pressure"][-1], 1e-6 * abs(swing["air_pressure"]).max(), "restart: pressure, Pa")
+
+CAVITY = "-effect_air_type cavity -time static "
+ERRORS = ((scene("air", "cr") + CAVITY, "p1 or p2"), (scene("air", "dg") + CAVITY, "p1 or p2"),
+          (scene("air") + CAVITY + "-effect_air_added -1 ", "can be drawn out"), (scene("air") + CAVITY + "-effect_air_modulus 1e14 ", "rounding"),
+          (scene("air") + CAVITY + "-set_inside_at box:-1,-1,0,1,1,0.041 ", "rim of"), ("-bodies s " + "-body_s_mesh box:0.1,0.1,0.1:1 -body_s_material linear -body_s_young 1e5 "
+          "-body_s_poisson 0.3 -body_s_density 1000 -sets inside -set_inside_at body:s -effects air -effect_air_on inside -effect_air_type cavity ", "around bodies"), (scene("air") + "-effect_air_type cavity -time euler_explicit ", "euler_explicit"))
+for options, words in ERRORS:
+    text = run("error", options, code=1)
+    check(words in text, f"{words}: {text}")
+finish()
