@@ -151,6 +151,11 @@ sanitize: deps ## unit tests and damaged inputs under the address and undefined-
 	@$(if $(T),,tests/run --build build-sanitize --supple build-sanitize/supple --group scenario --sanitize --match mutations.py)
 	@$(if $(T),,for t in formulas.py foreign_meshes.py; do tests/run --build build-sanitize --supple build-sanitize/supple --group verify --sanitize --match $$t || exit 1; done)
 
+coverage: deps ## how much of each source file the tests run, by gcov: unit tests, or GROUP=unit,verify (one: T=name)
+	$(AGAIN) BUILD=build-coverage OPT='-O0 -g --coverage' build-coverage/supple build-coverage/supple-mesh $(if $(filter-out unit,$(GROUP)),tests,build-coverage/unit)
+	@find build-coverage -name '*.gcda' -delete
+	@tests/run --build build-coverage --supple build-coverage/supple --group $(or $(GROUP),unit) $(if $(T),--match '$(T)'); status=$$?; scripts/coverage build-coverage; exit $$status
+
 # MPI's compiler is told to call clang.
 FUZZ    := -O1 -g -fno-omit-frame-pointer -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
 # NULL + 0 of an empty array is undefined in C11 and harmless: only the readers must not have it.
@@ -241,9 +246,9 @@ clean: ## remove build results and meshes; results in out/ stay
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
-	@echo "settings: T=name (tests)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
+	@echo "settings: T=name (tests)  GROUP=unit,verify (coverage)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench measured locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
