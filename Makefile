@@ -140,7 +140,7 @@ check-hard: deps ## robustness tests on 1, 2 and 3 ranks, ten perturbed runs eac
 stability: check-hard ## the same, with the table written into docs/reports/stability.md
 	@scripts/stability --build $(BUILD) --write
 
-lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syntax
+lint: ## format, layers of the include lines, clang-tidy, shellcheck; syntax, style and types of Python
 	@scripts/install-deps lint
 	@COMPILE_FLAGS='-std=c11 $(INCLUDES)' scripts/lint
 
@@ -232,6 +232,9 @@ install: bin/supple bin/supple-mesh manual $(GIVEN) ## programs, man pages, comp
 	install -m 644 README.md CHANGELOG.md LICENSE CITATION.cff $(TO)/share/doc/supple
 	cp -r docs $(TO)/share/doc/supple
 
+check-installed: ## a scenario on one rank and on two, with the programs below PREFIX, after make install
+	@SUPPLE='$(abspath $(TO)/bin)' SCENARIOS='$(abspath $(SHARE)/scenarios)' sh packaging/debian/tests/scenario && echo "the programs in $(TO)/bin work"
+
 dist: ## build/supple-VERSION.tar.gz of the last commit, and its checksum
 	@scripts/package dist
 
@@ -248,7 +251,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  GROUP=unit,verify (coverage)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured locking solvers accuracy docs manual install check-installed dist deb packaging fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)

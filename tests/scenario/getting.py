@@ -47,6 +47,10 @@ def install():
         check(f"not installed: {name}", (root / name).is_file())
     done = run(root / "bin/supple", root / "share/supple/scenarios/cantilever.opts", "-progress", "no", cwd=OUT)
     check(f"the installed program: {done.stderr}", done.returncode == 0 and (OUT / "out/cantilever/history.csv").is_file())
+    done = run("make", "-s", "check-installed", f"DESTDIR={OUT}/root", "PREFIX=/opt/supple")
+    check(f"make check-installed: {done.stdout[-400:]} {done.stderr[-400:]}", done.returncode == 0 and str(root / "bin") in done.stdout)
+    done = run("make", "-s", "check-installed", f"PREFIX={OUT}/nowhere")
+    check("make check-installed without an installation", done.returncode != 0)
     # the Python environment of a copy that the user may not write to is in the user's cache
     cache = OUT / "cache/supple"
     cache.mkdir(parents=True)
@@ -126,6 +130,8 @@ def versions(top):
     heads = re.findall(r"^## (\S+)(?: - (\S+))?$", (top / "CHANGELOG.md").read_text(), re.M)
     check(f"CHANGELOG.md begins with {heads[:1]}, the program is {version}", heads[0][0] == version)
     check("CITATION.cff has another version", f"\nversion: {version}\n" in (top / "CITATION.cff").read_text())
+    package = re.search(r'^version = "(.*)"', (top / "python/pyproject.toml").read_text(), re.M)[1]
+    check(f"python/pyproject.toml is of {package}", package == version)
     recipe = re.search(r'^  version: "(.*)"', (top / "packaging/conda/recipe.yaml").read_text(), re.M)[1]
     check(f"the recipe of conda is for {recipe}", recipe == version or (recipe, ) in [h[:1] for h in heads if h[1]])
     return version
@@ -158,6 +164,7 @@ def release():
     archive = clone / f"build/supple-{version}.tar.gz"
     sha = run("sha256sum", archive).stdout.split()[0]
     check("checksum in the recipes", sha in recipe and sha in (clone / "packaging/spack_repo/supple/packages/supple/package.py").read_text())
+    check("address in the citation", "\nrepository-code: https://example.org/moved\n" in (clone / "CITATION.cff").read_text())
     check("address in the recipe", "https://example.org/moved/releases/supple-${{ version }}.tar.gz" in recipe)
     run("git", "checkout", "-q", f"v{version}", cwd=clone)
     again = run("scripts/package", "dist", cwd=clone)
