@@ -62,11 +62,11 @@ all: bin/supple bin/supple-mesh ## the programs, bin/supple and bin/supple-mesh 
 bin/%: $(BUILD)/% FORCE
 	@mkdir -p bin; cmp -s $< $@ || install -m 755 $< $@
 
-$(BUILD)/supple: $(BUILD)/src/main.o $(BUILD)/libsupple.a
+$(BUILD)/supple: $(BUILD)/src/main.o $(BUILD)/src/version.o $(BUILD)/libsupple.a
 	$(SAY) "  link     $@"
 	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
 
-$(BUILD)/supple-mesh: $(BUILD)/src/mesh_main.o $(BUILD)/libsupple.a
+$(BUILD)/supple-mesh: $(BUILD)/src/mesh_main.o $(BUILD)/src/version.o $(BUILD)/libsupple.a
 	$(SAY) "  link     $@"
 	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
 
@@ -87,6 +87,18 @@ $(BUILD)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(SAY) "  compile  $<"
 	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
+
+# What -version says of the build: commit (of an archive: packaging/commit, which git fills in), compiler and flags.
+BUILT = $(CC) $(OPT) $(filter-out -ffile-prefix-map=% -fdebug-prefix-map=%,$(CPPFLAGS) $(CFLAGS) $(LDFLAGS))
+$(BUILD)/version.h: $(BUILD)/flags FORCE
+	@if [ -e .git ]; then commit=$$(git describe --always --dirty --abbrev=12 --exclude='*' 2>/dev/null); else commit=$$(sed /Format/d packaging/commit 2>/dev/null); fi; \
+	new=$$(printf '%s\n' "$$commit" '$(strip $(BUILT))' | sed 's/[\\"]/\\&/g; s/.*/"&"/; 1s/^/#define SB_COMMIT /; 2s/^/#define SB_BUILT /'); \
+	[ "$$new" = "$$(cat $@ 2>/dev/null)" ] || printf '%s\n' "$$new" >$@
+
+$(BUILD)/src/version.o: src/version.c $(BUILD)/version.h $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(SAY) "  compile  $<"
+	$(Q)$(COMPILE) -include $(BUILD)/version.h -MMD -MP -c -o $@ $<
 
 # Holds the settings that the objects were made with; it is written, and so everything made again, only when they change.
 $(BUILD)/flags: FORCE

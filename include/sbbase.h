@@ -169,10 +169,10 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings);
 /*
   SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT,
   PETSC_ERR_FILE_*, a bad option file) is not printed where it happens, but by SbErrorFinish().
-  Other errors get PETSc's trace. Collective; after MPI_Init(), before PetscInitialize(). program: a
-  literal, begins error lines and warnings.
+  Other errors get PETSc's trace. Collective; after MPI_Init(), before PetscInitialize(). comm: of
+  the run, is duplicated; program: a literal, begins error lines and warnings.
 */
-PetscErrorCode SbErrorHandlerInstall(const char *program);
+PetscErrorCode SbErrorHandlerInstall(MPI_Comm comm, const char *program);
 /* A crash (SIGSEGV, SIGFPE, ...) is one line with the options of solvers that were given; not with
    -no_signal_handler. After PetscInitialize(). */
 PetscErrorCode SbErrorCatchCrashes(void);

@@ -21,8 +21,8 @@ typedef struct {
 } SbCommand;
 
 /*
-  SbCommandLine - takes what is for the program itself out of the command line. Collective; after
-  MPI_Init(), before PetscInitialize().
+  SbCommandLine - takes what is for the program itself out of the command line. Collective on comm;
+  after MPI_Init(), before PetscInitialize().
 
   Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_table FILE; `-help petsc`
   becomes PETSc's own -help. Nothing at all is a request for help, and nothing to run. A first word
@@ -34,7 +34,7 @@ typedef struct {
   Input and output:
     argc, argv - as from main(); words are taken out in place
 */
-PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command);
+PetscErrorCode SbCommandLine(MPI_Comm comm, int *argc, char *argv[], SbCommand *command);
 
 /* Registers every type and option row of the program, in one readable list. Not collective. */
 PetscErrorCode SbRegisterAll(void);

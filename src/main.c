@@ -10,6 +10,7 @@
 #include <hdf5.h>
 #include <signal.h>
 #include "sb.h"
+#include "version.h"
 
 /* Objects of a simulation; re-meshing replaces the first three. */
 typedef struct {
@@ -63,7 +64,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode supple(int argc, char *argv[])
+static PetscErrorCode supple(MPI_Comm comm, int argc, char *argv[])
 {
   SbCommand command;
   static Scene scene; /* static: used by the failure handler */
@@ -71,13 +72,13 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscErrorCode ierr;
   PetscBool left, trace;
   PetscInt unused;
-  char petsc[256];
 
   PetscFunctionBeginUser;
 
   /* initialise libraries and error handling */
-  PetscCall(SbErrorHandlerInstall("supple"));
-  PetscCall(SbCommandLine(&argc, argv, &command));
+  PetscCall(SbErrorHandlerInstall(comm, "supple"));
+  PetscCall(SbCommandLine(comm, &argc, argv, &command));
+  PETSC_COMM_WORLD = comm; /* where PETSc begins */
   ierr = SbOptionsInitialize(&argc, &argv, command.scenario);
   if (ierr)
     SbErrorFindYamlLine();
@@ -99,24 +100,22 @@ static PetscErrorCode supple(int argc, char *argv[])
   if (!trace)
     (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* errors have a message without HDF5's stack */
   for (PetscInt i = 0; i < command.nfile; i++)
-    PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
+    PetscCall(SbOptionsFile(comm, command.file[i]));
 
   if (bare)
-    PetscCall(
-      SbOptionsHelp(PETSC_COMM_WORLD, "")); /* followed by the error that there is nothing to run */
+    PetscCall(SbOptionsHelp(comm, "")); /* followed by the error that there is nothing to run */
 
   /* -help, -version, -options_table: print, without a simulation */
   if (command.help) {
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.help));
+    PetscCall(SbOptionsHelp(comm, command.help));
   } else if (command.version) {
-    PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
-    PetscCall(SbStandardOutputCheck(PETSC_COMM_WORLD));
+    PetscCall(SbVersionPrint(comm, "supple"));
+    PetscCall(SbStandardOutputCheck(comm));
   } else if (command.table) {
-    PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
+    PetscCall(SbOptionsTable(comm, command.table));
   } else {
     /* check options; nothing is computed yet */
-    PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene.model));
+    PetscCall(SbSceneCreate(comm, &scene.model));
     PetscCall(SbRunCreate(scene.model, &scene.run));
     PetscCall(SbLedgerSetFromOptions(scene.run, &scene.ledger));
     PetscCall(SbRemeshSetFromOptions(scene.model, &scene.remesh));
@@ -128,9 +127,9 @@ static PetscErrorCode supple(int argc, char *argv[])
     if (command.view) {
       PetscViewer viewer;
 
-      PetscCall(SbViewerOpen(PETSC_COMM_WORLD, command.view, &viewer));
+      PetscCall(SbViewerOpen(comm, command.view, &viewer));
       PetscCall(SbOptionsView(viewer));
-      PetscCall(SbViewerClose(PETSC_COMM_WORLD, command.view, &viewer));
+      PetscCall(SbViewerClose(comm, command.view, &viewer));
     } else
       PetscCall(simulate(&scene));
 
@@ -140,7 +139,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     PetscCall(SbRunDestroy(&scene.run));
     PetscCall(SbModelDestroy(&scene.model));
     if (!command.view)
-      PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
+      PetscCall(SbOptionsUnused(comm, &unused));
   }
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
@@ -154,5 +153,5 @@ int main(int argc, char *argv[])
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   if (!SbMemoryIsEnough("supple") || MPI_Init(&argc, &argv))
     return 1;
-  return SbErrorFinish(supple(argc, argv));
+  return SbErrorFinish(supple(MPI_COMM_WORLD, argc, argv));
 }

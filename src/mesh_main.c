@@ -7,15 +7,17 @@
 */
 #include <signal.h>
 #include "tool/tool.h"
+#include "version.h"
 
-static PetscErrorCode supple_mesh(int argc, char *argv[])
+static PetscErrorCode supple_mesh(MPI_Comm comm, int argc, char *argv[])
 {
   SbToolLine line;
   SbTool tool;
 
   PetscFunctionBeginUser;
-  PetscCall(SbErrorHandlerInstall("supple-mesh"));
+  PetscCall(SbErrorHandlerInstall(comm, "supple-mesh"));
   PetscCall(SbToolCommandLine(&argc, argv, &line));
+  PETSC_COMM_WORLD = comm; /* where PETSc begins */
   PetscCall(SbOptionsInitialize(&argc, &argv, NULL));
   PetscCall(SbErrorCatchCrashes());
   SbMemoryReturnLarge();
@@ -24,12 +26,12 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   if (line.help) {
     PetscCall(SbToolHelp());
   } else if (line.version) {
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple-mesh %s\n", SB_VERSION));
+    PetscCall(SbVersionPrint(comm, "supple-mesh"));
   } else {
     PetscCall(SbToolSetFromOptions(&line, &tool));
     PetscCall(SbToolRun(&tool));
   }
-  PetscCall(SbStandardOutputCheck(PETSC_COMM_WORLD));
+  PetscCall(SbStandardOutputCheck(comm));
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -39,5 +41,5 @@ int main(int argc, char *argv[])
 {
   if (!SbMemoryIsEnough("supple-mesh") || MPI_Init(&argc, &argv))
     return 1;
-  return SbErrorFinish(supple_mesh(argc, argv));
+  return SbErrorFinish(supple_mesh(MPI_COMM_WORLD, argc, argv));
 }

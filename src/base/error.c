@@ -23,7 +23,7 @@
 #define GRACE 3.0 /* s; grace period in which a failed rank waits for the others */
 
 static struct {
-  MPI_Comm comm;       /* duplicate of MPI_COMM_WORLD without other pending communication */
+  MPI_Comm comm;       /* duplicate of the run's, without other pending communication */
   PetscBool pending;   /* a user error is being returned to main(), or was posted */
   PetscBool posted;    /* by SbErrorPost(): the run counts as failed */
   int code;            /* exit code of the program */
@@ -207,11 +207,11 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
 }
 
-PetscErrorCode SbErrorHandlerInstall(const char *program)
+PetscErrorCode SbErrorHandlerInstall(MPI_Comm comm, const char *program)
 {
   PetscFunctionBeginUser;
   state.program = program;
-  PetscCallMPI(MPI_Comm_dup(MPI_COMM_WORLD, &state.comm));
+  PetscCallMPI(MPI_Comm_dup(comm, &state.comm));
   PetscCall(PetscPushErrorHandler(handler, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,7 +250,7 @@ static PetscErrorCode crashed(int number, void *ctx)
   (void)!write(STDERR_FILENO, line, strlen(line));
   if (PetscGlobalSize == 1)
     _exit(PETSC_ERR_SIG);
-  (void)MPI_Abort(PETSC_COMM_WORLD, PETSC_ERR_SIG);
+  (void)MPI_Abort(state.comm, PETSC_ERR_SIG);
   return PETSC_ERR_SIG;
 }
 

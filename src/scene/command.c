@@ -16,7 +16,7 @@ const SbOption SbCommandRows[] = {
    "petsc runs "
    "and lists PETSc's own"},
   {"version", SB_OPTION_BOOL, 1, "", "false", "",
-   "print the versions of supple and of PETSc, and end"},
+   "print version, commit and compiler flags of supple and the version of PETSc, and end"},
   {"options_file", SB_OPTION_STRING, 1, "", "", "",
    "the scenario, .opts or .yml; its name can also be the first word of the command line"},
   {"scenario_view", SB_OPTION_STRING, 1, "", "", "",
@@ -38,12 +38,12 @@ static PetscBool is_option(const char *word, const char *key)
 
 /* Whether rank 0 can read an option file, which is then recorded; else sets command->problem.
    Collective. */
-static PetscBool readable(const char *file, SbCommand *command)
+static PetscBool readable(MPI_Comm comm, const char *file, SbCommand *command)
 {
   char why[3 * SB_NAME_MAX + 192] = "";
   PetscMPIInt rank;
 
-  (void)MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  (void)MPI_Comm_rank(comm, &rank);
   if (!rank) {
     FILE *f;
     const char *reason = SbFileOpen(file, 0, &f);
@@ -55,7 +55,7 @@ static PetscBool readable(const char *file, SbCommand *command)
     else
       SbOptionsRefused(file, sizeof(why), why);
   }
-  (void)MPI_Bcast(why, sizeof(why), MPI_CHAR, 0, MPI_COMM_WORLD);
+  (void)MPI_Bcast(why, sizeof(why), MPI_CHAR, 0, comm);
   if (!why[0]) {
     if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
       command->file[command->nfile++] = file;
@@ -69,7 +69,7 @@ static PetscBool readable(const char *file, SbCommand *command)
 
 /* Handles one option with its value (NULL: none); returns whether it remains on the command
    line. */
-static PetscBool take_option(const char *name, const char *value, SbCommand *command)
+static PetscBool take_option(MPI_Comm comm, const char *name, const char *value, SbCommand *command)
 {
   if (is_option(name, "help") || !strcmp(name, "-h")) {
     if (value && !strcasecmp(value, "petsc"))
@@ -84,14 +84,14 @@ static PetscBool take_option(const char *name, const char *value, SbCommand *com
   } else if (value &&
              (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
     SbErrorSetFile(value);
-    return readable(value, command);
+    return readable(comm, value, command);
   } else {
     return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
 
-PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
+PetscErrorCode SbCommandLine(MPI_Comm comm, int *argc, char *argv[], SbCommand *command)
 {
   int kept = 1;
 
@@ -107,7 +107,7 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
       PetscCall(PetscOptionsValidKey(argv[i + 1], &next_is_option));
     words = option && !next_is_option ? 2 : 1;
     if (option) {
-      const PetscBool stays = take_option(argv[i], words == 2 ? argv[i + 1] : NULL, command);
+      const PetscBool stays = take_option(comm, argv[i], words == 2 ? argv[i + 1] : NULL, command);
 
       if (stays)
         argv[kept++] = argv[i];
@@ -116,7 +116,7 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
     } else if (i == 1) {
       argv[kept++] = argv[1];
       SbErrorSetFile(argv[1]);
-      if (readable(argv[1], command))
+      if (readable(comm, argv[1], command))
         command->scenario = argv[1];
     } else if (!command->problem[0]) {
       (void)snprintf(

@@ -237,6 +237,8 @@ done
 
 # answers
 check "-version" grep -q '^supple [0-9]' <<<"$("$supple" -version)"
+check "-version names no commit" grep -qE '^commit ([0-9a-f]{12,40}|not known)' <<<"$("$supple" -version)"
+check "-version names no flags" grep -qE ' -(O|g)' <<<"$("$supple" -version)"
 check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "supple "
 check "-help lacks -body_<name>_young" grep -qF -- '-body_<name>_young' <<<"$("${mpi[@]}" 2 "$supple" -help)"
 check "-help body has options of effects" test "$("$supple" -help body | grep -c -- '-effect_<name>_')" = 0

@@ -20,7 +20,7 @@ static PetscErrorCode fails(const char *what)
 static PetscErrorCode program(int argc, char **argv, PetscMPIInt rank, PetscMPIInt size)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbErrorHandlerInstall("supple"));
+  PetscCall(SbErrorHandlerInstall(MPI_COMM_WORLD, "supple"));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(SbWarning(PETSC_COMM_WORLD, "a warning of %d rank%s", (int)size, size == 1 ? "" : "s"));
   if (rank == size - 1)

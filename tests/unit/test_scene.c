@@ -250,7 +250,7 @@ static PetscErrorCode test_command(void)
   SbCommand command;
 
   PetscFunctionBeginUser;
-  PetscCall(SbCommandLine(&argc, argv, &command));
+  PetscCall(SbCommandLine(PETSC_COMM_WORLD, &argc, argv, &command));
   SB_CHECK(argc == 8 && !argv[8], "%d words are left", argc);
   for (int i = 0; i < PetscMin(argc, 8); i++)
     SB_CHECK(!strcmp(argv[i], expected[i]), "word %d is %s", i, argv[i]);
@@ -261,8 +261,24 @@ static PetscErrorCode test_command(void)
     !strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"),
     "%s", command.problem);
   argc = 2;
-  PetscCall(SbCommandLine(&argc, only, &command));
+  PetscCall(SbCommandLine(PETSC_COMM_WORLD, &argc, only, &command));
   SB_CHECK(argc == 1 && !strcmp(command.table, "-") && !command.problem[0], "-options_table alone");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each rank is a run of its own: rank 0 names a file that is not there, the others one that is. */
+static PetscErrorCode test_communicator(void)
+{
+  char *argv[] = {"supple", test_rank ? "scenarios/cantilever.opts" : "nix.opts", NULL};
+  int argc = 2;
+  SbCommand command;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbCommandLine(PETSC_COMM_SELF, &argc, argv, &command));
+  SB_CHECK(!command.problem[0] == (test_rank > 0), "rank %d: '%s'", (int)test_rank,
+           command.problem);
+  SB_CHECK(command.nfile == (test_rank > 0), "rank %d has %d files", (int)test_rank,
+           (int)command.nfile);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,6 +292,7 @@ int main(int argc, char **argv)
   PetscCall(test_file_folder(folder));
   PetscCall(test_model(folder));
   PetscCall(test_names());
+  PetscCall(test_communicator());
   PetscCall(refused("-bodies liver", "-body_liver_mesh"));
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
   PetscCall(
