@@ -106,7 +106,7 @@ SCENES = {
 -probes corner
 -probe_corner_at 48,60,0
 """,
-    "swing": f"""-bodies bar
+    "swing": """-bodies bar
 -body_bar_material corotated
 -body_bar_young 1e5
 -body_bar_poisson 0.4

@@ -75,7 +75,7 @@ def sources():
 
 def blocks(page):
     """(name of the file to write or None, lines) of each indented block."""
-    name, block, out = None, [], []
+    name, block, out, last = None, [], [], ""
     for line in page.read_text().split("\n") + [""]:
         mark = re.match(r"<!-- file: (\S+) -->", line)
         if line.startswith("    ") and (block or last == "") or (block and line == ""):

@@ -5,7 +5,6 @@ import subprocess
 import sys
 
 import h5py
-import numpy
 
 from output_common import MPI, OUT, SUPPLE
 

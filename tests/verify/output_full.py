@@ -4,7 +4,6 @@ A full disk is played by a limit on the size of files, set while the run is goin
 written, which must be found before anything is computed.
 """
 import json
-import os
 import re
 import resource
 import shutil
