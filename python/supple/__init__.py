@@ -3,8 +3,8 @@ studies, options from measurements.
 
     import supple
     run = supple.Run("out/demo")
-    run.times, run.positions(-1), run.field("von_mises", -1), run.history["strain"],
-    run.info["steps"]
+    run.times, run.positions(-1), run.field("von_mises", -1)
+    run.history["strain"], run.info["steps"]
     run = supple.start("scenarios/pull.opts", "out/mine", ranks=2, young=2e4)
     print(supple.sweep("scenarios/pull.opts", young=[1e4, 2e4], poisson=[0.3, 0.4]))
     print(supple.fit("scenarios/pull.opts", {"grip_reaction_x": "force.csv"}, {"young": 2e4}))

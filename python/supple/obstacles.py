@@ -10,12 +10,8 @@ import numpy
 from .formula import split_formulas, value_at
 from .run import FACES, Run, read_text
 
-SURFACES = (
-    "stl",
-    "obj",
-    "ply",
-    "off",
-)  # what trimesh may read here; its other formats name further files or hold more than a surface
+# what trimesh may read here; its other formats name further files or hold more than a surface
+SURFACES = ("stl", "obj", "ply", "off")
 MESH_BYTES = 1 << 32  # largest size of a mesh
 
 
@@ -174,9 +170,8 @@ class Obstacle:
         elif path.suffix.lower().lstrip(".") in SURFACES and path.stat().st_size <= MESH_BYTES:
             import trimesh
 
-            with open(
-                path, "rb"
-            ) as file:  # without its name: materials and pictures that it names are not looked for
+            # without its name: materials and pictures that it names are not looked for
+            with open(path, "rb") as file:
                 surface = trimesh.load_mesh(
                     file, file_type=path.suffix.lower().lstrip("."), process=False
                 )

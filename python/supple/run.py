@@ -15,12 +15,8 @@ import numpy
 
 TEXT_BYTES = 1 << 28  # largest size of a text file, as SB_TEXT_BYTES
 TENSOR = ("xx", "xy", "xz", "yy", "yz", "zz")  # order of six components in fields.h5
-FACES = (
-    (1, 2, 3),
-    (0, 3, 2),
-    (0, 1, 3),
-    (0, 2, 1),
-)  # of a tet, counter-clockwise seen from outside
+# of a tet, counter-clockwise seen from outside
+FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 
 
 class RunError(Exception):
@@ -114,12 +110,11 @@ class Surface:
 
 class Mesh:
     """The bodies' mesh at rest: x [npoint][3] m, cells [ncell][4] points, vertices [ncell][4]
-    (which tell what points coincide where each
-    cell has its own), body [ncell] number of the body, `arrays` the names of what else there is
-    (sets, ranks). Where a body is of p2,
-    cells10 [n][10] are the points of the scene's tets, -1 in those of other elements (else None);
-    without -output_quadratic `cells` are what these are cut into, and parent [ncell] says of which
-    each is part (else None)."""
+    (which tell what points coincide where each cell has its own), body [ncell] number of the
+    body, `arrays` the names of what else there is (sets, ranks). Where a body is of p2, cells10
+    [n][10] are the points of the scene's tets, -1 in those of other elements (else None);
+    without -output_quadratic `cells` are what these are cut into, and parent [ncell] says of
+    which each is part (else None)."""
 
     def __init__(self, group: Any) -> None:
         self.path = group.name
@@ -145,9 +140,7 @@ class Run:
     """What a run wrote into its folder; one that is going on may be read, and again with refresh().
 
     Frames are numbered from 0, negative ones from the end. A frame's arrays have the lengths of
-    mesh(k), which changes where
-    bodies were re-meshed.
-    """
+    mesh(k), which changes where bodies were re-meshed."""
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
@@ -197,9 +190,8 @@ class Run:
     def read_index(self, path: Path) -> None:
         """Frames of fields.h5, and that the newest of them is whole."""
         self.file = h5py.File(path, "r", locking=False)
-        hundreds = own(
-            self.file, "step"
-        )  # not by items(), where a group that has not come to the disk yet is None
+        # not by items(), where a group that has not come to the disk yet is None
+        hundreds = own(self.file, "step")
         self.paths = sorted(
             (f"/step/{hundred}/{step}" for hundred in hundreds for step in own(hundreds, hundred)),
             key=lambda one: int(one.rpartition("/")[2]),

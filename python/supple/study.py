@@ -98,10 +98,9 @@ def options_of(scenario: str | Path, options: dict[str, Any], folder: str | Path
 
 
 def start(scenario: str | Path, folder: str | Path, ranks: int = 1, **options: Any) -> Run:
-    """Runs a scenario into `folder` and returns its Run. Keywords are options without the dash; one
-    that only bodies have, young=2e4, is given
-    to all of them. Results of an earlier run in `folder` are replaced, unless
-    output_overwrite=False keeps them in its subfolder before_DATE.
+    """Runs a scenario into `folder` and returns its Run. Keywords are options without the dash;
+    one that only bodies have, young=2e4, is given to all of them. Results of an earlier run in
+    `folder` are replaced, unless output_overwrite=False keeps them in its subfolder before_DATE.
     Raises RunError with the program's message when the run fails."""
     options = {"output_overwrite": True} | options
     done = subprocess.run(
@@ -193,9 +192,8 @@ def sweep(
     the runs that have ended.
 
     Returns a Table: the options that vary, `status` (completed, or the reason of a failure), the
-    columns of the last row of the
-    history (those named, else all), and `folder`. A run that fails does not end the sweep.
-    """
+    columns of the last row of the history (those named, else all), and `folder`. A run that
+    fails does not end the sweep."""
     lists = {name: values for name, values in options.items() if isinstance(values, list)}
     fixed = {name: value for name, value in options.items() if name not in lists}
     cases = list(itertools.product(*lists.values()))
@@ -233,8 +231,7 @@ def sweep(
 
 def richardson(sizes: Iterable[float], values: Iterable[float]) -> tuple[float, float]:
     """Order and limit of f(h) = f0 + C h^p through the three smallest sizes h: (p, f0); (nan, value
-    of the smallest) where they do not
-    approach a limit in that way.
+    of the smallest) where they do not approach a limit in that way.
 
     Reference: Roache, Verification and Validation in Computational Science and Engineering, 1998,
     section 5.
@@ -307,10 +304,8 @@ def convergence(
     """Runs a scenario once for each of `sizes` (m, or s), and extrapolates a quantity to size zero.
 
     Options that are lists have one value for each size: mesh=["box:1,1,1:4", "box:1,1,1:8"], or
-    ts_dt=[0.01, 0.005]. The quantity is a
-    column of the history, whose last row counts, or a function of the Run. Three sizes at least.
-    Returns a Convergence.
-    """
+    ts_dt=[0.01, 0.005]. The quantity is a column of the history, whose last row counts, or a
+    function of the Run. Three sizes at least. Returns a Convergence."""
     if len(sizes) < 3 or any(len(v) != len(sizes) for v in options.values() if isinstance(v, list)):
         raise RunError(
             "a convergence study needs three sizes or more, and as many values of each option "
