@@ -260,7 +260,7 @@ clean: ## remove build results and meshes; results in out/ stay
 	rm -rf build build-* bin meshes/*.msh
 
 help: ## this list
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-24s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  GROUP=unit,verify (coverage)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
 .PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured locking solvers accuracy docs manual install check-installed dist deb packaging fuzz clean help FORCE
