@@ -1,8 +1,10 @@
 """What those who join meet: the top level has the folders that it has; the rows of the hosted verification are commands that run by hand, and name what is wrong with others; hooks
-before a commit call what is there; scripts/coverage counts lines, for two small files.
+before a commit call what is there; scripts/coverage counts lines, for two small files; no type of the program is among
+what the documents say it does not have.
 
 @cpu 60
 """
+import csv
 import os
 import re
 import shutil
@@ -86,9 +88,22 @@ def coverage():
     check(f"scripts/coverage without counters: {done.stderr}", done.returncode == 1 and "make coverage" in done.stderr)
 
 
+def missing():
+    """What docs/reference/not_there.md says is not there is no type of the program: the beginnings of its rows beside the names of effects and materials."""
+    page = (TOP / "docs/reference/not_there.md").read_text()
+    pieces = [piece.strip().lower() for row in re.findall(r"^\| ([^|`]+) \|", page, re.M) for piece in re.split(r"[,:;]| and ", row)]
+    table = csv.DictReader(run(TOP / os.environ["SB_SUPPLE"], "-options_table").stdout.splitlines(), delimiter="\t", quoting=csv.QUOTE_NONE)
+    types = {row["type"] for row in table if row["class"] in ("effect", "body") and len(row["type"]) > 2}
+    check(f"{len(types)} types, {len(pieces)} things that are not there", len(types) > 20 and len(pieces) > 40)
+    for name in sorted(types):
+        found = [piece for piece in pieces if piece.startswith(name.replace("_", " ").removesuffix("y"))]
+        check(f"docs/reference/not_there.md says there is no {found}: {name} is a type", not found)
+
+
 top_level()
 rows()
 hooks()
 coverage()
+missing()
 print(f"{passed} passed, {failed} failed")
 raise SystemExit(failed > 0)
