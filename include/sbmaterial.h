@@ -15,6 +15,7 @@ typedef struct _p_SbMaterial *SbMaterial;
 typedef struct _p_SbFibres *SbFibres;   /* directions of the axes of a law with fibres */
 typedef struct _p_SbViscous *SbViscous; /* of a viscoelastic material */
 typedef struct _p_SbActive *SbActive;   /* of fibres that contract */
+typedef struct _p_SbMullins *SbMullins; /* of a material that softens by its first stretch */
 
 /* polar.c, spectral.c: 3x3 matrices of a batch */
 
@@ -122,7 +123,8 @@ typedef struct {
     limited  - psi is also infinite beyond a limit of stretch, and stress and tangent are no numbers
     fibres   - the law depends on directions in the rest state, SbMaterial.axes; Hooke's law at rest
                has the mean of its shear moduli over all directions
-    share    - psi_mu has the part share mu/2 theta^2
+    share    - psi_mu has the part share mu/2 theta^2; 2/3: psi is K/2 theta^2 and an energy of the
+               shape alone
 */
 typedef struct {
   const char *name;
@@ -145,21 +147,23 @@ struct _p_SbMaterial {
   PetscReal density;         /* kg/m^3 */
   PetscBool
     adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
-  SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
-  SbMaterial point;      /* SbMaterialGetPointwise(), likewise */
-  SbMaterial stiffest;   /* SbMaterialGetStiffest(), likewise */
-  void *data;            /* the law's own constants; freed with the material */
-  SbFibres fibres;       /* of a law with fibres, or that contract, else NULL; owned */
-  SbViscous viscous;     /* of a viscoelastic material, else NULL; owned */
-  SbActive active;       /* of fibres that contract, else NULL; owned */
+  SbTangentKind tangent;              /* tangent of ops.frame or ops.tangent */
+  SbMaterial shear;                   /* SbMaterialGetShear(); NULL until it is asked for; owned */
+  SbMaterial point;                   /* SbMaterialGetPointwise(), likewise */
+  SbMaterial stiffest;                /* SbMaterialGetStiffest(), likewise */
+  void *data;                         /* the law's own constants; freed with the material */
+  SbFibres fibres;                    /* of a law with fibres, or that contract, else NULL; owned */
+  SbViscous viscous;                  /* of a viscoelastic material, else NULL; owned */
+  SbActive active;                    /* of fibres that contract, else NULL; owned */
+  const struct _p_SbMullins *mullins; /* of one that softens, else NULL; owned */
   /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
      state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
   const SbPack *axes;
-  /* of a copy by SbActiveStrain(), else NULL: the law, borrowed; of a batch, along and across its
-     fibres the inverse of their stretch without stress, [2] */
+  /* of a copy by SbActiveStrain() or SbMullinsSoften(), else NULL: the law, borrowed; of a batch,
+     along and across its fibres the inverse of their stretch without stress, [2]; or the largest
+     energy of the shape that a point had, J/m^3, and NULL or the factor that its stress keeps */
   const struct _p_SbMaterial *inner;
-  const SbPack *shortening;
+  const SbPack *shortening, *most, *factor;
 };
 
 /* Where the axes of a law with fibres come from: formulas of the place; fields of the mesh file; or
@@ -172,6 +176,12 @@ struct _p_SbFibres {
   /* outer, inner, base, apex, inner of the right ventricle or ""; the first one "": no rule */
   char surface[SB_FIBRE_SURFACES][SB_NAME_MAX];
   PetscReal angle[4]; /* rad, alpha inside and outside, beta inside and outside */
+};
+
+/* Constants of softening (src/material/mullins.c). */
+struct _p_SbMullins {
+  PetscReal r;       /* above 1 */
+  PetscReal m, beta; /* J/m^3, and without unit */
 };
 
 /* A tension along the fibres (src/material/active.c). */
@@ -277,6 +287,18 @@ void SbActiveStrain(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,
                     const SbPack shortening[2]);
 /* Of such a law the derivative of psi by the strain g, a = 1/(1 + g), b = sqrt(1 + g); J/m^3. */
 void SbActiveStrainForce(const struct _p_SbMaterial *m, const SbPack F[9], SbPack force);
+/* Makes m, a copy of `law` with its axes, that law softened; the caller sets `most` and `factor`.
+   Not collective. */
+void SbMullinsSoften(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,
+                     const struct _p_SbMullins *mullins);
+/* Such a law without softening, with its axes and tangent. */
+struct _p_SbMaterial SbMullinsLaw(const struct _p_SbMaterial *m);
+/* Of such a law the energy of the shape without softening, J/m^3; and the factor of softening on
+   its stress. Not collective. */
+void SbMullinsShape(const struct _p_SbMaterial *m, const SbPack F[9], SbPack W);
+void SbMullinsFactor(const struct _p_SbMaterial *m, const SbPack F[9], SbPack eta);
+/* Energy that is lost until the largest one of the shape is `most`, J/m^3. Not collective. */
+PetscReal SbMullinsLost(const struct _p_SbMullins *mullins, PetscReal most);
 /* At the strain E = (l^2 - 1)/2 of fibres: their energy phi over the tension, the factor G of the
    stress, and c = l dG/dl. rate: NULL without a velocity. Not collective. */
 void SbActiveFactors(const struct _p_SbActive *active, const SbPack E, const SbFibreRate *rate,

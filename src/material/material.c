@@ -55,6 +55,13 @@ static const SbOption body_rows[] = {
    "Hill: k of the factor (1 + v) / (1 - v/k) on the tension, v the rate over active_velocity"},
   {"active_eccentric", SB_OPTION_REAL, 1, "", "1.5", "[1, inf)",
    "this factor of fibres that lengthen fast"},
+  {"mullins_r", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
+   "rubber that softens by its first stretch (Mullins): r of Ogden and Roxburgh, above 1; at most "
+   "1/r of the stress that changes the shape is lost; 0: it does not soften"},
+  {"mullins_m", SB_OPTION_REAL, 1, "J/m^3", "0", "[0, inf)",
+   "softening spreads over energies of the shape of m + beta times the largest one so far"},
+  {"mullins_beta", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
+   "beta of mullins_m; 0: the original of Ogden and Roxburgh"},
   SB_FIBRE_ROWS,
 };
 
@@ -206,6 +213,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
     }
     PetscCall(SbViscousRelax(m, &scope));
   }
+  PetscCall(SbMullinsRead(m, &scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -234,6 +242,7 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscCall(SbMaterialDestroy(&(*m)->stiffest));
   PetscCall(SbFibresDestroy(&(*m)->fibres));
   PetscCall(SbActiveDestroy(&(*m)->active));
+  PetscCall(PetscFree((*m)->mullins));
   if ((*m)->viscous) {
     PetscCall(SbMaterialDestroy(&(*m)->viscous->step));
     PetscCall(SbMaterialDestroy(&(*m)->viscous->relaxed));

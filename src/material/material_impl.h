@@ -52,6 +52,11 @@ PetscErrorCode SbViscousRead(SbMaterial m, const SbScope *scope);
    not begun. Error: PETSC_ERR_USER for a series that the law does not admit. */
 PetscErrorCode SbViscousRelax(SbMaterial m, const SbScope *scope);
 
+/* mullins.c: reads the constants of softening into m->mullins; NULL: there is none. After the
+   tension of fibres and the series. Errors: PETSC_ERR_USER for constants out of range, and for laws
+   and options that softening does not go with. */
+PetscErrorCode SbMullinsRead(SbMaterial m, const SbScope *scope);
+
 /* Option row of a law without a warped tangent. */
 #define SB_MATERIAL_TANGENT_ROW                                                          \
   {                                                                                      \
