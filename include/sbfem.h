@@ -46,6 +46,7 @@ typedef struct {
   SbPack *axes;         /* [batches][9] SbMaterial.axes of a law with fibres, else NULL; owned */
   SbLinearStress *stress; /* [batches][points]; NULL before SbSpaceLineariseStress(); owned */
   struct _p_SbStressHistory *history;   /* of a viscoelastic material, else NULL; owned */
+  struct _p_SbSoftening *softening;     /* of a material that softens, else NULL; owned */
   struct _p_SbContraction *contraction; /* of fibres that contract, else NULL; owned */
 } SbRegion;
 
@@ -136,13 +137,16 @@ struct _p_SbSpace {
     block_scale;    /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
-  PetscBool positive; /* a region's law has infinite energy where det F <= 0 */
-  PetscInt viscous;   /* history variables of a cell at most, all ranks; 0: no viscoelastic body */
-  PetscBool viscous_began;     /* they have values */
-  PetscLogEvent viscous_event; /* SbMat_viscous, around their updates */
-  PetscBool active;            /* some fibres contract, on any rank, */
-  PetscBool active_rates;      /* and with a force that depends on their velocity */
-  PetscLogEvent active_event;  /* SbMat_active, around the evaluation of their tensions */
+  PetscBool positive;            /* a region's law has infinite energy where det F <= 0 */
+  PetscInt nhistory;             /* history variables of a cell at most, all ranks */
+  PetscBool viscous;             /* some body is viscoelastic, on any rank */
+  PetscBool viscous_began;       /* they have values */
+  PetscLogEvent viscous_event;   /* SbMat_viscous, around their updates */
+  PetscBool softening;           /* some body softens, on any rank */
+  PetscLogEvent softening_event; /* SbMat_mullins, around the updates of its history */
+  PetscBool active;              /* some fibres contract, on any rank, */
+  PetscBool active_rates;        /* and with a force that depends on their velocity */
+  PetscLogEvent active_event;    /* SbMat_active, around the evaluation of their tensions */
   SbPack
     *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
@@ -238,19 +242,39 @@ PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
                           and m/s, raises loss, J: by the mean of their stresses at both ends, as
                           works in the energy balance
   SbSpaceViscousStored  - energy of the branches of a body, -1: of all, J. Not collective.
-  SbSpaceGetHistory     - for checkpoints, x[viscous ncell_owned]. Not collective.
-  SbSpaceSetHistory     - the same
-  SbSpaceMeanHistory    - in the record x of an owned cell, from SbSpaceGetHistory(), the branches
-  of
-                          its points become their mean, first in the record; back: the points of a
-                          cell of another mesh get it, and its last step is that of
-                          SbSpaceViscousStart(), to be called then. Not collective.
 */
 PetscErrorCode SbSpaceViscousStart(SbSpace space, Vec U);
 PetscErrorCode SbSpaceViscousAt(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
 PetscErrorCode SbSpaceViscousAdvance(SbSpace space, PetscReal dt, Vec U0, Vec U1, PetscReal *loss);
 PetscErrorCode SbSpaceViscousWork(SbSpace space, const Vec U[2], const Vec V[2], PetscReal *loss);
 PetscReal SbSpaceViscousStored(SbSpace space, PetscInt body);
+
+/*
+  Materials that soften (src/fem/mullins.c); nothing without any.
+
+  SbSpaceMullinsAdvance - the state U, m, was accepted, or a run begins there: points remember the
+                          largest energy of their shape. loss: raised by what that lost, J, or NULL:
+                          energies are not wanted. Collective.
+  SbSpaceMullinsFreeze  - stresses have the factor that they have at U, whatever they are of; U
+                          NULL: no longer. Collective.
+  SbSpaceMullinsFactor  - per owned cell: the factor on the stress that changes the shape, the mean
+                          of its points, value[ncell_owned]; 1 without softening. Not collective.
+*/
+PetscErrorCode SbSpaceMullinsAdvance(SbSpace space, Vec U, PetscReal *loss);
+PetscErrorCode SbSpaceMullinsFreeze(SbSpace space, Vec U);
+void SbSpaceMullinsFactor(SbSpace space, const PetscReal u[], PetscReal value[]);
+
+/*
+  The history of cells of both kinds (src/fem/history.c).
+
+  SbSpaceGetHistory  - for checkpoints, x[nhistory ncell_owned]. Not collective.
+  SbSpaceSetHistory  - the same. Collective.
+  SbSpaceMeanHistory - in the record x of an owned cell, from SbSpaceGetHistory(), what its points
+                       have becomes their mean, first in the record: branches of a series, largest
+                       energies; back: the points of a cell of another mesh get it, and the last
+                       step of a viscoelastic one is that of SbSpaceViscousStart(), to be called
+                       then. Not collective.
+*/
 PetscErrorCode SbSpaceGetHistory(SbSpace space, PetscReal x[]);
 PetscErrorCode SbSpaceSetHistory(SbSpace space, const PetscReal x[]);
 PetscErrorCode SbSpaceMeanHistory(SbSpace space, const PetscBool of_body[], PetscBool back,

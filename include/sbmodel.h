@@ -16,6 +16,7 @@ typedef struct {
   PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
   PetscReal relaxation_loss; /* dissipated by Prony series of materials since the start, J */
   PetscReal viscosity_loss;  /* by viscosities of materials, J */
+  PetscReal mullins_loss;    /* by softening of materials, J */
   PetscReal remesh_loss;     /* energy lost by re-meshing since the start, J */
   PetscReal remesh_mass; /* change by re-meshings since the start, each as its absolute value, kg */
   PetscReal remesh_momentum; /* likewise of the momentum, kg m/s */

@@ -260,16 +260,45 @@ struct _p_SbContraction {
   SbFibreRate *rate; /* [batches][npoint] with a velocity, else NULL */
   PetscBool moving;  /* it is known: not in static runs */
 };
-/* A law of a region as its operations take it for batch b: itself or, of a law with fibres, `own`,
-   a copy with the axes of these cells. */
+/* mullins.c: the largest energies of the shape of the cells of a region that softens. */
+struct _p_SbSoftening {
+  int npoint;
+  SbPack *most, *factor; /* [batches][npoint] J/m^3; of SbSpaceMullinsFreeze(), */
+  PetscBool frozen;      /* which acts */
+};
+PetscErrorCode SbMullinsCreate(SbSpace space);
+PetscErrorCode SbMullinsDestroy(SbRegion *region);
+/* history.c: what viscous.c and mullins.c keep of cells, once there are batches. Collective. */
+#define SB_HISTORY_POINT \
+  (8 * SB_PRONY_TERMS) /* numbers of a point that another mesh takes at most */
+PetscErrorCode SbHistoryCreate(SbSpace space);
+
+/* Of a copy of the law of a region that softens: that at point q of batch b. */
+SB_INLINE void SbPointLaw(const SbRegion *region, PetscInt b, int q, struct _p_SbMaterial *own)
+{
+  const struct _p_SbSoftening *a = region->softening;
+  const PetscInt k = a ? a->npoint * (b - region->bstart) + q : 0;
+
+  if (!a)
+    return;
+  own->most = (const SbPack *)a->most + k;
+  own->factor = a->frozen ? (const SbPack *)a->factor + k : NULL;
+}
+/* A law of a region as its operations take it for batch b: itself or, of a law with fibres or one
+   that softens, `own`, a copy with what these cells have; at the first point, for others
+   SbPointLaw(). */
 SB_INLINE const struct _p_SbMaterial *SbBatchAxes(const SbRegion *region,
                                                   const struct _p_SbMaterial *law, PetscInt b,
                                                   struct _p_SbMaterial *own)
 {
-  if (!region->axes)
+  if (!region->axes && !region->softening)
     return law;
   *own = *law;
-  own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
+  if (region->axes)
+    own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
+  if (region->softening)
+    SbMullinsSoften(own, law, region->material->mullins);
+  SbPointLaw(region, b, 0, own);
   if (region->contraction && region->contraction->shortening)
     SbActiveStrain(own, law,
                    (const SbPack *)region->contraction->shortening + 2 * (b - region->bstart));

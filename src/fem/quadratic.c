@@ -197,6 +197,7 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
 
   SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
   for (int q = 0; q < at.n; q++) {
+    SbPointLaw(region, b, q, &own);
     if (P)
       law->ops.stress(law, (const SbPack *)F[q], P[q]);
     if (psi)

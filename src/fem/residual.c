@@ -65,6 +65,7 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
       }
     }
     for (int q = 0; q < at.n; q++) {
+      SbPointLaw(region, b, q, &own);
       if (elastic)
         law->ops.stress(law, (const SbPack *)F[q], P);
       if (elastic && region->history)

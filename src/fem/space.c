@@ -253,7 +253,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(find_regions(s));
   PetscCall(tabulate_batches(s));
   PetscCall(SbSpaceFindAxes(s));
-  PetscCall(SbViscousCreate(s));
+  PetscCall(SbHistoryCreate(s));
   PetscCall(SbActiveCreate(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
@@ -329,6 +329,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
     PetscCall(PetscFree(s->region[r].stress));
     PetscCall(PetscFree(s->region[r].axes));
     PetscCall(SbViscousDestroy(&s->region[r]));
+    PetscCall(SbMullinsDestroy(&s->region[r]));
     PetscCall(SbActiveDestroyRegion(&s->region[r]));
   }
   PetscCall(PetscFree(s->region));

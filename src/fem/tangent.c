@@ -337,6 +337,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     if (has_linear_stress(s, region))
       at.stress = &region->stress[points.n * (batch - region->bstart) + q];
     SbPointVolume(&points, q, W);
+    SbPointLaw(region, batch, q, &own);
     if (region->history && point_pressure(region, batch, q, of_mean, pressure))
       at.pressure = (const SbPack *)&pressure;
     law_blocks(local, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);

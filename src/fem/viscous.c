@@ -109,8 +109,6 @@ static void measure(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POIN
 
 PetscErrorCode SbViscousCreate(SbSpace s)
 {
-  PetscInt n = 0;
-
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     SbRegion *region = &s->region[r];
@@ -131,11 +129,7 @@ PetscErrorCode SbViscousCreate(SbSpace s)
     PetscCall(PetscCalloc3(points * (size_t)h->width, &h->last,
                            points * (size_t)h->width * (size_t)v->n, &h->branch,
                            points * (size_t)h->width, &h->dead));
-    n = PetscMax(n, h->npoint * h->width * (1 + v->n));
   }
-  PetscCallMPI(MPI_Allreduce(&n, &s->viscous, 1, MPIU_INT, MPI_MAX, s->comm));
-  if (s->viscous)
-    PetscCall(SbLogNamed("Mat", "viscous", &s->viscous_event));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -457,85 +451,5 @@ PetscErrorCode SbSpaceViscousWork(SbSpace s, const Vec U[2], const Vec V[2], Pet
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
   *loss += sum;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Copies the history of a lane to or from x. */
-static void copy_lane(const SbRegion *region, PetscInt b, int l, PetscBool out, PetscReal x[])
-{
-  const struct _p_SbStressHistory *h = region->history;
-  const PetscInt n = region->material->viscous->n;
-
-  for (int q = 0; q < h->npoint; q++) {
-    SbPack *const from[2] = {h->last + h->width * SbHistoryPoint(region, b, q),
-                             h->branch + h->width * n * SbHistoryPoint(region, b, q)};
-
-    for (int part = 0; part < 2; part++) {
-      for (PetscInt k = 0; k < h->width * (part ? n : 1); k++, x++)
-        if (out)
-          *x = from[part][k][l];
-        else
-          from[part][k][l] = *x;
-    }
-  }
-}
-
-PetscErrorCode SbSpaceGetHistory(SbSpace s, PetscReal x[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(x, s->viscous * s->mesh->ncell_owned));
-  for (PetscInt b = 0; b < s->nbatch_owned; b++)
-    for (PetscInt l = 0; s->batch_region[b]->history && l < s->batch_n[b]; l++)
-      copy_lane(s->batch_region[b], b, (int)l, PETSC_TRUE, x + s->viscous * (s->batch_cell[b] + l));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceSetHistory(SbSpace s, const PetscReal own[])
-{
-  PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->viscous * s->mesh->ncell, &x));
-  PetscCall(PetscArraycpy(x, own, s->viscous * s->mesh->ncell_owned));
-  PetscCall(SbForestBroadcast(s->mesh->cell_sf, s->viscous, MPIU_REAL, x, x));
-
-  /* padding repeats the first cell */
-  for (PetscInt b = 0; b < s->nbatch; b++)
-    for (int l = 0; s->batch_region[b]->history && l < SB_BATCH; l++)
-      copy_lane(s->batch_region[b], b, l, PETSC_FALSE,
-                x + s->viscous * (s->batch_cell[b] + (l < s->batch_n[b] ? l : 0)));
-  PetscCall(PetscFree(x));
-  s->viscous_began = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceMeanHistory(SbSpace s, const PetscBool of_body[], PetscBool back,
-                                  PetscInt stride, PetscReal x[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
-    const SbRegion *region = s->batch_region[b];
-    const struct _p_SbStressHistory *h = region->history;
-
-    if (!h || !of_body[region->body])
-      continue;
-
-    // a point has the numbers of the last step, then those of the branches
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      const PetscInt n = h->width * region->material->viscous->n;
-      PetscReal *record = x + stride * (s->batch_cell[b] + l);
-      PetscReal mean[SB_WIDTH * SB_PRONY_TERMS] = {0.};
-
-      for (PetscInt k = 0; k < n * h->npoint && !back; k++)
-        mean[k % n] += record[(h->width + n) * (k / n) + h->width + k % n] / h->npoint;
-      if (back)
-        PetscCall(PetscArraycpy(mean, record, n));
-      PetscCall(PetscArrayzero(record, stride));
-      if (!back)
-        PetscCall(PetscArraycpy(record, mean, n));
-      for (PetscInt k = 0; k < n * h->npoint && back; k++)
-        record[(h->width + n) * (k / n) + h->width + k % n] = mean[k % n];
-    }
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

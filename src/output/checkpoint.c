@@ -32,7 +32,7 @@ typedef struct {
   PetscInt ncomp;
   uint64_t salt;
   Vec vec;        /* NULL: penalty data of faces, or */
-  PetscBool past; /* the history of viscoelastic cells */
+  PetscBool past; /* the history of cells */
 } Part;
 
 /* Those of a run: arc length has `path`; penalty data of faces are there where they are history
@@ -44,14 +44,14 @@ static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
   const PetscBool implicit =
     (PetscBool)(m->dynamic && run->solve.J && run->solve.preset != SB_TIME_ALPHA2);
   const PetscBool remember = (PetscBool)(implicit && m->space->jump && !m->space->linear);
-  const PetscBool past = (PetscBool)(m->dynamic && m->space->viscous);
+  const PetscBool past = (PetscBool)(m->space->softening || (m->dynamic && m->space->viscous));
   const Part all[NPART] = {
     {"u", "SI", NULL, &out->node, 3, 0, run->state.U, PETSC_FALSE},
     {"v", "SI", NULL, &out->node, 3, 1, run->state.V, PETSC_FALSE},
     {"a", "SI", NULL, &out->node, 3, 2, run->state.A, PETSC_FALSE},
     {"path", "SI", "path_checksum", &out->node, 3, 3, run->state.path, PETSC_FALSE},
     {"jumps", "N/m, Pa", "jumps_checksum", &out->cell, 5, 0, NULL, PETSC_FALSE},
-    {"viscous", "Pa, 1", NULL, &out->cell, m->space->viscous, 4, NULL, PETSC_TRUE}};
+    {"history", "Pa, 1", NULL, &out->cell, m->space->nhistory, 4, NULL, PETSC_TRUE}};
   PetscInt n = 0;
 
   for (int k = 0; k < NPART; k++)
@@ -89,7 +89,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 19
+#define NNUMBER 20
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->state.energies;
@@ -112,6 +112,7 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"good_steps", &run->clock.good_steps, PETSC_TRUE},
     {"relaxation_loss", &e->relaxation_loss, PETSC_TRUE},
     {"viscosity_loss", &e->viscosity_loss, PETSC_TRUE},
+    {"mullins_loss", &e->mullins_loss, PETSC_TRUE},
     {"active_work", &e->active_work, PETSC_TRUE},
   };
 

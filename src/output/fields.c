@@ -313,6 +313,19 @@ static PetscErrorCode tension(const SbField *f, SbRun run, const SbStep *step, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode softening(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  const SbSpace s = run->model->space;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  (void)f;
+  PetscCall(SbSpaceGetLocalRead(s, step->U, &u));
+  SbSpaceMullinsFactor(s, u, values);
+  PetscCall(SbSpaceRestoreLocalRead(s, step->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 #define CELL .cell = PETSC_TRUE
 #define STEP(member) .from = offsetof(SbStep, member)
 #define STATE(member) .from = offsetof(struct _p_SbOutput, member)
@@ -352,6 +365,8 @@ static const SbField table[] = {
   {"sheet", "1", 3, CELL, .compute = axis, .help = "second axis of these laws, at rest"},
   {"active_tension", "Pa", 1, CELL, .compute = tension,
    .help = "tension of fibres that contract, with its factors by length and velocity; else 0"},
+  {"mullins_factor", "1", 1, CELL, .compute = softening,
+   .help = "factor of softening on the stress that changes the shape; without it 1"},
   {"body", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
    .help = "number of the body, always written"},
   {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,

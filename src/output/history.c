@@ -79,7 +79,8 @@ static const struct {
 } losses[] = {{"relaxation_loss", AT(energies.relaxation_loss)},
               {"viscosity_loss", AT(energies.viscosity_loss)}};
 
-#define ACTIVE "active_work" /* with fibres that contract */
+#define ACTIVE "active_work"   /* with fibres that contract */
+#define MULLINS "mullins_loss" /* with materials that soften */
 
 /* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
 static const struct {
@@ -135,6 +136,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     put_column(line, "J", ",%s", losses[i].name);
   if (run->model->space->active)
     put_column(line, "J", "," ACTIVE);
+  if (run->model->space->softening)
+    put_column(line, "J", "," MULLINS);
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     const SbEffect effect = run->model->history[e];
 
@@ -321,6 +324,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
                     *(const PetscReal *)(const void *)((const char *)step + losses[k].from));
     if (s->active)
       (void)fprintf(h->text, ",%.17g", e->active_work);
+    if (s->softening)
+      (void)fprintf(h->text, ",%.17g", e->mullins_loss);
     for (PetscInt k = 0; k < h->nextra; k++)
       (void)fprintf(h->text, ",%.17g", h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)

@@ -236,29 +236,29 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
+PetscErrorCode SbHistoryHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
                                  const PetscBool due[])
 {
   const SbModel a = from->model;
   const SbModel b = to->model;
-  const PetscInt n = PetscMax(a->space->viscous, b->space->viscous);
+  const PetscInt n = PetscMax(a->space->nhistory, b->space->nhistory);
   PetscReal *own, *record, *all[2];
   PetscMPIInt rank;
   PetscSF sf;
 
   PetscFunctionBeginUser;
-  if (!n || !a->dynamic)
+  if (!n || (!a->dynamic && !a->space->softening))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_rank(a->comm, &rank));
   PetscCall(
     PetscCalloc2(rank ? 0 : n * a->mesh->Ncell, &all[0], rank ? 0 : n * b->mesh->Ncell, &all[1]));
 
   // a record of n numbers per cell; of bodies with a new mesh the mean over the points of a cell
-  PetscCall(PetscMalloc1(a->space->viscous * a->mesh->ncell_owned, &own));
+  PetscCall(PetscMalloc1(a->space->nhistory * a->mesh->ncell_owned, &own));
   PetscCall(PetscCalloc1(n * a->mesh->ncell_owned, &record));
   PetscCall(SbSpaceGetHistory(a->space, own));
   for (PetscInt c = 0; c < a->mesh->ncell_owned; c++)
-    PetscCall(PetscArraycpy(record + n * c, own + a->space->viscous * c, a->space->viscous));
+    PetscCall(PetscArraycpy(record + n * c, own + a->space->nhistory * c, a->space->nhistory));
   PetscCall(PetscFree(own));
   PetscCall(SbSpaceMeanHistory(a->space, due, PETSC_FALSE, n, record));
 
@@ -278,9 +278,9 @@ PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *res
   PetscCall(SbForestBroadcast(sf, n, MPIU_REAL, all[1], record));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(SbSpaceMeanHistory(b->space, due, PETSC_TRUE, n, record));
-  PetscCall(PetscMalloc1(b->space->viscous * b->mesh->ncell_owned, &own));
+  PetscCall(PetscMalloc1(b->space->nhistory * b->mesh->ncell_owned, &own));
   for (PetscInt c = 0; c < b->mesh->ncell_owned; c++)
-    PetscCall(PetscArraycpy(own + b->space->viscous * c, record + n * c, b->space->viscous));
+    PetscCall(PetscArraycpy(own + b->space->nhistory * c, record + n * c, b->space->nhistory));
   PetscCall(SbSpaceSetHistory(b->space, own));
   PetscCall(PetscFree(own));
   PetscCall(PetscFree(record));
@@ -288,8 +288,13 @@ PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *res
 
   // the law at the last step is that of the new mesh, the same bit for bit where that is the old
   // one
-  b->space->viscous_began = PETSC_FALSE;
-  PetscCall(SbSpaceViscousStart(b->space, to->state.U));
+  if (b->dynamic) {
+    b->space->viscous_began = PETSC_FALSE;
+    PetscCall(SbSpaceViscousStart(b->space, to->state.U));
+  }
+
+  // where the new mesh stretches more than the old one did, what that loses is lost by re-meshing
+  PetscCall(SbSpaceMullinsAdvance(b->space, to->state.U, NULL));
   for (PetscInt k = 0; k < a->nmaterial; k++)
     if (a->material[k]->viscous)
       PetscCall(PetscArraycpy(b->material[k]->viscous->stored, a->material[k]->viscous->stored,

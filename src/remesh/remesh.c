@@ -352,7 +352,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   // transfer the state
   PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
-  PetscCall(SbViscousHandOver(before, run, result, r->due));
+  PetscCall(SbHistoryHandOver(before, run, result, r->due));
   PetscCall(prescribe(r, &s));
 
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations

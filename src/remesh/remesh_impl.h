@@ -137,7 +137,7 @@ PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool nam
 
 /* gather.c: transfers the history variables of effects to the new model. Collective. */
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);
-/* The history of viscoelastic cells at the end of a step, from the cells result->from: bodies with
-   due[nbody] have new meshes. Collective. */
-PetscErrorCode SbViscousHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
+/* The history of cells at the end of a step, from the cells result->from: bodies with due[nbody]
+   have new meshes. Collective. */
+PetscErrorCode SbHistoryHandOver(SbRun from, SbRun to, const SbRemeshResult *result,
                                  const PetscBool due[]);

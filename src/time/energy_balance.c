@@ -119,6 +119,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
                        e->damping_loss - e->remesh_loss - e->kinetic - e->strain;
   if (m->space->viscous)
     e->integrator_loss -= e->relaxation_loss + e->viscosity_loss;
+  if (m->space->softening)
+    e->integrator_loss -= e->mullins_loss;
   e->integrator_loss += e->active_work;
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&

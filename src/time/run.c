@@ -120,6 +120,17 @@ static PetscErrorCode check_active(const SbMaterial m, PetscBool body, SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Integrators that softening does not go with. */
+static PetscErrorCode check_mullins(const SbMaterial m, PetscBool body, SbRun r)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(!m->mullins || !SbRunIsExplicit(r), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s_%s_mullins_r: the stable step of explicit integrators does not know how stiff "
+             "unloading is; take -time euler_implicit, newmark, genalpha or static",
+             body ? "body" : "inclusion", m->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -155,6 +166,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(check_rigid(&model->body[b], r));
   for (PetscInt k = 0; k < model->nmaterial; k++)
     PetscCall(check_active(model->material[k], (PetscBool)(k < model->nbody), r));
+  for (PetscInt k = 0; k < model->nmaterial; k++)
+    PetscCall(check_mullins(model->material[k], (PetscBool)(k < model->nbody), r));
   PetscCheck(!r->solve.reject_inverted || r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,
              PETSC_ERR_USER,
              "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the "
@@ -423,6 +436,7 @@ PetscErrorCode SbRunSolve(SbRun run)
     PetscCall(SbSpaceViscousStart(m->space, run->state.U));
     PetscCall(SbSpaceViscousAt(m->space, 0., PETSC_FALSE, run->state.U, run->state.V));
   }
+  PetscCall(SbSpaceMullinsAdvance(m->space, run->state.U, NULL));
   if (m->dynamic)
     PetscCall(SbSpaceActiveRates(m->space, 0., PETSC_FALSE, run->state.U, run->state.V));
   if (run->solve.ts)

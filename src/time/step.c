@@ -260,9 +260,13 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   if (clock->fixed)
     now.step_end = step + (PetscInt)PetscCeilReal((clock->t_end - t) / clock->dt - 1e-6);
 
-  /* history of effects, energies, reactions */
-  if (!first)
+  /* history of effects and materials, energies, reactions */
+  if (!first) {
     PetscCall(save_history(run, step, t, dt));
+    PetscCall(SbSpaceMullinsAdvance(run->model->space, run->state.U,
+                                    run->monitors.want_energies ? &run->state.energies.mullins_loss
+                                                                : NULL));
+  }
   if (run->monitors.want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
   else if (run->monitors.want_residual) {
