@@ -62,6 +62,8 @@ typedef struct {
     negative_eigenvalues - NULL: unknown. Number in the last factorisation, -1: unknown
     linearise            - NULL: nothing to linearise. Tangents take the stresses linearised at X,
                            or at X for the step to X - s Y; X NULL: of the iterate again
+    freeze               - NULL: nothing to freeze. Laws with a factor whose slope jumps keep the
+                           factor that they have at X; X NULL: no longer
     longest              - NULL: any. part: the longest s in [0, 1] for which E stays finite from X
                            to X - s Y
     prescribed_part      - sets all of D but the prescribed unknowns to zero
@@ -72,6 +74,7 @@ typedef struct {
   PetscErrorCode (*filter)(void *ctx, PetscBool filtered, PetscBool required);
   PetscErrorCode (*negative_eigenvalues)(void *ctx, PetscInt *n);
   PetscErrorCode (*linearise)(void *ctx, Vec X, Vec Y, PetscReal s);
+  PetscErrorCode (*freeze)(void *ctx, Vec X);
   PetscErrorCode (*longest)(void *ctx, Vec X, Vec Y, PetscReal *part);
   PetscErrorCode (*prescribed_part)(void *ctx, Vec D);
   PetscErrorCode (*interrupted)(void *ctx, PetscBool *is);

@@ -23,11 +23,18 @@
   likewise, and is part of S. Where theta is J - 1 its second derivative is exact (tangent.c), while
   S has it at the points of the law, which makes no difference at the solution.
 
+  Cells that soften (mullins.c): the stress that is linearised is that of the law without softening.
+  Its part of the shape is multiplied by the factor at F, which is bounded, where the slope of the
+  softened stress is steep up to the largest stretch so far, and not beyond.
+
   Not handled: co-rotated cells, which have linearised pressures of P2's mean only: their stress
   turns with them.
 */
 #include "fem_impl.h"
 #include "sbgeometry.h"
+
+static const int row[6] = {0, 0, 0, 1, 1, 2};
+static const int column[6] = {0, 1, 2, 1, 2, 2};
 
 #define LEAST 1e-2 /* det F below which a cell counts as degenerate: without geometric stiffness */
 
@@ -76,6 +83,26 @@ static void evaluate(const struct _p_SbMaterial *law, const SbPack F[9], const E
   }
 }
 
+/* The linearised stress of a law that softens: the part of the pressures is left as it is. */
+static void soften(const struct _p_SbMaterial *m, const SbPack F[9], const SbLinearStress *stress,
+                   const SbPack mean, const SbPack D[9], SbPack S[6])
+{
+  SbPack eta;
+
+  SbMullinsFactor(m, F, eta);
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal p = stress->p[l] + (mean ? mean[l] : 0.);
+    PetscReal f[9], d[9], s[9];
+
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, D, l, d);
+    pull_back(f, d, s);
+    for (int k = 0; k < 6; k++)
+      S[k][l] = eta[l] * stress->S[k][l] +
+                (1. - eta[l]) * p * 0.5 * (s[3 * row[k] + column[k]] + s[3 * column[k] + row[k]]);
+  }
+}
+
 void SbLinearStressTangent(const struct _p_SbMaterial *m, const SbPack F[9],
                            const SbLinearStress *stress, const SbPack hessian, const SbPack mean,
                            SbPack C[81])
@@ -83,7 +110,8 @@ void SbLinearStressTangent(const struct _p_SbMaterial *m, const SbPack F[9],
   static const int at[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
   const PetscReal modulus = SbMaterialDilatationModulus(m);
   Extra extra;
-  SbPack S[9], D[9], theta;
+  SbPack S[9], D[9], softened[6], theta;
+  const SbPack *goal = stress->S;
 
   m->ops.dilatation(m, F, theta);
   for (int l = 0; l < SB_BATCH; l++) {
@@ -92,10 +120,14 @@ void SbLinearStressTangent(const struct _p_SbMaterial *m, const SbPack F[9],
     extra.stress[l] = mean ? mean[l] : 0.;
   }
   evaluate(m, F, &extra, C, S, D);
+  if (m->most) {
+    soften(m, F, stress, mean, (const SbPack *)D, softened);
+    goal = (const SbPack *)softened;
+  }
   for (int k = 0; k < 27; k++) {
     const int i = k / 9;
     const int n = k % 9;
-    const SbPack *lin = stress->S + at[n];
+    const SbPack *lin = goal + at[n];
     SbPack *c = C + 9 * (3 * i + n / 3) + 3 * i + n % 3;
     const SbPack *s = (const SbPack *)S + n;
     const SbPack *t = (const SbPack *)S + 3 * (n % 3) + n / 3;
@@ -124,8 +156,6 @@ SB_INLINE PetscReal go(PetscReal from, PetscReal goal, PetscReal part)
 static void linearise(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack *H,
                       const SbPack mean[3], PetscReal part, SbLinearStress *stress)
 {
-  static const int row[6] = {0, 0, 0, 1, 1, 2};
-  static const int column[6] = {0, 1, 2, 1, 2, 2};
   const PetscReal modulus = SbMaterialDilatationModulus(m);
   Extra used;
   SbPack C[81], D[9], P[9], S[9], theta;
@@ -224,9 +254,13 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
       const SbPoints at = SbBatchPoints(s, b);
       SbPack x[30], dx[30], F[SB_POINTS][9], H[SB_POINTS][9];
       SbPack pressure[3] = {{0.}};
-      struct _p_SbMaterial own;
+      struct _p_SbMaterial own, without;
       const struct _p_SbMaterial *here = SbBatchLaw(region, law, b, &own);
 
+      if (region->softening) {
+        without = SbMullinsLaw(here);
+        here = &without;
+      }
       SbBatchGradients(s, b, u, PETSC_FALSE, x, F);
       if (step) {
         SbBatchGradients(s, b, du, PETSC_TRUE, dx, H);

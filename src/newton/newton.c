@@ -35,7 +35,8 @@
 
 /* Static: the first iteration, from the last equilibrium. Where displacements are prescribed, the
    rest of the guess X stays behind them and the cells between are distorted; so the right-hand side
-   has the derivative of the residual by the prescribed motion D, and the bodies move with it. */
+   has the derivative of the residual by the prescribed motion D, and the bodies move with it. A law
+   whose slope jumps would have one in this derivative and another one in the tangent. */
 static PetscErrorCode predict(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
@@ -59,6 +60,8 @@ static PetscErrorCode predict(SNES snes)
   if (prescribed == 0. || other > 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecCopy(X, guess));
+  if (p->freeze)
+    PetscCall((*p->freeze)(p->ctx, p->start));
   PetscCall((*p->linearise)(p->ctx, p->start, NULL, 1.));
 
   /* the residual of the linearised problem */
@@ -72,6 +75,8 @@ static PetscErrorCode predict(SNES snes)
 
   /* its solution */
   PetscCall(SbNewtonFindDirection(snes, &slope));
+  if (p->freeze)
+    PetscCall((*p->freeze)(p->ctx, NULL));
   if (!snes->reason)
     PetscCall(VecAXPY(Y, -1., D));
   else

@@ -110,6 +110,13 @@ static PetscErrorCode linearise(void *ctx, Vec X, Vec Y, PetscReal s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode freeze(void *ctx, Vec X)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceMullinsFreeze(((SbPotential)ctx)->run->model->space, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode interrupted(void *ctx, PetscBool *is)
 {
   const SbRun run = ((SbPotential)ctx)->run;
@@ -290,6 +297,7 @@ PetscErrorCode SbPotentialCreate(SbRun run)
                                  .filter = m->may_filter ? filter : NULL,
                                  .negative_eigenvalues = negative_eigenvalues,
                                  .linearise = m->dynamic || nodes ? NULL : linearise,
+                                 .freeze = m->space->softening ? freeze : NULL,
                                  .longest = m->space->positive ? longest : NULL,
                                  .prescribed_part = prescribed_part,
                                  .interrupted = interrupted,
