@@ -5,8 +5,8 @@
   this run: u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest there, or of
   the nearest one; ten weights in a tet of P2. So element, mesh, material, effects and integrator
   may differ. Every rank reads the body's part of the file. A checkpoint has no mesh, but all
-  unknowns in full precision: for scenes with the same meshes and elements; other scenes take the
-  frame of its step.
+  unknowns in full precision, and the largest energies of materials that soften: for scenes with the
+  same meshes and elements; other scenes take the frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -14,6 +14,7 @@
 #include "sbgeometry.h"
 #include "sbmeshio.h"
 
+#define WIDEST 4096  /* more numbers of a cell than any history has */
 #define OUTSIDE 0.05 /* of the body's diagonal: warn of nodes farther from the other run's body */
 
 /* The body of another run. */
@@ -327,6 +328,85 @@ static PetscErrorCode order_of_file(SbRun run, PetscInt n, SbOrder *order, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a material, of the run and of the options of a checkpoint, softens. */
+static PetscBool softens_in(SbModel m, PetscInt k, const char *options)
+{
+  const SbMaterial material = m->material[k];
+  const SbBody *body = k < m->nbody ? &m->body[k] : NULL;
+  const char *name = body && body->copy_of[0] ? body->copy_of : material->name;
+  char line[3 * SB_NAME_MAX];
+  const char *value;
+
+  if (!material->mullins)
+    return PETSC_FALSE;
+  SbFormat(sizeof(line), line, "-%s_%s_mullins_r ", body ? "body" : "inclusion", name);
+  value = strstr(options, line);
+  return (PetscBool)(value && strtod(value + strlen(line), NULL) > 1.);
+}
+
+/* Numbers of a cell in the history of a checkpoint; 0: there is none. */
+static PetscInt width_of_history(const SbH5 *h)
+{
+  const hid_t dataset =
+    H5Lexists(h->file, "history", H5P_DEFAULT) > 0 ? H5Dopen(h->file, "history", H5P_DEFAULT) : -1;
+  const hid_t space = dataset < 0 ? -1 : H5Dget_space(dataset);
+  const int rank = space < 0 ? 0 : H5Sget_simple_extent_ndims(space);
+  hsize_t n[2] = {0, rank == 1};
+
+  if (rank == 1 || rank == 2)
+    (void)H5Sget_simple_extent_dims(space, n, NULL);
+  if (space >= 0)
+    (void)H5Sclose(space);
+  if (dataset >= 0)
+    (void)H5Dclose(dataset);
+  return n[1] > WIDEST ? 0 : (PetscInt)n[1];
+}
+
+/* The largest energies of the shape in cells of body b that soften, here and in the checkpoint. */
+static PetscErrorCode take_softening(SbRun run, PetscInt b, SbH5 *h, const char *options,
+                                     PetscBool *ok)
+{
+  const SbModel m = run->model;
+  const SbOutput out = (SbOutput)run->monitors.output;
+  const SbMesh mesh = m->mesh;
+  const PetscInt n = m->space->softening ? width_of_history(h) : 0;
+  const PetscInt width = m->space->nhistory;
+  PetscReal *slice, *theirs, *ours;
+  PetscBool *both;
+
+  PetscFunctionBeginUser;
+  if (!n)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m->nmaterial, &both));
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    both[k] = softens_in(m, k, options);
+  PetscCall(PetscMalloc3(n * out->cell.n, &slice, n * mesh->ncell_owned, &theirs,
+                         width * mesh->ncell_owned, &ours));
+  PetscCall(SbH5ReadSlice(h, "history", &out->cell, n, slice, ok));
+  if (*ok) {
+    PetscCall(SbForestBroadcast(out->cell.sf, n, MPIU_REAL, slice, theirs));
+    PetscCall(SbSpaceGetHistory(m->space, ours));
+  }
+  for (PetscInt c = 0; *ok && c < mesh->ncell_owned; c++) {
+    if (mesh->cell_body[c] != b || !both[mesh->cell_material[c]])
+      continue;
+    for (PetscInt k = 0; k < PetscMin(n, width); k++) {
+      const PetscReal most = theirs[n * c + k];
+
+      if (PetscIsInfOrNanReal(most) || most < 0.)
+        *ok = PETSC_FALSE;
+      ours[width * c + k] = most;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
+  if (*ok)
+    PetscCall(SbSpaceSetHistory(m->space, ours));
+  m->space->viscous_began = PETSC_FALSE; // viscoelastic bodies begin relaxed
+  PetscCall(PetscFree3(slice, theirs, ours));
+  PetscCall(PetscFree(both));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and
    elements. For another checkpoint frame[] names the frame of its step in its run's folder.
    Collective. */
@@ -380,7 +460,6 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
              body->copy_of[0] ? body->copy_of : body->name, body->element);
     same = (PetscBool)(strstr(options, line) != NULL);
   }
-  PetscCall(PetscFree(options));
   if (!same) {
     const char *name = strrchr(path, '/');
 
@@ -391,6 +470,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
                 "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place",
                 option, path, frame));
     PetscCall(SbH5Close(&h));
+    PetscCall(PetscFree(options));
     *is = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -425,12 +505,25 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     PetscCall(PetscFree2(slice, owned));
     PetscCall(SbOrderDestroy(&order));
   }
+  if (ok)
+    PetscCall(take_softening(run, b, &h, options, &ok));
+  PetscCall(PetscFree(options));
   PetscCall(SbH5Close(&h));
   PetscCheck(
     ok, out->comm, PETSC_ERR_USER_INPUT,
     "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well",
     option, path);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a body or one of its inclusions softens. */
+static PetscBool softens(SbModel m, PetscInt b)
+{
+  PetscBool any = (PetscBool)(m->material[b]->mullins != NULL);
+
+  for (PetscInt i = 0; i < m->body[b].ninclusion; i++)
+    any = (PetscBool)(any || m->material[m->body[b].inclusion[i].material]->mullins);
+  return any;
 }
 
 PetscErrorCode SbOutputLoadState(SbRun run)
@@ -461,6 +554,12 @@ PetscErrorCode SbOutputLoadState(SbRun run)
                "%s: a rigid body takes its state from a checkpoint of the same bodies, meshes and "
                "elements, not from a frame",
                option);
+    if (softens(m, b))
+      PetscCall(SbWarning(out->comm,
+                          "%s: a frame does not know how far the body %s was stretched: it softens "
+                          "from its stretch there on; a checkpoint of the same bodies, meshes and "
+                          "elements knows",
+                          option, m->body[b].name));
     SB_CATCH(&caught, read_other(option, frame, &m->body[b], &o));
     if (!caught.code)
       PetscCall(take_over(run, option, b, &o));
