@@ -39,28 +39,36 @@ def read_curve(curve, column):
     return x, y
 
 
+def names_of(values):
+    """Of options, with a number behind those of a list."""
+    return [name if numpy.isscalar(value) else f"{name}[{k}]" for name, value in values.items() for k in range(numpy.size(value))]
+
+
 class Identified:
     """Options that were found.
 
-    values       - {option: value}
-    deviations   - {option: standard deviation}, from the scatter of the measured points about the curves; nan without points to spare
+    values       - {option: value}; of a list {option: [values]}
+    deviations   - likewise their standard deviations, from the scatter of the measured points about the curves; nan without points to spare
     misfits      - {column: root mean square of the differences over that of what was measured}
-    correlation  - [n][n] of the options
+    correlation  - [n][n] of all values, in the order of `names`
+    names        - of all values: option, or option[0], option[1], ... of a list
     nrun         - runs that it took
     run          - Run of the values
     """
 
     def __init__(self, values, deviations, misfits, correlation, nrun, run):
         self.values, self.deviations, self.misfits, self.correlation, self.nrun, self.run = values, deviations, misfits, correlation, nrun, run
+        self.names = names_of(values)
 
     @property
     def alike(self):
         """Pairs of options that the measurements do not tell apart."""
-        names = list(self.values)
+        names = self.names
         return [(names[i], names[j]) for i in range(len(names)) for j in range(i) if not abs(self.correlation[i, j]) < ALIKE]
 
     def __str__(self):
-        rows = [{"option": name, "value": f"{value:.6g}", "deviation": f"{self.deviations[name]:.2g}"} for name, value in self.values.items()]
+        flat = zip(self.names, numpy.hstack(list(self.values.values())), numpy.hstack(list(self.deviations.values())))
+        rows = [{"option": name, "value": f"{value:.6g}", "deviation": f"{deviation:.2g}"} for name, value, deviation in flat]
         lines = [str(Table(rows)), *(f"{column}: {100 * misfit:.2g} % off" for column, misfit in self.misfits.items()), f"{self.nrun} runs"]
         return "\n".join(lines + [f"{a} and {b} are not told apart by these measurements" for a, b in self.alike])
 
@@ -71,10 +79,10 @@ def fit(scenario, measured, unknown, folder="out/fit", over="time", bounds=None,
     """Finds the values of options with which runs of a scenario come closest to what was measured. Needs scipy.
 
     measured   - {column of history.csv: (x, y), or a CSV file of two columns}: forces, probes; values at x of the column `over`
-    unknown    - {option: value to start from}, not 0: names as those of start(). A value keeps its sign
+    unknown    - {option: value to start from}, not 0: names as those of start(). A value keeps its sign. A list is an option that is one: {"mu": [1e5, -1e4], "alpha": [2, -2]}
     folder     - of the runs, in its subfolders 0000, ..., which are overwritten; 0000 has the values that were found
     over       - column of x: time (s; the load factor of a static run), or another one that rises or falls throughout
-    bounds     - {option: (low, high)}
+    bounds     - {option: (low, high)}, of a list for all that is in it, or {"mu[0]": (low, high)} for one value of it
     workers    - runs at a time; more than the number of unknowns do not help. ranks - of each
     options    - of all runs, as those of start(); fields are written only where output_fields is given
 
@@ -83,23 +91,38 @@ def fit(scenario, measured, unknown, folder="out/fit", over="time", bounds=None,
     """
     from scipy.optimize import least_squares
 
-    if not unknown or any(isinstance(v, (bool, str)) or not numpy.isscalar(v) or not math.isfinite(v) or v == 0 for v in unknown.values()):
-        raise RunError(f"unknown options are numbers to start from, not 0; they are {unknown}")
+    flat = [v for value in unknown.values() for v in (value if isinstance(value, (list, tuple, numpy.ndarray)) else [value])]
+    if not flat or any(isinstance(v, (bool, str)) or not numpy.isscalar(v) or not math.isfinite(v) or v == 0 for v in flat):
+        raise RunError(f"unknown options are numbers to start from, or lists of them, not 0; they are {unknown}")
+    names = names_of(unknown)
     curves = {column: read_curve(curve, column) for column, curve in measured.items()}
     npoint = sum(len(x) for x, _ in curves.values())
-    if npoint < len(unknown):
-        raise RunError(f"{len(unknown)} unknown options need as many measured points or more; there are {npoint}")
-    first = numpy.array(list(unknown.values()), dtype=float)
+    if npoint < len(flat):
+        raise RunError(f"{len(flat)} unknown options need as many measured points or more; there are {npoint}")
+    first = numpy.array(flat, dtype=float)
     low, high = numpy.full(len(first), -numpy.inf), numpy.full(len(first), numpy.inf)
     for name, pair in (bounds or {}).items():
-        if name not in unknown:
-            raise RunError(f"bounds of {name}, which is not among the unknown options {', '.join(unknown)}")
-        k, value = list(unknown).index(name), unknown[name]
-        if not min(pair) < value < max(pair):
-            raise RunError(f"{name} starts at {value:g}, which is not within its bounds {min(pair):g} to {max(pair):g}")
-        ends = [math.log(end / value) if end / value > 0 else -math.inf for end in pair]
-        low[k], high[k] = min(ends), max(ends)
-    values_of = lambda u: dict(zip(unknown, (first * numpy.exp(u)).tolist()))
+        # of one value, or of all of a list
+        chosen = [k for k, own in enumerate(names) if own == name or own.partition("[")[0] == name]
+        if not chosen:
+            raise RunError(f"bounds of {name}, which is not among the unknown options {', '.join(names)}")
+        for k in chosen:
+            if not min(pair) < first[k] < max(pair):
+                raise RunError(f"{names[k]} starts at {first[k]:g}, which is not within its bounds {min(pair):g} to {max(pair):g}")
+            ends = [math.log(end / first[k]) if end / first[k] > 0 else -math.inf for end in pair]
+            low[k], high[k] = min(ends), max(ends)
+
+    def folded(flat):
+        """{option: value or list} of all values."""
+        found, k = {}, 0
+        for name, value in unknown.items():
+            n = numpy.size(value)
+            found[name] = float(flat[k]) if numpy.isscalar(value) else numpy.asarray(flat[k:k + n]).tolist()
+            k += n
+        return found
+
+    # lists as options have them
+    values_of = lambda u: {name: tuple(value) if isinstance(value, list) else value for name, value in folded(first * numpy.exp(u)).items()}
     known, count = {}, 0
 
     def differences(u, number=0):
@@ -144,7 +167,7 @@ def fit(scenario, measured, unknown, folder="out/fit", over="time", bounds=None,
         with ThreadPoolExecutor(workers) as pool:
             beside = list(pool.map(differences, [u + s for s in steps], range(1, len(u) + 1)))
         J = numpy.array([(r - here) / s.sum() for r, s in zip(beside, steps)]).T
-        for name, column in zip(unknown, J.T):
+        for name, column in zip(names, J.T):
             if not column.any():
                 raise RunError(f"{name} changes nothing of what was measured")
         return J
@@ -162,6 +185,6 @@ def fit(scenario, measured, unknown, folder="out/fit", over="time", bounds=None,
     for column, (x, _) in curves.items():
         misfits[column] = float(numpy.linalg.norm(found.fun[k:k + len(x)]))
         k += len(x)
-    values = values_of(found.x)
-    return Identified(values, {name: abs(value) * s * scatter for (name, value), s in zip(values.items(), size)}, misfits,
+    values = first * numpy.exp(found.x)
+    return Identified(folded(values), folded(abs(values) * size * scatter), misfits,
                       covariance / numpy.outer(size, size), count + 1, run)

@@ -11,7 +11,7 @@ of load the nominal stress is (t_1 - t_3)/s_1, and in simple shear by g, whose s
     ogden               t_k = sum_i mu_i s_k^alpha_i
 
 Reference: Ogden, Non-linear elastic deformations, 1984, chapter 7. The energies are those of docs/reference/materials.md; tests/verify/fit.py runs the program beside.
-What is not here: laws with fibres, and those of small strains or without a limit of constant volume.
+What is not here: laws with fibres (fibres.py), and those of small strains or without a limit of constant volume.
 """
 import math
 from difflib import get_close_matches
@@ -21,7 +21,8 @@ import numpy
 from .run import RunError
 
 # mode: what its coordinate is, and the value of that at rest
-MODES = {"uniaxial": ("stretch", 1.0), "compression": ("stretch", 1.0), "equibiaxial": ("stretch", 1.0), "planar": ("stretch", 1.0), "shear": ("amount of shear", 0.0)}
+MODES = {"uniaxial": ("stretch", 1.0), "compression": ("stretch", 1.0), "equibiaxial": ("stretch", 1.0), "planar": ("stretch", 1.0), "biaxial": ("stretch", 1.0),
+         "shear": ("amount of shear", 0.0)} | {f"shear_{plane}": ("amount of shear", 0.0) for plane in ("fs", "fn", "sf", "sn", "nf", "ns")}
 POWERS = {"c10": (1, 0), "c01": (0, 1), "c20": (2, 0), "c11": (1, 1), "c02": (0, 2), "c30": (3, 0), "c21": (2, 1), "c12": (1, 2), "c03": (0, 3)}
 POLYNOMIALS = {1: ("c10",), 2: ("c10", "c01"), 3: ("c10", "c01", "c11"), 5: tuple(POWERS)[:5], 9: tuple(POWERS)}
 LANGEVIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
@@ -34,10 +35,10 @@ class LawError(RunError):
     """A law, a constant or a mode that does not exist, or is out of range."""
 
 
-def strains(mode, x):
-    """Logarithms of the principal stretches [3, n], and what to divide t_1 - t_3 by for the nominal stress."""
+def strains(mode, x, across=None):
+    """Logarithms of the principal stretches [3, n], and what to divide t_1 - t_3 by for the nominal stress. across [n]: the other stretch of a biaxial test."""
     x = numpy.asarray(x, dtype=float)
-    if mode == "shear":
+    if mode.startswith("shear"):
         e = numpy.arcsinh(x / 2)
         return numpy.array([e, 0 * e, -e]), 2 * numpy.cosh(e)
     e = numpy.log(x)
@@ -47,12 +48,34 @@ def strains(mode, x):
         return numpy.array([e, e, -2 * e]), x
     if mode == "planar":
         return numpy.array([e, 0 * e, -e]), x
+    if mode == "biaxial":
+        if across is None or numpy.shape(across) != x.shape:
+            raise LawError("biaxial tests need the stretch across for each point")
+        a = numpy.log(across)
+        return numpy.array([e, a, -e - a]), x
     raise LawError(no_such("mode", mode, MODES))
 
 
 def no_such(what, name, known):
     near = get_close_matches(str(name), list(known), 1)
     return f"there is no {what} {name}" + (f"; is {near[0]} meant?" if near else "") + f" ({what}s: {', '.join(known)})"
+
+
+def text_of(value, digits):
+    """A constant, or a list of them, as options have it."""
+    return ",".join(f"{v:.{digits}g}" for v in value) if isinstance(value, list) else f"{value:.{digits}g}"
+
+
+def around_rest(mode, low, high, holds, steps=STEPS):
+    """(from, to): the range around rest, within low and high, in which holds(x [n]) is true throughout."""
+    rest = MODES[mode][1]
+    ends = []
+    for end in (low, high):
+        x = numpy.linspace(rest, end, steps + 1) if rest == 0 else numpy.geomspace(rest, end, steps + 1)
+        with numpy.errstate(all="ignore"):
+            good = holds(x) if end != rest else numpy.ones(1, dtype=bool)
+        ends.append(float(x[-1] if good.all() else x[max(int(numpy.argmin(good)) - 1, 0)]))
+    return tuple(ends)
 
 
 def of_invariants(slopes):
@@ -99,9 +122,9 @@ class Family:
         self.name, self.scales, self.shapes = name, scales, shapes
         self.columns, self.moduli = functions
 
-    def responses(self, shape, mode, x):
+    def responses(self, shape, mode, x, across=None):
         """Nominal stresses for each scale at 1 [nscale, n]."""
-        e, divisor = strains(mode, x)
+        e, divisor = strains(mode, x, across)
         t = self.columns(shape, e)
         return (t[:, 0] - t[:, 2]) / divisor
 
@@ -114,7 +137,7 @@ def family(name, terms=None):
     """The Family of a law; terms: of mooney_rivlin 1, 2, 3, 5 or 9, of yeoh 1 to 3, of ogden 1 to 20."""
     allowed = {"mooney_rivlin": tuple(POLYNOMIALS), "yeoh": (1, 2, 3), "ogden": tuple(range(1, TERMS + 1))}
     if name not in LAWS:
-        raise LawError(no_such("law", name, LAWS) + "; laws of small strains and those with fibres are not fitted")
+        raise LawError(no_such("law", name, LAWS) + "; laws of small strains are not fitted")
     if name not in allowed:
         if terms not in (None, 1):
             raise LawError(f"{name} has one term, not {terms}")
@@ -171,8 +194,7 @@ class Law:
         return dict(zip(names, [*self.scale.tolist(), *self.shape.tolist()]))
 
     def __str__(self):
-        text = lambda value: ",".join(f"{v:.4g}" for v in value) if isinstance(value, list) else f"{value:.4g}"
-        return " ".join(f"{key}={text(value)}" for key, value in self.constants.items() if value)
+        return " ".join(f"{key}={text_of(value, 4)}" for key, value in self.constants.items() if value)
 
     @property
     def shear_modulus(self):
@@ -183,9 +205,9 @@ class Law:
         """t_k [3, n], Pa, up to a pressure, of logarithms of the stretches [3, n]."""
         return numpy.tensordot(self.scale, self.family.columns(self.shape, e), 1)
 
-    def nominal_stress(self, mode, x):
-        """Force over the area at rest, Pa, at stretches or amounts of shear x [n]."""
-        return self.scale @ self.family.responses(self.shape, mode, x)
+    def nominal_stress(self, mode, x, angle=0.0, across=None):
+        """Force over the area at rest, Pa, at stretches or amounts of shear x [n]; a law without fibres has no angle."""
+        return self.scale @ self.family.responses(self.shape, mode, x, across)
 
     def drucker(self, mode, x):
         """The lower eigenvalue of D_ab = d(t_a - t_3)/de_b, a, b = 1, 2, over the larger one of the upper eigenvalue and the shear modulus at rest [n]:
@@ -202,35 +224,23 @@ class Law:
         root = numpy.hypot(skew, off)
         return (half - root) / numpy.maximum(self.shear_modulus, half + root)
 
-    def stable(self, mode, low, high):
+    def stable(self, mode, low, high, angle=0.0):
         """(from, to): the range around rest, within low and high, in which Drucker's condition holds."""
-        return self.around_rest(mode, low, high, lambda x: self.drucker(mode, x) >= LOWEST)
+        return around_rest(mode, low, high, lambda x: self.drucker(mode, x) >= LOWEST)
 
-    def rising(self, mode, low, high):
+    def rising(self, mode, low, high, angle=0.0):
         """(from, to): the range around rest, within low and high, in which the nominal stress rises."""
-        return self.around_rest(mode, low, high, lambda x: numpy.gradient(self.nominal_stress(mode, x), x) > 0)
-
-    @staticmethod
-    def around_rest(mode, low, high, holds):
-        rest = MODES[mode][1]
-        ends = []
-        for end in (low, high):
-            x = numpy.linspace(rest, end, STEPS + 1) if mode == "shear" else numpy.geomspace(rest, end, STEPS + 1)
-            with numpy.errstate(all="ignore"):
-                good = holds(x)
-            ends.append(float(x[-1] if good.all() else x[max(int(numpy.argmin(good)) - 1, 0)]) if end != rest else rest)
-        return tuple(ends)
+        return around_rest(mode, low, high, lambda x: numpy.gradient(self.nominal_stress(mode, x), x) > 0)
 
     def option_lines(self, body, poisson=0.4995):
         """The lines of a scenario, as the program accepts them."""
         # terms of opposite signs that nearly cancel need all digits
         digits = 8 if abs(self.scale).sum() < 100 * self.shear_modulus else 17
-        text = lambda value: ",".join(f"{v:.{digits}g}" for v in value) if isinstance(value, list) else f"{value:.{digits}g}"
         constants = {key: value for key, value in self.constants.items() if value or key == "c10"}
         if self.family.scales == ("shear",):
             constants = {"young": 2 * self.shear_modulus * (1 + poisson)}
         return [f"-body_{body}_{key} {value}" for key, value in
-                [("material", self.family.name), *((key, text(value)) for key, value in constants.items()), ("poisson", f"{poisson:g}")]]
+                [("material", self.family.name), *((key, text_of(value, digits)) for key, value in constants.items()), ("poisson", f"{poisson:g}")]]
 
 
 def principal_range(mode, x):
