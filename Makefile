@@ -235,7 +235,7 @@ install: bin/supple bin/supple-mesh manual $(GIVEN) ## programs, man pages, comp
 	install -m 644 $(BUILD)/share/supple $(COMPLETE)
 	ln -sf supple $(COMPLETE)/supple-mesh
 	install -m 644 $(BUILD)/share/_supple $(TO)/share/zsh/site-functions
-	install -m 755 scripts/render scripts/plot scripts/fit scripts/export scripts/live scripts/venv $(SHARE)/scripts
+	install -m 755 scripts/render scripts/plot scripts/fit scripts/unload scripts/export scripts/live scripts/venv $(SHARE)/scripts
 	install -m 644 scripts/own_python.py $(SHARE)/scripts
 	install -d $(SHARE)/python/supple
 	install -m 644 python/supple/*.py $(SHARE)/python/supple

@@ -48,10 +48,8 @@ def text_of(value: Any) -> str:
     )
 
 
-def options_of(scenario: str | Path, options: dict[str, Any], folder: str | Path) -> list[str]:
-    """The program's options from keywords: full names (body_organ_young, ts_dt), or the end of
-    those of every body (young). folder: of the run, so that runs beside each other do not meet in
-    that of the scenario."""
+def scenario_view(scenario: str | Path, folder: str | Path) -> dict[str, str]:
+    """{option: value} of all options that a scenario has, as texts, with their defaults."""
     viewed = subprocess.run(
         [program(), str(scenario), "-scenario_view", "-output_dir", str(folder)],
         capture_output=True,
@@ -63,19 +61,25 @@ def options_of(scenario: str | Path, options: dict[str, Any], folder: str | Path
             if viewed.stderr.strip()
             else f"{scenario} cannot be read"
         )
-    known = {
-        line.lstrip("#").split()[0][1:]
-        for line in viewed.stdout.splitlines()
-        if line.lstrip("# ").startswith("-")
-    }
-    bodies = next(
-        (
-            line.split()[1].split(",")
-            for line in viewed.stdout.splitlines()
-            if line.startswith("-bodies ")
-        ),
-        [],
-    )
+    found = {}
+    for line in viewed.stdout.splitlines():
+        words = line.lstrip("# ").split(None, 1)
+        if words and words[0].startswith("-"):
+            # a value in quotes may have a mark of remarks in it
+            value = words[1] if len(words) > 1 else ""
+            quoted = value.startswith('"')
+            found[words[0][1:]] = (
+                value[1:].partition('"')[0] if quoted else value.partition("#")[0].strip()
+            )
+    return found
+
+
+def options_of(scenario: str | Path, options: dict[str, Any], folder: str | Path) -> list[str]:
+    """The program's options from keywords: full names (body_organ_young, ts_dt), or the end of
+    those of every body (young). folder: of the run, so that runs beside each other do not meet in
+    that of the scenario."""
+    known = scenario_view(scenario, folder)
+    bodies = known["bodies"].split(",") if "bodies" in known else []
     found: list[str] = []
     for name, value in options.items():
         of_bodies = [f"body_{body}_{name}" for body in bodies]
