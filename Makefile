@@ -200,6 +200,9 @@ measured: deps ## what others measured or published beside what supple finds, in
 	@scripts/venv
 	@scripts/measured --write
 
+ventricle: deps ## the ventricle of Land et al. (2015), into docs/reports/ventricle.md with its picture
+	@scripts/ventricle --write
+
 locking: deps ## how P1, P2, CR and DG behave near nu = 1/2, measured into docs/reports/locking.md with its plots (about 10 minutes)
 	$(AGAIN) $(BUILD)/tests/perf/locking
 	@scripts/locking --build $(BUILD)
@@ -263,7 +266,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-24s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  GROUP=unit,verify (coverage)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured locking solvers accuracy docs manual install check-installed dist deb packaging fuzz clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize coverage memcheck bench measured ventricle locking solvers accuracy docs manual install check-installed dist deb packaging fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
