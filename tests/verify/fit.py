@@ -257,10 +257,10 @@ def check_fibres_stable():
     """Fibres of W4 = dW/dI4 in a neo-Hookean buckle in compression: shear of the logarithmic strain between fibre and sheet changes C = exp(2 H) by divided differences
     of f = exp(2 h), and the energy by mu/2 (f[1,1,2] + f[1,2,2]) + W4 f[1,1,2], which is zero at the stretch that is found."""
     law = FibreLaw("transversely_isotropic", mu=3.0, mu_fibre=3.0, young_fibre=90.0)
-    l = numpy.linspace(0.5, 0.999, 10001)
-    f1, f2, apart = l**2, 1 / l, 1.5 * numpy.log(l)
+    x = numpy.linspace(0.5, 0.999, 10001)
+    f1, f2, apart = x**2, 1 / x, 1.5 * numpy.log(x)
     f112, f122 = (2 * f1 - (f1 - f2) / apart) / apart, ((f1 - f2) / apart - 2 * f2) / apart
-    root = l[numpy.nonzero(1.5 * (f112 + f122) + 81 / 4 * (l**2 - 1) * f112 < 0)[0][-1]]
+    root = x[numpy.nonzero(1.5 * (f112 + f122) + 81 / 4 * (x**2 - 1) * f112 < 0)[0][-1]]
     low, high = law.stable("uniaxial", 0.3, 3)
     step = 0.3 ** (1 / 50)
     check(low >= root > low * step and high == 3, f"stable from {low} to {high}; fibres buckle at {root}")
