@@ -48,6 +48,7 @@ typedef struct {
   struct _p_SbStressHistory *history;   /* of a viscoelastic material, else NULL; owned */
   struct _p_SbSoftening *softening;     /* of a material that softens, else NULL; owned */
   struct _p_SbContraction *contraction; /* of fibres that contract, else NULL; owned */
+  struct _p_SbEigenState *eigen;        /* of strains without stress, else NULL; owned */
 } SbRegion;
 
 typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
@@ -137,16 +138,19 @@ struct _p_SbSpace {
     block_scale;    /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;  /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear; /* every region's law is linear */
-  PetscBool positive;            /* a region's law has infinite energy where det F <= 0 */
-  PetscInt nhistory;             /* history variables of a cell at most, all ranks */
-  PetscBool viscous;             /* some body is viscoelastic, on any rank */
-  PetscBool viscous_began;       /* they have values */
-  PetscLogEvent viscous_event;   /* SbMat_viscous, around their updates */
-  PetscBool softening;           /* some body softens, on any rank */
-  PetscLogEvent softening_event; /* SbMat_mullins, around the updates of its history */
-  PetscBool active;              /* some fibres contract, on any rank, */
-  PetscBool active_rates;        /* and with a force that depends on their velocity */
-  PetscLogEvent active_event;    /* SbMat_active, around the evaluation of their tensions */
+  PetscBool positive;             /* a region's law has infinite energy where det F <= 0 */
+  PetscInt nhistory;              /* history variables of a cell at most, all ranks */
+  PetscBool viscous;              /* some body is viscoelastic, on any rank */
+  PetscBool viscous_began;        /* they have values */
+  PetscLogEvent viscous_event;    /* SbMat_viscous, around their updates */
+  PetscBool softening;            /* some body softens, on any rank */
+  PetscLogEvent softening_event;  /* SbMat_mullins, around the updates of its history */
+  PetscBool active;               /* some fibres contract, on any rank, */
+  PetscBool active_rates;         /* and with a force that depends on their velocity */
+  PetscLogEvent active_event;     /* SbMat_active, around the evaluation of their tensions */
+  PetscBool eigen;                /* some body has strains without stress, on any rank, */
+  PetscBool grows, active_strain; /* and others than active ones; active ones */
+  PetscLogEvent eigen_event;      /* SbMat_eigenstrain, around their evaluation */
   SbPack
     *pressure; /* [nbatch] of P2's means, Pa, tension, by SbSpaceLineariseStress(), NULL before */
   PetscBool linear_stress; /* tangents have the stresses of that instead of those of states */
@@ -293,8 +297,6 @@ PetscErrorCode SbSpaceMeanHistory(SbSpace space, const PetscBool of_body[], Pets
                          derivative is their force. Not collective.
   SbSpaceAddActiveForce - f[nnode][3] += the force of the fibres on the nodes, N, right on owned
                          ones. Not collective.
-  SbSpaceActiveStrainWork - work of active strains of this rank's cells since the last call, which
-                         ended a step as this one does, J; 0 at the first one. Not collective.
   SbSpaceActiveTension - per owned cell: the tension times its factors by length and velocity, Pa,
                          value[ncell_owned]; 0: none. Not collective.
 */
@@ -302,9 +304,28 @@ PetscErrorCode SbSpaceActiveAt(SbSpace space, PetscReal t, PetscReal load);
 PetscErrorCode SbSpaceActiveMost(SbSpace space, PetscReal from, PetscReal to);
 PetscErrorCode SbSpaceActiveRates(SbSpace space, PetscReal elapsed, PetscBool second, Vec U, Vec V);
 PetscReal SbSpaceActiveEnergy(SbSpace space, const PetscReal u[]);
-PetscReal SbSpaceActiveStrainWork(SbSpace space, const PetscReal u[], PetscBool first);
 void SbSpaceAddActiveForce(SbSpace space, const PetscReal u[], PetscReal f[]);
 void SbSpaceActiveTension(SbSpace space, const PetscReal u[], PetscReal value[]);
+
+/*
+  Strains without stress (src/fem/eigenstrain.c); nothing without any.
+
+  SbSpaceEigenAt    - stresses and tangents are from now on those with the strains at a time, s;
+                      those that do not depend on it are multiplied by load. Not collective. Errors:
+                      those of SbEigenstrainAt()
+  SbSpaceEigenKeep  - the strains are those of an equilibrium, from which the next step starts: the
+                      first SbSpaceLineariseStress() without a step has its stresses. Not
+                      collective.
+  SbSpaceEigenWork  - work of active strains, and of all others, of this rank's cells since the last
+                      call, which ended a step as this one does, J; 0 at the first one. Not
+                      collective.
+  SbSpaceCellGrowth - per owned cell: the volume without stress over that at rest,
+                      value[ncell_owned]; 1: none. Not collective.
+*/
+PetscErrorCode SbSpaceEigenAt(SbSpace space, PetscReal t, PetscReal load);
+PetscErrorCode SbSpaceEigenKeep(SbSpace space);
+void SbSpaceEigenWork(SbSpace space, const PetscReal u[], PetscBool first, PetscReal work[2]);
+void SbSpaceCellGrowth(SbSpace space, PetscReal value[]);
 
 /* matrices and their assembly */
 
@@ -386,10 +407,11 @@ typedef struct {
    collective. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                       PetscReal psi[], PetscReal pressure[]);
-/* Fills SbMesh.direction for laws that take directions from the mesh file or by a rule; material as
-   SbSpaceCreate() takes it. Errors: those of SbImportDirections(); PETSC_ERR_USER_INPUT for a set
-   without a vertex of the body. Collective. */
-PetscErrorCode SbFibresFind(SbMesh mesh, const SbMaterial material[]);
+/* Fills SbMesh.direction for laws that take directions from the mesh file or by a rule, and
+   SbMesh.temperature for bodies with a field of it; material as SbSpaceCreate() takes it. Errors:
+   those of SbImportCellData(); PETSC_ERR_USER_INPUT for a set without a vertex of the body.
+   Collective. */
+PetscErrorCode SbCellFieldsFind(SbMesh mesh, const SbMaterial material[]);
 /* Per owned cell: the unit vector of an axis, 0: fibre, 1: sheet, at rest, value[ncell_owned][3];
    zero where the law has none. Not collective. */
 void SbSpaceCellAxis(SbSpace space, int axis, PetscReal value[]);

@@ -16,6 +16,7 @@ typedef struct _p_SbFibres *SbFibres;   /* directions of the axes of a law with 
 typedef struct _p_SbViscous *SbViscous; /* of a viscoelastic material */
 typedef struct _p_SbActive *SbActive;   /* of fibres that contract */
 typedef struct _p_SbMullins *SbMullins; /* of a material that softens by its first stretch */
+typedef struct _p_SbEigenstrain *SbEigenstrain; /* of bodies that grow or expand */
 
 /* polar.c, spectral.c: 3x3 matrices of a batch */
 
@@ -147,23 +148,26 @@ struct _p_SbMaterial {
   PetscReal density;         /* kg/m^3 */
   PetscBool
     adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  SbTangentKind tangent;              /* tangent of ops.frame or ops.tangent */
-  SbMaterial shear;                   /* SbMaterialGetShear(); NULL until it is asked for; owned */
-  SbMaterial point;                   /* SbMaterialGetPointwise(), likewise */
-  SbMaterial stiffest;                /* SbMaterialGetStiffest(), likewise */
-  void *data;                         /* the law's own constants; freed with the material */
-  SbFibres fibres;                    /* of a law with fibres, or that contract, else NULL; owned */
-  SbViscous viscous;                  /* of a viscoelastic material, else NULL; owned */
-  SbActive active;                    /* of fibres that contract, else NULL; owned */
+  SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
+  SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
+  SbMaterial point;      /* SbMaterialGetPointwise(), likewise */
+  SbMaterial stiffest;   /* SbMaterialGetStiffest(), likewise */
+  void *data;            /* the law's own constants; freed with the material */
+  SbFibres fibres;       /* of a law with fibres, or that needs them here, else NULL; owned */
+  SbViscous viscous;     /* of a viscoelastic material, else NULL; owned */
+  SbActive active;       /* of fibres that contract, else NULL; owned */
+  SbEigenstrain eigen;   /* of strains without stress, else NULL; owned */
   const struct _p_SbMullins *mullins; /* of one that softens, else NULL; owned */
   /* [9] of such a law: Q of a batch, its columns the fibre, the sheet and their normal in the rest
      state, orthonormal; NULL: I. Set by the caller in a copy of this struct. */
   const SbPack *axes;
-  /* of a copy by SbActiveStrain() or SbMullinsSoften(), else NULL: the law, borrowed; of a batch,
-     along and across its fibres the inverse of their stretch without stress, [2]; or the largest
-     energy of the shape that a point had, J/m^3, and NULL or the factor that its stress keeps */
+  /* of a copy by SbEigenLaw() or SbMullinsSoften(), else NULL: the law, borrowed; of a batch at a
+     point, along and across the fibres the inverse of the stretch without stress, and the root of
+     J_g, [3]; how far those of the next point are; or the largest energy of the shape that a point
+     had, J/m^3, and NULL or the factor that its stress keeps */
   const struct _p_SbMaterial *inner;
-  const SbPack *shortening, *most, *factor;
+  const SbPack *stretch, *most, *factor;
+  int stretch_step;
 };
 
 /* Where the axes of a law with fibres come from: formulas of the place; fields of the mesh file; or
@@ -194,15 +198,39 @@ struct _p_SbActive {
   char option[3 * SB_NAME_MAX]; /* name of its option, */
   SbFormula tension;            /* which it has, Pa */
   PetscBool steady;             /* not a formula of t */
-  /* the same of the strain without stress, with the formula 0 where there is none */
-  char strain_option[3 * SB_NAME_MAX];
-  SbFormula strain;
-  PetscBool strain_steady, strains;
-  SbLengthRelation length;  /* of force and length, */
-  PetscReal optimum, width; /* the stretch of the largest force, and a measure of its range */
-  PetscReal velocity;       /* of shortening without force, 1/s; 0: force does not depend on it */
+  SbLengthRelation length;      /* of force and length, */
+  PetscReal optimum, width;     /* the stretch of the largest force, and a measure of its range */
+  PetscReal velocity; /* of shortening without force, 1/s; 0: force does not depend on it */
   PetscReal curvature, eccentric; /* of Hill's hyperbola; largest force in lengthening */
 };
+/* Strains without stress (src/material/eigenstrain.c). */
+typedef enum {
+  SB_EIGEN_ACTIVE, /* at constant volume */
+  SB_EIGEN_PRESTRAIN,
+  SB_EIGEN_GROWTH, /* of any volume */
+  SB_EIGEN_FIBRE,
+  SB_EIGEN_PLANE,
+  SB_EIGEN_TEMPERATURE,
+  SB_EIGEN_TERMS
+} SbEigenTerm;
+struct _p_SbEigenstrain {
+  char option[SB_EIGEN_TERMS][3 * SB_NAME_MAX]; /* names of their options, */
+  SbFormula formula[SB_EIGEN_TERMS];            /* which they have; NULL: none */
+  PetscBool steady[SB_EIGEN_TERMS];             /* not a formula of t */
+  char name[3 * SB_NAME_MAX];                   /* the first of these options, for messages */
+  PetscReal expansion;                          /* 1/K */
+  char field[SB_NAME_MAX]; /* array in the mesh file whose numbers times the formula are the
+                              temperature of tets; "": none */
+  PetscBool isochoric;     /* they keep the volume, by which the law measures it */
+  PetscBool grows;         /* not an active strain only */
+  PetscBool changes;       /* some depend on t */
+  PetscBool varies; /* some depend on the place, but for an active strain, which is of a cell */
+};
+/* At a point: 1/l and 1/m of the stretches l along the fibres and m across, the root of J_g (1 of
+   the law linear); ln l and ln m; ln(1 + a) of the active strain. */
+typedef struct {
+  PetscReal along, across, root, log[2], active;
+} SbEigenstretch;
 /* At a point in a step: the stretch of the fibres at its start, that expected at the time of the
    evaluation, and v = v + slope (stretch - start), rates over the velocity. */
 typedef struct {
@@ -278,15 +306,34 @@ void SbViscousSetElapsed(SbMaterial m, PetscReal elapsed);
    collective. */
 PetscErrorCode SbActiveTension(const struct _p_SbActive *active, PetscReal t, const PetscReal x[3],
                                PetscReal *tension);
-/* The same of the strain without stress, above -1, times `load` if it does not depend on t. */
-PetscErrorCode SbActiveStrainAt(const struct _p_SbActive *active, PetscReal t, PetscReal load,
-                                const PetscReal x[3], PetscReal *strain);
-/* Makes m, a copy of `law` with its axes, the law of the elastic part of F: psi(F A), A = a f f^T +
-   b (1 - f f^T), shortening = {a, b}. Not collective. */
-void SbActiveStrain(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,
-                    const SbPack shortening[2]);
-/* Of such a law the derivative of psi by the strain g, a = 1/(1 + g), b = sqrt(1 + g); J/m^3. */
-void SbActiveStrainForce(const struct _p_SbMaterial *m, const SbPack F[9], SbPack force);
+/* What they are evaluated at: time, s, or load factor; factor on those that do not depend on t;
+   centre of the tet and place of the point at rest, m; the tet's number from the field, or 1. */
+typedef struct {
+  PetscReal t, load, centre[3], x[3], field;
+} SbEigenPlace;
+/* The strains without stress there. Errors: PETSC_ERR_USER_INPUT with option, value, time and place
+   where a strain is not above -1. Not collective. */
+PetscErrorCode SbEigenstrainAt(const struct _p_SbMaterial *m, const SbEigenPlace *place,
+                               SbEigenstretch *stretch);
+/* Makes m, a copy of `law` with its axes, the law of the elastic part of F; the caller sets
+   `stretch`. isochoric: the law's dilatation stays. step: from the stretches of a point to those of
+   the next one, 0: all have the same. Not collective. */
+void SbEigenLaw(struct _p_SbMaterial *m, const struct _p_SbMaterial *law, PetscBool isochoric,
+                int step);
+/* Such a law at point q: `own`, a copy of it, or m itself. */
+SB_INLINE const struct _p_SbMaterial *SbLawAt(const struct _p_SbMaterial *m, int q,
+                                              struct _p_SbMaterial *own)
+{
+  if (!m->stretch_step || !q)
+    return m;
+  *own = *m;
+  own->stretch += (size_t)q * (size_t)m->stretch_step;
+  return own;
+}
+/* Of such a law the derivatives of psi by ln l and ln m, J/m^3, with that of the mean of a P2 cell
+   under its pressure p, Pa, tension. */
+void SbEigenForce(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                  SbPack force[2]);
 /* Makes m, a copy of `law` with its axes, that law softened; the caller sets `most` and `factor`.
    Not collective. */
 void SbMullinsSoften(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,

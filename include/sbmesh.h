@@ -202,8 +202,9 @@ struct _p_SbMesh {
   PetscReal *
     edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
   /* [ncell][6] directions of fibre and sheet of laws that take them from the mesh file or by a
-     rule, else unset; NULL: no law does. By SbFibresFind(), later than the rest. */
+     rule, else unset; NULL: no law does. By SbCellFieldsFind(), later than the rest. */
   PetscReal *direction;
+  PetscReal *temperature; /* [ncell] likewise, of bodies with a field of temperatures, or NULL */
   uint64_t
     *face_set; /* [ncell][4] face f is opposite vertex f: SB_ON_BOUNDARY, SB_SET_BIT(k) in set k */
 };

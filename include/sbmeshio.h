@@ -166,12 +166,13 @@ struct _p_SbImport {
   char note[512]; /* repairs by the reader, for SbBody.note */
   PetscInt
     step; /* input: step of a run's output whose positions are read; 0 at rest, -1 the last one */
-  /* input: name of an array with three numbers per tet that is kept, "": none; by the number of the
-     tet in the file */
+  /* input: name of an array that is kept, "": none, and its numbers per tet, 1 or 3; by the number
+     of the tet in the file */
   char field[SB_NAME_MAX];
+  int field_width;
   PetscInt nfield;         /* 0: the file has none of this name */
   int64_t *field_number;   /* [nfield] */
-  PetscReal *field_value;  /* [nfield][3] turned as the mesh, once placed */
+  PetscReal *field_value;  /* [nfield][width]; three numbers: turned as the mesh, once placed */
   SbMeshProgress progress; /* input: progress callback of long reads; may be NULL */
   void *progress_ctx;
   /* while a file is read; SbImportForget() */
@@ -199,16 +200,15 @@ struct _p_SbImport {
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /*
-  SbImportDirections - an array of vectors of the tets in a body's mesh file: ElementData of gmsh,
-  CellData of VTK, /mesh/NAME of an .h5; not collective.
+  SbImportCellData - an array of numbers, width 1, or vectors, 3, of the tets in a body's mesh file:
+  ElementData of gmsh, CellData of VTK, /mesh/NAME of an .h5; not collective.
 
-  Output, to be freed by PetscFree(): centre[n][3], m, of the tets, and direction[n][3] as in the
-    file, both placed as the body is.
-  Errors: PETSC_ERR_USER_INPUT if there is no array of this name with three numbers per tet, or it
-    lacks a tet.
+  Output, to be freed by PetscFree(): centre[n][3], m, of the tets, and value[n][width] as in the
+    file, centres and vectors placed as the body is.
+  Errors: PETSC_ERR_USER_INPUT if there is no array of this name and width, or it lacks a tet.
 */
-PetscErrorCode SbImportDirections(const SbBody *body, const char *option, const char *name,
-                                  PetscInt *n, PetscReal **centre, PetscReal **direction);
+PetscErrorCode SbImportCellData(const SbBody *body, const char *option, const char *name, int width,
+                                PetscInt *n, PetscReal **centre, PetscReal **value);
 /* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or
    -1. */
 void SbImportDropVertices(SbImport *import, PetscInt keep[]);

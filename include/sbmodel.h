@@ -13,6 +13,7 @@ typedef struct {
     load_work; /* by loads since the start (constant: minus the change of their potential), J */
   PetscReal prescribed_work; /* work done by moving supports since the start, J */
   PetscReal active_work;     /* by fibres that contract since the start, J */
+  PetscReal growth_work;     /* by growth, expansion and changes of prestrain since the start, J */
   PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
   PetscReal relaxation_loss; /* dissipated by Prony series of materials since the start, J */
   PetscReal viscosity_loss;  /* by viscosities of materials, J */
@@ -127,12 +128,14 @@ PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi,
 /* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive
    semi-definite, or the exact ones. Not collective. */
 PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
-/* Fibres that contract have from now on the tensions at t, s; static: the load factor. Residuals
-   and tangents do it by themselves. Not collective. */
+/* Fibres that contract have from now on the tensions, and bodies the strains without stress, at t,
+   s; static: the load factor. Residuals and tangents do it by themselves. Not collective. */
 PetscErrorCode SbModelActiveAt(SbModel model, PetscReal t);
-/* Their force on the nodes at t, F[nnode][3] N; the work of active strains since the last call, J,
-   0 for the first one. Collective. */
-PetscErrorCode SbModelActiveForce(SbModel model, PetscReal t, Vec U, PetscBool first, Vec F,
-                                  PetscReal *work);
+/* The force of fibres that contract on the nodes at t, F[nnode][3] N. Collective. */
+PetscErrorCode SbModelActiveForce(SbModel model, PetscReal t, Vec U, Vec F);
+/* The works of active strains and of other strains without stress since the last call, J, 0 for the
+   first one. Collective. */
+PetscErrorCode SbModelEigenWork(SbModel model, PetscReal t, Vec U, PetscBool first,
+                                PetscReal work[2]);
 /* Power dissipated by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

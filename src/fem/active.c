@@ -1,6 +1,7 @@
 /*
-  Fibres that contract (src/material/active.c has the law): the tension and the strain of each cell,
-  their energy, force and work. active_stress.c has the stress and the tangent.
+  Fibres that contract (src/material/active.c has the law): the tension of each cell, its energy,
+  force and work. active_stress.c has the stress and the tangent. An active strain is one of
+  eigenstrain.c.
 
   A tension is evaluated at the centre of a tet, where its fibre is, of owned cells and ghosts
   alike, and only when evaluations are of another time than before. In a static run one without t
@@ -13,26 +14,10 @@
   fibres, from displacement and velocity. A time d later the rate is (l - l_0) / d (implicit Euler),
   or 2 (l - l_0) / d - r_0, of second order for the others; at the end of a step that of the
   velocities. Static runs have none.
-
-  An active strain changes the law of a batch (SbBatchAxes()) and the energy that it stores: its
-  work in a step is (q_0 + q_1)/2 (g_1 - g_0), q the derivative of the energy by the strain g.
 */
 #include "active.h"
 
 #define SAMPLES 200 /* times of a run at which the largest tension is looked for */
-
-/* Arrays of an active strain: none. */
-static PetscErrorCode create_strains(const SbRegion *region)
-{
-  const PetscInt n = region->bend - region->bstart;
-  struct _p_SbContraction *a = region->contraction;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc4(n, &a->strain, 2 * n, &a->shortening, n, &a->force, n, &a->before));
-  for (PetscInt k = 0; k < 2 * n * SB_BATCH; k++)
-    a->shortening[k / SB_BATCH][k % SB_BATCH] = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbActiveCreate(SbSpace s)
 {
@@ -57,8 +42,6 @@ PetscErrorCode SbActiveCreate(SbSpace s)
     PetscCall(PetscNew(&a));
     region->contraction = a;
     a->npoint = SbBatchPoints(s, region->bstart).n;
-    if (region->material->active->strains)
-      PetscCall(create_strains(region));
     if (region->material->active->velocity > 0.)
       PetscCall(PetscCalloc1(a->npoint * (region->bend - region->bstart), &a->rate));
     PetscCall(PetscCalloc2(region->bend - region->bstart, &a->tension,
@@ -73,8 +56,6 @@ PetscErrorCode SbActiveDestroyRegion(SbRegion *region)
   if (!region->contraction)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree2(region->contraction->tension, region->contraction->most));
-  PetscCall(PetscFree4(region->contraction->strain, region->contraction->shortening,
-                       region->contraction->force, region->contraction->before));
   PetscCall(PetscFree(region->contraction->rate));
   PetscCall(PetscFree(region->contraction));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -102,32 +83,6 @@ static PetscErrorCode evaluate(SbSpace s, const SbRegion *region, PetscReal t, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The strains of a region. */
-static PetscErrorCode evaluate_strains(SbSpace s, const SbRegion *region, PetscReal t,
-                                       PetscReal load)
-{
-  const SbActive a = region->material->active;
-  const PetscBool everywhere = (PetscBool)!SbFormulaUses(a->strain, 'x');
-  PetscReal strain = 0.;
-
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < SB_BATCH * (region->bend - region->bstart); k++) {
-    const PetscInt b = region->bstart + k / SB_BATCH;
-    const PetscInt i = k / SB_BATCH;
-    const PetscInt l = k % SB_BATCH;
-    PetscReal x[3];
-
-    if (!k || !everywhere) {
-      SbCellCentre(s->mesh, s->batch_cell[b] + (l < s->batch_n[b] ? l : 0), x);
-      PetscCall(SbActiveStrainAt(a, t, load, x, &strain));
-    }
-    region->contraction->strain[i][l] = strain;
-    region->contraction->shortening[2 * i][l] = 1. / (1. + strain);
-    region->contraction->shortening[2 * i + 1][l] = PetscSqrtReal(1. + strain);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceActiveAt(SbSpace s, PetscReal t, PetscReal load)
 {
   PetscFunctionBeginUser;
@@ -137,13 +92,7 @@ PetscErrorCode SbSpaceActiveAt(SbSpace s, PetscReal t, PetscReal load)
     const SbRegion *region = &s->region[r];
     struct _p_SbContraction *a = region->contraction;
     const PetscReal at = a && region->material->active->steady ? load : t;
-    const PetscReal strain_at = a && region->material->active->strain_steady ? load : t;
 
-    if (a && a->strain && !(a->strain_known && a->strain_at == strain_at)) {
-      PetscCall(evaluate_strains(s, region, t, load));
-      a->strain_known = PETSC_TRUE;
-      a->strain_at = strain_at;
-    }
     if (!a || (a->known && a->at == at))
       continue;
     PetscCall(PetscLogEventBegin(s->active_event, 0, 0, 0, 0));
@@ -271,36 +220,6 @@ PetscReal SbSpaceActiveEnergy(SbSpace s, const PetscReal u[])
       for (PetscInt l = 0; l < s->batch_n[b]; l++)
         sum += at.weight[q][l] * (*at.V)[l] * T[l] * x.phi[l];
     }
-  }
-  return sum;
-}
-
-PetscReal SbSpaceActiveStrainWork(SbSpace s, const PetscReal u[], PetscBool first)
-{
-  PetscReal sum = 0.;
-
-  for (PetscInt b = 0; b < s->nbatch_owned; b++) {
-    const SbRegion *region = s->batch_region[b];
-    const struct _p_SbContraction *a = region->contraction;
-    const SbPoints at = SbBatchPoints(s, b);
-    const PetscInt k = b - region->bstart;
-    struct _p_SbMaterial own;
-    SbPack U[30], F[SB_POINTS][9], one;
-    SbPack force = {0};
-
-    if (!a || !a->strain)
-      continue;
-    (void)SbBatchLaw(region, region->pointwise, b, &own);
-    SbBatchGradients(s, b, u, PETSC_FALSE, U, F);
-    for (int q = 0; q < at.n; q++) {
-      SbActiveStrainForce(&own, (const SbPack *)F[q], one);
-      for (int l = 0; l < SB_BATCH; l++)
-        force[l] += at.weight[q][l] * (*at.V)[l] * one[l];
-    }
-    for (PetscInt l = 0; !first && l < s->batch_n[b]; l++)
-      sum += (a->force[k][l] + force[l]) / 2. * (a->strain[k][l] - a->before[k][l]);
-    memcpy(a->force[k], force, sizeof(force));
-    memcpy(a->before[k], a->strain[k], sizeof(force));
   }
   return sum;
 }

@@ -125,6 +125,7 @@ static Worst find_worst(SbSpace s, const PetscReal x[])
       continue;
     SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
     for (int q = 0; q < npoint; q++) {
+      SbPointLaw(s->batch_region[b], b, q, &own);
       if (law->type->limited)
         law->ops.energy(law, (const SbPack *)F[q], psi);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {

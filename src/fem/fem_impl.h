@@ -251,11 +251,6 @@ struct _p_SbContraction {
   SbPack *most;    /* [batches] their largest values by SbSpaceActiveMost(), or 0 */
   PetscReal at;
   PetscBool known;
-  /* with an active strain, else NULL, [batches]: strains, those of SbActiveStrain() ([2]), and at
-     the last SbSpaceActiveStrainWork() the force on a strain, J, and the strain */
-  SbPack *strain, *shortening, *force, *before;
-  PetscReal strain_at;
-  PetscBool strain_known;
   int npoint;
   SbFibreRate *rate; /* [batches][npoint] with a velocity, else NULL */
   PetscBool moving;  /* it is known: not in static runs */
@@ -273,36 +268,65 @@ PetscErrorCode SbMullinsDestroy(SbRegion *region);
   (8 * SB_PRONY_TERMS) /* numbers of a point that another mesh takes at most */
 PetscErrorCode SbHistoryCreate(SbSpace space);
 
-/* Of a copy of the law of a region that softens: that at point q of batch b. */
+/* eigenstrain.c: strains without stress of a region, and the time and the load that they are of. */
+struct _p_SbEigenState {
+  PetscInt npoint; /* of a cell */
+  int step;        /* 3: each point has strains of its own, 0: all have those of the first */
+  /* [batches][points with strains of their own]: of SbEigenLaw() [3]; logarithms along and across
+     the fibres, and that of the active strain, [3]; at the last SbSpaceEigenWork() the forces on
+     the first two, J, and the three, [5] */
+  SbPack *stretch, *log, *last;
+  SbPack *kept;    /* stretch at SbSpaceEigenKeep(), NULL before */
+  PetscBool fresh; /* it is what the first tangent of a step linearises from */
+  PetscReal at[2];
+  PetscBool known;
+};
+
+/* Of a copy of the law of a region that softens or has strains without stress: that at point q of
+   batch b. */
 SB_INLINE void SbPointLaw(const SbRegion *region, PetscInt b, int q, struct _p_SbMaterial *own)
 {
   const struct _p_SbSoftening *a = region->softening;
-  const PetscInt k = a ? a->npoint * (b - region->bstart) + q : 0;
+  const struct _p_SbEigenState *e = region->eigen;
 
-  if (!a)
-    return;
-  own->most = (const SbPack *)a->most + k;
-  own->factor = a->frozen ? (const SbPack *)a->factor + k : NULL;
+  if (e) {
+    const PetscInt each = e->step ? e->step * e->npoint : 3;
+
+    own->stretch = (const SbPack *)e->stretch + each * (b - region->bstart) + e->step * q;
+  }
+  if (a) {
+    const PetscInt k = a->npoint * (b - region->bstart) + q;
+
+    own->most = (const SbPack *)a->most + k;
+    own->factor = a->frozen ? (const SbPack *)a->factor + k : NULL;
+  }
 }
-/* A law of a region as its operations take it for batch b: itself or, of a law with fibres or one
-   that softens, `own`, a copy with what these cells have; at the first point, for others
-   SbPointLaw(). */
+/* A law of a region as its operations take it for batch b: itself or, of a law with fibres, one
+   that softens or one with strains without stress, `own`, a copy with what these cells have; at the
+   first point, for others SbPointLaw(). */
 SB_INLINE const struct _p_SbMaterial *SbBatchAxes(const SbRegion *region,
                                                   const struct _p_SbMaterial *law, PetscInt b,
                                                   struct _p_SbMaterial *own)
 {
-  if (!region->axes && !region->softening)
+  if (!region->axes && !region->softening && !region->eigen)
     return law;
   *own = *law;
   if (region->axes)
     own->axes = (const SbPack *)region->axes + 9 * (b - region->bstart);
   if (region->softening)
     SbMullinsSoften(own, law, region->material->mullins);
+  if (region->eigen)
+    SbEigenLaw(own, law, region->material->eigen->isochoric, region->eigen->step);
   SbPointLaw(region, b, 0, own);
-  if (region->contraction && region->contraction->shortening)
-    SbActiveStrain(own, law,
-                   (const SbPack *)region->contraction->shortening + 2 * (b - region->bstart));
   return own;
+}
+/* The law whose dilatation has a mean in P2 cells. */
+SB_INLINE const struct _p_SbMaterial *SbBatchVolumeLaw(const SbRegion *region, PetscInt b,
+                                                       struct _p_SbMaterial *own)
+{
+  if (!region->eigen || region->material->eigen->isochoric)
+    return region->material;
+  return SbBatchAxes(region, region->material, b, own);
 }
 /* The same; of a viscoelastic material the law of the step, to which SbViscousStress() and its
    siblings add the history. */
@@ -355,6 +379,13 @@ void SbActiveBlocks(const SbRegion *region, const struct _p_SbMaterial *law, Pet
                     const SbPack g[9], const SbPack W, const SbPack F[9], SbPack K[10][9]);
 /* f += their tangent at rest with the largest tensions, or those of the largest force, times x. */
 void SbActiveStiffest(SbSpace space, const SbRegion *region, const PetscReal x[], PetscReal f[]);
+
+/* eigenstrain.c */
+PetscErrorCode SbEigenCreate(SbSpace space);
+PetscErrorCode SbEigenDestroyRegion(SbRegion *region);
+/* Exchanges the strains for those kept, where these are fresh, and back; they are no longer. */
+void SbEigenExchangeKept(SbSpace space);
+void SbEigenForgetKept(SbSpace space);
 
 /* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)

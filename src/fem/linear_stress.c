@@ -205,7 +205,7 @@ static void linearise(const struct _p_SbMaterial *m, const SbPack F[9], const Sb
 
 /* The pressure of P2's mean, tension: at the state, the last one, its change by the step; updates
    the last one. */
-static void linearise_mean(const SbMaterial m, const SbPoints *at, const SbPack x[30],
+static void linearise_mean(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack x[30],
                            const SbPack F[SB_POINTS][9], const SbPack *dx, PetscReal part,
                            SbPack pressure, SbPack mean[3])
 {
@@ -238,6 +238,10 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   if (step)
     PetscCall(SbSpaceGetLocalRead(s, step, &du));
+  if (step)
+    SbEigenForgetKept(s);
+  else
+    SbEigenExchangeKept(s);
   for (PetscInt r = 0; r < s->nregion; r++) {
     SbRegion *region = &s->region[r];
     const SbMaterial law = region->pointwise;
@@ -254,7 +258,7 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
       const SbPoints at = SbBatchPoints(s, b);
       SbPack x[30], dx[30], F[SB_POINTS][9], H[SB_POINTS][9];
       SbPack pressure[3] = {{0.}};
-      struct _p_SbMaterial own, without;
+      struct _p_SbMaterial own, without, whole;
       const struct _p_SbMaterial *here = SbBatchLaw(region, law, b, &own);
 
       if (region->softening) {
@@ -272,15 +276,19 @@ PetscErrorCode SbSpaceLineariseStress(SbSpace s, Vec U, Vec step, PetscReal part
             H[k / 9][k % 9][l] = -H[k / 9][k % 9][l];
       }
       if (mean)
-        linearise_mean(region->material, &at, (const SbPack *)x, (const SbPack(*)[9])F,
-                       step ? (const SbPack *)dx : NULL, step ? part : 1., s->pressure[b],
-                       pressure);
-      for (int q = 0; points && q < at.n; q++)
+        linearise_mean(SbBatchVolumeLaw(region, b, &whole), &at, (const SbPack *)x,
+                       (const SbPack(*)[9])F, step ? (const SbPack *)dx : NULL, step ? part : 1.,
+                       s->pressure[b], pressure);
+      for (int q = 0; points && q < at.n; q++) {
+        SbPointLaw(region, b, q, &own);
         linearise(here, (const SbPack *)F[q], step ? (const SbPack *)H[q] : NULL,
                   (const SbPack *)pressure, step ? part : 1.,
                   &region->stress[at.n * (b - region->bstart) + q]);
+      }
     }
   }
+  if (!step)
+    SbEigenExchangeKept(s);
   if (step)
     PetscCall(SbSpaceRestoreLocalRead(s, step, &du));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));

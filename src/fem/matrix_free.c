@@ -353,7 +353,7 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
     const SbMaterial m = s->region[r].material;
     const PetscReal *viscosity = m->viscous ? m->viscous->viscosity : NULL;
 
-    *has = (PetscBool)(*has && (m->linear || (m->ops.frame && !m->active)) &&
+    *has = (PetscBool)(*has && (m->linear || (m->ops.frame && !m->active && !m->eigen)) &&
                        (!viscosity || (viscosity[0] == 0. && viscosity[1] == 0.)));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));

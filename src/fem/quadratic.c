@@ -90,6 +90,8 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   for (int q = 0; q < rule->n; q++) {
     const SbPack *g = at->g + at->step * q;
     const SbPack *here = cubic ? NULL : F[q];
+    struct _p_SbMaterial copy;
+    const struct _p_SbMaterial *law = SbLawAt(m, q, &copy);
     SbPack u[12], own[9], D[9], p, W, f[12];
 
     if (cubic) {
@@ -97,20 +99,20 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
       SbCellGradient(g, (const SbPack *)u, 1., own);
       here = (const SbPack *)own;
     }
-    if (m->linear || m->ops.frame || m->ops.spin) {
+    if (!law->inner && (law->linear || law->ops.frame || law->ops.spin)) {
       // theta = R : F - 3, with its derivative
-      m->ops.dilatation_gradient(m, here, D);
+      law->ops.dilatation_gradient(law, here, D);
       for (int l = 0; l < SB_BATCH; l++)
         p[l] = 3. * lambda;
       for (int k = 0; k < 9; k++)
         for (int l = 0; l < SB_BATCH; l++)
           p[l] -= lambda * D[k][l] * here[k][l];
     } else {
-      m->ops.dilatation(m, here, p);
+      law->ops.dilatation(law, here, p);
       for (int l = 0; l < SB_BATCH; l++)
         p[l] *= -lambda;
       if (b)
-        m->ops.dilatation_gradient(m, here, D);
+        law->ops.dilatation_gradient(law, here, D);
     }
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal weight = cubic ? rule->weight[q] : at->weight[q][l];
@@ -185,14 +187,22 @@ static void add_mean_history(const SbRegion *region, PetscInt b, int n, const Sb
   }
 }
 
+/* The pressure of a law with strains without stress, whose dilatation is r theta, from that. */
+static void per_grown_volume(const struct _p_SbMaterial *law, SbPack pressure)
+{
+  for (int l = 0; law->stretch && l < SB_BATCH; l++)
+    pressure[l] /= law->stretch[2][l];
+}
+
 void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
   const SbRegion *region = s->batch_region[b];
   const SbMaterial m = region->pointwise;
   const SbPoints at = SbBatchPoints(s, b);
-  struct _p_SbMaterial own;
+  struct _p_SbMaterial own, whole, here;
   const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
+  const struct _p_SbMaterial *volume_law = SbBatchVolumeLaw(region, b, &whole);
   SbPack U[30], p;
 
   SbBatchGradients(s, b, x, PETSC_FALSE, U, F);
@@ -203,7 +213,10 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
     if (psi)
       law->ops.energy(law, (const SbPack *)F[q], psi[q]);
     if (pressure)
-      SbMaterialPressure(region->history ? law : m, (const SbPack *)F[q], pressure[q]);
+      SbMaterialPressure(region->history || region->eigen ? law : m, (const SbPack *)F[q],
+                         pressure[q]);
+    if (pressure)
+      per_grown_volume(law, pressure[q]);
     if (region->history && P)
       SbViscousStress(region, law, b, q, (const SbPack *)F[q], P[q]);
     if (region->contraction && P)
@@ -219,24 +232,26 @@ void SbBatchState(SbSpace s, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS
   /* contribution of the mean theta */
   const PetscReal lambda = SbMaterialMeanModulus(region->material);
 
-  SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
+  SbQuadraticVolume(volume_law, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   if (region->history) {
     add_mean_history(region, b, at.n, p, P ? P : NULL, psi, pressure, (const SbPack(*)[9])F);
     return;
   }
   for (int q = 0; q < at.n; q++) {
-    SbPack D[9];
+    const struct _p_SbMaterial *volume = SbLawAt(volume_law, q, &here);
+    SbPack D[9], mean;
 
     if (P)
-      region->material->ops.dilatation_gradient(region->material, (const SbPack *)F[q], D);
+      volume->ops.dilatation_gradient(volume, (const SbPack *)F[q], D);
     for (int k = 0; P && k < 9; k++)
       for (int l = 0; l < SB_BATCH; l++)
         P[q][k][l] += p[l] * D[k][l];
-    for (int l = 0; l < SB_BATCH; l++) {
+    for (int l = 0; l < SB_BATCH; l++)
       if (psi)
         psi[q][l] += p[l] * p[l] / (2. * lambda);
-      if (pressure)
-        pressure[q][l] -= p[l];
-    }
+    memcpy(mean, p, sizeof(mean));
+    per_grown_volume(volume, mean);
+    for (int l = 0; pressure && l < SB_BATCH; l++)
+      pressure[q][l] -= mean[l];
   }
 }

@@ -39,14 +39,15 @@ void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscR
     const SbPoints at = SbBatchPoints(s, b);
     SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30];
     SbPack p = {0};
-    struct _p_SbMaterial own;
+    struct _p_SbMaterial own, whole;
     const struct _p_SbMaterial *law = SbBatchLaw(region, m, b, &own);
 
     if (at.rule)
       memset(fe, 0, sizeof(fe));
     SbBatchGradients(s, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
-      SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
+      SbQuadraticVolume(SbBatchVolumeLaw(region, b, &whole), &at, (const SbPack *)U,
+                        (const SbPack(*)[9])F, p, b10);
       if (region->history)
         add_mean_history(region, b, p);
       for (int k = 0; k < 30; k++)

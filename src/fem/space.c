@@ -255,6 +255,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(SbSpaceFindAxes(s));
   PetscCall(SbHistoryCreate(s));
   PetscCall(SbActiveCreate(s));
+  PetscCall(SbEigenCreate(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces)
     PetscCall(SbJumpCreate(s, &s->jump));
@@ -331,6 +332,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
     PetscCall(SbViscousDestroy(&s->region[r]));
     PetscCall(SbMullinsDestroy(&s->region[r]));
     PetscCall(SbActiveDestroyRegion(&s->region[r]));
+    PetscCall(SbEigenDestroyRegion(&s->region[r]));
   }
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree3(s->batch_region, s->batch_cell, s->batch_n));

@@ -302,11 +302,12 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
                              PetscReal shift_k, const Factors *x, PetscInt batch,
                              const SbVolumetric *out, SbPack K[SB_PAIRS][9])
 {
-  const SbMaterial m = region->material;
+  struct _p_SbMaterial own, whole;
+  const struct _p_SbMaterial *m = SbBatchVolumeLaw(region, batch, &whole);
   const SbMaterial law = region->pointwise;
   const SbPoints points = SbBatchPoints(s, batch);
   const SbPack *V = points.V;
-  const PetscBool mean = (PetscBool)(law != m);
+  const PetscBool mean = (PetscBool)(law != region->material);
   const PetscBool one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
   const PetscReal damped_m = mean ? SbMaterialMeanModulus(m) : 0.;
   const PetscBool split = (PetscBool)(out && mean && damped_m > 0.);
@@ -314,7 +315,6 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
     b[30] = {{0}};
   SbPack pressure;
-  struct _p_SbMaterial own;
   const struct _p_SbMaterial *local = SbBatchLaw(region, law, batch, &own);
   Factors at = *x;
 

@@ -127,6 +127,24 @@ PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbFibresRequire(SbMaterial m, const SbScope *scope, const char *option)
+{
+  static const char *const keys[] = {"fibre", "fibre_field", "fibre_surfaces"};
+  PetscBool has = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (m->fibres)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys) && !has; k++)
+    PetscCall(SbOptionGiven(scope, keys[k], &has));
+  PetscCheck(has, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: fibres of the law %s have no direction: give -%s_%s_fibre, as 1,0,0, or "
+             "fibre_field or fibre_surfaces",
+             option, m->type->name, scope->klass, scope->instance);
+  PetscCall(SbFibresRead(m, scope, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A direction at x, as a unit vector. */
 static PetscErrorCode evaluate(const SbFibres f, int i, const PetscReal x[3],
                                const PetscReal *given, PetscReal a[3])

@@ -60,44 +60,47 @@ void SbFibreClear(int level, SbFibreEnergy *w);
   collective.
 */
 PetscErrorCode SbFibresRead(SbMaterial m, const SbScope *scope, PetscBool sheet);
+/* Reads them for `option`, which needs them, unless the law has its own. Error: PETSC_ERR_USER if
+   none is given. */
+PetscErrorCode SbFibresRequire(SbMaterial m, const SbScope *scope, const char *option);
 
 /* Option rows of the directions of fibres. */
-#define SB_FIBRE_ROWS                                                                             \
-  {"fibre",                                                                                       \
-   SB_OPTION_FORMULA,                                                                             \
-   3,                                                                                             \
-   "",                                                                                            \
-   "1,0,0",                                                                                       \
-   "",                                                                                            \
-   "direction of the fibres, of laws that have them and of bodies that contract, of any length "  \
-   "but 0: numbers or formulas of the rest position x, y, z, at the centre of each tet"},         \
-    {"sheet",                                                                                     \
-     SB_OPTION_FORMULA,                                                                           \
-     3,                                                                                           \
-     "",                                                                                          \
-     "0,0,0",                                                                                     \
-     "",                                                                                          \
-     "direction in the plane of fibres and sheet, likewise; what it has along the fibres is "     \
-     "left out; 0,0,0: any, for laws that do not need it"},                                       \
-    {"fibre_field",                                                                               \
-     SB_OPTION_STRING,                                                                            \
-     1,                                                                                           \
-     "",                                                                                          \
-     "",                                                                                          \
-     "",                                                                                          \
-     "array of the mesh file with the direction of the fibres of each tet, in place of `fibre`: " \
-     "ElementData of gmsh, CellData of VTK files, /mesh/NAME of an .h5 mesh; empty: none"},       \
-    {"sheet_field", SB_OPTION_STRING, 1, "", "", "", "the same for the sheets"},                  \
-    {"fibre_surfaces",                                                                            \
-     SB_OPTION_NAMES,                                                                             \
-     1,                                                                                           \
-     "",                                                                                          \
-     "",                                                                                          \
-     "",                                                                                          \
-     "directions by rule, as in a ventricle of the heart: four sets, its outer and its inner "    \
-     "surface, base and apex; with a right ventricle a fifth, its inner surface; none: no rule"}, \
-  {                                                                                               \
-    "fibre_angles", SB_OPTION_REALS, 4, "degree", "40,-50,-65,25", "[-90, 90]",                   \
-      "of the rule: alpha of the fibres to the circumference, inside and outside, and beta of "   \
-      "the sheets to the wall's normal, inside and outside"                                       \
+#define SB_FIBRE_ROWS                                                                              \
+  {"fibre",                                                                                        \
+   SB_OPTION_FORMULA,                                                                              \
+   3,                                                                                              \
+   "",                                                                                             \
+   "1,0,0",                                                                                        \
+   "",                                                                                             \
+   "direction of the fibres, of laws that have them, and of bodies that contract or grow, of any " \
+   "length but 0: numbers or formulas of the rest position x, y, z, at the centre of each tet"},   \
+    {"sheet",                                                                                      \
+     SB_OPTION_FORMULA,                                                                            \
+     3,                                                                                            \
+     "",                                                                                           \
+     "0,0,0",                                                                                      \
+     "",                                                                                           \
+     "direction in the plane of fibres and sheet, likewise; what it has along the fibres is "      \
+     "left out; 0,0,0: any, for laws that do not need it"},                                        \
+    {"fibre_field",                                                                                \
+     SB_OPTION_STRING,                                                                             \
+     1,                                                                                            \
+     "",                                                                                           \
+     "",                                                                                           \
+     "",                                                                                           \
+     "array of the mesh file with the direction of the fibres of each tet, in place of `fibre`: "  \
+     "ElementData of gmsh, CellData of VTK files, /mesh/NAME of an .h5 mesh; empty: none"},        \
+    {"sheet_field", SB_OPTION_STRING, 1, "", "", "", "the same for the sheets"},                   \
+    {"fibre_surfaces",                                                                             \
+     SB_OPTION_NAMES,                                                                              \
+     1,                                                                                            \
+     "",                                                                                           \
+     "",                                                                                           \
+     "",                                                                                           \
+     "directions by rule, as in a ventricle of the heart: four sets, its outer and its inner "     \
+     "surface, base and apex; with a right ventricle a fifth, its inner surface; none: no rule"},  \
+  {                                                                                                \
+    "fibre_angles", SB_OPTION_REALS, 4, "degree", "40,-50,-65,25", "[-90, 90]",                    \
+      "of the rule: alpha of the fibres to the circumference, inside and outside, and beta of "    \
+      "the sheets to the wall's normal, inside and outside"                                        \
   }

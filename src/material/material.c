@@ -62,6 +62,22 @@ static const SbOption body_rows[] = {
    "softening spreads over energies of the shape of m + beta times the largest one so far"},
   {"mullins_beta", SB_OPTION_REAL, 1, "", "0", "[0, inf)",
    "beta of mullins_m; 0: the original of Ogden and Roxburgh"},
+  {"growth", SB_OPTION_FORMULA, 1, "", "0", "",
+   "growth: strain without stress, in all directions, above -1; a formula of the time and the rest "
+   "position, or table:FILE; 0: none"},
+  {"growth_fibre", SB_OPTION_FORMULA, 1, "", "0", "", "growth along the fibres, likewise"},
+  {"growth_plane", SB_OPTION_FORMULA, 1, "", "0", "",
+   "growth in the plane across the fibres, in its two directions, likewise"},
+  {"prestrain", SB_OPTION_FORMULA, 1, "", "0", "",
+   "strain of the fibres at rest, above -1, positive where they are stretched, at constant volume; "
+   "a formula as that of growth"},
+  {"thermal_expansion", SB_OPTION_REAL, 1, "1/K", "0", "",
+   "coefficient of thermal expansion, of lengths; needs temperature"},
+  {"temperature", SB_OPTION_FORMULA, 1, "K", "0", "",
+   "temperature above that without stress; a formula as that of growth; needs thermal_expansion"},
+  {"temperature_field", SB_OPTION_STRING, 1, "", "", "",
+   "array of the mesh file with a number for each tet, by which temperature is multiplied: "
+   "ElementData of gmsh, CellData of VTK files, /mesh/NAME of an .h5 mesh; empty: none"},
   SB_FIBRE_ROWS,
 };
 
@@ -203,6 +219,7 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
     PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)choice));
   }
   PetscCall(SbActiveRead(m, &scope));
+  PetscCall(SbEigenstrainRead(m, &scope));
   PetscCall(SbViscousRead(m, &scope));
   if (m->viscous) {
     SbMaterial *const laws_of[2] = {&m->viscous->step, &m->viscous->relaxed};
@@ -243,6 +260,7 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscCall(SbFibresDestroy(&(*m)->fibres));
   PetscCall(SbActiveDestroy(&(*m)->active));
   PetscCall(PetscFree((*m)->mullins));
+  PetscCall(SbEigenstrainDestroy(&(*m)->eigen));
   if ((*m)->viscous) {
     PetscCall(SbMaterialDestroy(&(*m)->viscous->step));
     PetscCall(SbMaterialDestroy(&(*m)->viscous->relaxed));

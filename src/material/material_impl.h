@@ -40,10 +40,15 @@ struct _p_SbElastic {
 PetscErrorCode SbFibresDestroy(SbFibres *fibres);
 
 /* active.c: reads the tension of fibres into m->active; NULL: there is none. Then m has fibres.
-   Errors: PETSC_ERR_USER for a law without fibres that gets no directions, and for what the linear
-   law cannot have. */
+   Errors: PETSC_ERR_USER as SbFibresRequire(), and for what the linear law cannot have. */
 PetscErrorCode SbActiveRead(SbMaterial m, const SbScope *scope);
 PetscErrorCode SbActiveDestroy(SbActive *active);
+
+/* eigenstrain.c: reads the strains without stress into m->eigen; NULL: there are none. Errors:
+   PETSC_ERR_USER for a viscoelastic material, a temperature without an expansion or the other way
+   round, and as SbFibresRequire(). */
+PetscErrorCode SbEigenstrainRead(SbMaterial m, const SbScope *scope);
+PetscErrorCode SbEigenstrainDestroy(SbEigenstrain *eigen);
 
 /* viscous.c: reads the series and the viscosity of a body into m->viscous; NULL: it has neither.
    Errors: PETSC_ERR_USER for what is no fraction, time or viscosity. */

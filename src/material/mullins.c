@@ -226,10 +226,10 @@ static PetscErrorCode check(const SbMaterial m, const SbScope *scope, const char
              "%s: a viscoelastic material does not soften, as which of its stresses would is not "
              "known; leave prony_times and viscosity out, or mullins_r",
              option);
-  PetscCheck(!m->active || !m->active->strains, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: a material with an active strain does not soften; take active_tension, or leave "
-             "%s out",
-             option, m->active->strain_option);
+  PetscCheck(!m->eigen, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: a material that grows, expands or has an active strain does not soften; leave %s "
+             "out",
+             option, m->eigen->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -99,6 +99,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
     PetscFree6(m->cell, m->cell_orig, m->cell_body, m->cell_material, m->cell_set, m->face_set));
   PetscCall(PetscFree(m->edge_off));
   PetscCall(PetscFree(m->direction));
+  PetscCall(PetscFree(m->temperature));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -57,7 +57,7 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
                  im->where, (double)off[i], (double)SB_LENGTH_MAX);
     }
   }
-  for (PetscInt f = 0; f < im->nfield; f++) {
+  for (PetscInt f = 0; im->field_width == 3 && f < im->nfield; f++) {
     PetscReal *a = im->field_value + 3 * f;
     const PetscReal y[3] = {a[0], a[1], a[2]};
 

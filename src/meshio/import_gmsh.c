@@ -384,17 +384,17 @@ static PetscErrorCode read_data(Gmsh *g)
     if (i < 3)
       whole[i] = one;
   }
-  if (!SbImportWants(g->im, name) || whole[1] != 3)
+  if (!SbImportWants(g->im, name, whole[1]))
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbScanRoom(s, "rows of element data", whole[2], 8, 28));
-  PetscCall(PetscMalloc2(whole[2], &number, 3 * whole[2], &value));
+  PetscCall(SbScanRoom(s, "rows of element data", whole[2], 2 + 2 * whole[1], 4 + 8 * whole[1]));
+  PetscCall(PetscMalloc2(whole[2], &number, whole[1] * whole[2], &value));
   SbScanEndOfLine(s);
   s->binary = g->binary;
   for (int64_t i = 0; i < whole[2]; i++) {
     PetscCall(SbScanInt(s, 4, "number of an element", &number[i]));
-    for (int k = 0; k < 3; k++) {
+    for (int64_t k = 0; k < whole[1]; k++) {
       PetscCall(SbScanReal(s, "element data", number[i], &x));
-      value[3 * i + k] = x;
+      value[whole[1] * i + k] = x;
     }
   }
   s->binary = PETSC_FALSE;

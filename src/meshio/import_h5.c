@@ -625,7 +625,8 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
     (void)snprintf(name, sizeof(name), "/mesh/%s", im->field);
     if (is_there(f, name)) {
       PetscCall(
-        read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &rows_of, &value));
+        read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = (hsize_t)im->field_width},
+                   &rows_of, &value));
       PetscCall(SbImportKeep(im, rows_of, NULL, 1, value));
     }
   }

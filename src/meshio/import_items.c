@@ -639,11 +639,11 @@ PetscErrorCode SbImportKeep(SbImport *im, PetscInt n, const int64_t number[], in
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree2(im->field_number, im->field_value));
-  PetscCall(PetscMalloc2(n, &im->field_number, 3 * n, &im->field_value));
+  PetscCall(PetscMalloc2(n, &im->field_number, im->field_width * n, &im->field_value));
   im->nfield = n;
   for (PetscInt i = 0; i < n; i++)
     im->field_number[i] = number ? number[i] : first + i;
-  for (PetscInt i = 0; i < 3 * n; i++)
+  for (PetscInt i = 0; i < im->field_width * n; i++)
     im->field_value[i] = value[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -198,10 +198,10 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
     SB_SCAN_ERROR(v->scan, "array '%s' of %lld components; expected up to 1024", name,
                   (long long)ncomponent);
   PetscCall(SbScanRoom(v->scan, "tuples", ntuple, 1, 1));
-  if (v->on_cells && ncomponent == 3 && SbImportWants(v->im, name)) {
+  if (v->on_cells && SbImportWants(v->im, name, ncomponent)) {
     double *value = NULL;
 
-    PetscCall(read_array(v, "data of cells", 3 * ntuple, type, &value));
+    PetscCall(read_array(v, "data of cells", ncomponent * ntuple, type, &value));
     PetscCall(SbImportKeep(v->im, (PetscInt)ntuple, NULL, 0, value));
   } else if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && SbVtkIsGhost(name)) {
     PetscCall(read_array(v, "data of cells", ntuple, type, &grid->ghost));

@@ -35,7 +35,7 @@ typedef struct {
   int64_t npoint;
   double *x;      /* [npoint][3] */
   double *global; /* [npoint], or NULL */
-  double *vector; /* [ncell][3] the array that SbImportWants(), or NULL */
+  double *wanted; /* [ncell][1 or 3] the array that SbImportWants(), or NULL */
 } Piece;
 
 typedef struct {
@@ -446,8 +446,8 @@ static PetscErrorCode read_piece(Vtu *v, Piece *one)
 
       attribute(tag, "NumberOfComponents", sizeof(value), value);
       attribute(tag, "Name", sizeof(found), found);
-      if (!strcmp(value, "3") && SbImportWants(v->im, found))
-        PetscCall(read_array(v, tag, 3 * ncell, &one->vector));
+      if (SbImportWants(v->im, found, value[0] ? atoi(value) : 1))
+        PetscCall(read_array(v, tag, v->im->field_width * ncell, &one->wanted));
       if ((value[0] && strcmp(value, "1") != 0) || !strcmp(found, "GlobalCellIds") ||
           !strcmp(found, "GlobalElementId"))
         continue;
@@ -500,11 +500,11 @@ static PetscErrorCode append_piece(Vtu *v, Piece *one)
     PetscCall(append(v, all->npoint, one->npoint, one->global, 0., &all->global));
   else
     all->global = NULL;
-  if (one->vector && all->vector)
-    PetscCall(
-      append(v, 3 * (int64_t)grid->ncell, 3 * (int64_t)its->ncell, one->vector, 0., &all->vector));
+  if (one->wanted && all->wanted)
+    PetscCall(append(v, v->im->field_width * (int64_t)grid->ncell,
+                     v->im->field_width * (int64_t)its->ncell, one->wanted, 0., &all->wanted));
   else
-    all->vector = NULL;
+    all->wanted = NULL;
   if (one->grid.ghost || grid->ghost) {
     double *none = NULL;
 
@@ -795,8 +795,8 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
                    (long long)v->ndeclared, empty, (long long)njoined,
                    v->all.global ? " by their global numbers" : " where their positions are equal");
   }
-  if (v->all.vector)
-    PetscCall(SbImportKeep(im, v->all.grid.ncell, NULL, 0, v->all.vector));
+  if (v->all.wanted)
+    PetscCall(SbImportKeep(im, v->all.grid.ncell, NULL, 0, v->all.wanted));
   PetscCall(SbVtkSetPoints((PetscInt)v->all.npoint, v->all.x, im));
   s->token = v->cells_at;
   PetscCall(SbVtkGridFill(&v->all.grid, im));

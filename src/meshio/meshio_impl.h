@@ -18,10 +18,11 @@ void SbImportParts(SbImport *import, SbImportPart part[SB_IMPORT_NPART]);
 /* Frees what only the reader needs: the text of the file and scratch arrays. */
 PetscErrorCode SbImportForget(SbImport *import);
 PetscErrorCode SbNumbersDestroy(SbNumbers *numbers);
-/* Whether an array of three numbers per cell is the one that is asked for. */
-static inline PetscBool SbImportWants(const SbImport *import, const char *name)
+/* Whether an array with this many numbers per cell is the one that is asked for. */
+static inline PetscBool SbImportWants(const SbImport *import, const char *name, int64_t width)
 {
-  return (PetscBool)(import->field[0] && !strcmp(import->field, name));
+  return (PetscBool)(import->field[0] && width == import->field_width &&
+                     !strcmp(import->field, name));
 }
 /* Keeps it: row i is of the cell number[i] of the file, or first + i where number is NULL. */
 PetscErrorCode SbImportKeep(SbImport *import, PetscInt n, const int64_t number[], int64_t first,

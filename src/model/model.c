@@ -144,7 +144,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
         m->set[k % m->nset].prescribed = PETSC_TRUE;
   }
   PetscCall(SbModelStiffenRigid(m));
-  PetscCall(SbFibresFind(m->mesh, m->material));
+  PetscCall(SbCellFieldsFind(m->mesh, m->material));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   PetscCall(SbSpaceWarnShapes(m->space));
   m->load = 1.;
@@ -280,11 +280,24 @@ PetscErrorCode SbModelActiveAt(SbModel m, PetscReal t)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSpaceActiveAt(m->space, t, m->dynamic ? 1. : t));
+  PetscCall(SbSpaceEigenAt(m->space, t, m->dynamic ? 1. : t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, PetscBool first, Vec F,
-                                  PetscReal *work)
+PetscErrorCode SbModelEigenWork(SbModel m, PetscReal t, Vec U, PetscBool first, PetscReal work[2])
+{
+  SbEvaluation e = {.U = U};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelActiveAt(m, t));
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  SbSpaceEigenWork(m->space, e.stage.u, first, work);
+  PetscCall(SbEvaluationEnd(m, &e));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, work, 2, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, Vec F)
 {
   SbEvaluation e = {.U = U, .F = F};
 
@@ -292,9 +305,7 @@ PetscErrorCode SbModelActiveForce(SbModel m, PetscReal t, Vec U, PetscBool first
   PetscCall(SbModelActiveAt(m, t));
   PetscCall(SbEvaluationBegin(m, t, &e));
   SbSpaceAddActiveForce(m->space, e.stage.u, e.f);
-  *work = SbSpaceActiveStrainWork(m->space, e.stage.u, first);
   PetscCall(SbEvaluationEnd(m, &e));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, work, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -89,7 +89,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 20
+#define NNUMBER 21
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->state.energies;
@@ -114,6 +114,7 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"viscosity_loss", &e->viscosity_loss, PETSC_TRUE},
     {"mullins_loss", &e->mullins_loss, PETSC_TRUE},
     {"active_work", &e->active_work, PETSC_TRUE},
+    {"growth_work", &e->growth_work, PETSC_TRUE},
   };
 
   memcpy(number, all, sizeof(all));

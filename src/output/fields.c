@@ -300,6 +300,16 @@ static PetscErrorCode axis(const SbField *f, SbRun run, const SbStep *step, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The volume of a cell without stress over that at rest. */
+static PetscErrorCode growth(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  (void)f;
+  (void)step;
+  SbSpaceCellGrowth(run->model->space, values);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode tension(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   const SbSpace s = run->model->space;
@@ -367,6 +377,8 @@ static const SbField table[] = {
    .help = "tension of fibres that contract, with its factors by length and velocity; else 0"},
   {"mullins_factor", "1", 1, CELL, .compute = softening,
    .help = "factor of softening on the stress that changes the shape; without it 1"},
+  {"growth", "1", 1, CELL, .compute = growth,
+   .help = "volume without stress over that at rest, of bodies that grow or expand; else 1"},
   {"body", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,
    .help = "number of the body, always written"},
   {"rank", "1", 1, CELL, .compute = number, .constant = PETSC_TRUE,

@@ -80,6 +80,7 @@ static const struct {
               {"viscosity_loss", AT(energies.viscosity_loss)}};
 
 #define ACTIVE "active_work"   /* with fibres that contract */
+#define GROWTH "growth_work"   /* with other strains without stress */
 #define MULLINS "mullins_loss" /* with materials that soften */
 
 /* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
@@ -134,8 +135,10 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     put_column(line, columns[i].unit, "%s%s", i ? "," : "", columns[i].name);
   for (size_t i = 0; run->model->space->viscous && i < PETSC_STATIC_ARRAY_LENGTH(losses); i++)
     put_column(line, "J", ",%s", losses[i].name);
-  if (run->model->space->active)
+  if (run->model->space->active || run->model->space->active_strain)
     put_column(line, "J", "," ACTIVE);
+  if (run->model->space->grows)
+    put_column(line, "J", "," GROWTH);
   if (run->model->space->softening)
     put_column(line, "J", "," MULLINS);
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
@@ -305,7 +308,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (h->fd >= 0) {
     const SbEnergies *e = &step->energies;
     const PetscReal total =
-      e->kinetic + e->strain - e->load_work - e->prescribed_work - e->active_work;
+      e->kinetic + e->strain - e->load_work - e->prescribed_work - e->active_work - e->growth_work;
 
     rewind(h->text);
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
@@ -322,8 +325,10 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     for (size_t k = 0; s->viscous && k < PETSC_STATIC_ARRAY_LENGTH(losses); k++)
       (void)fprintf(h->text, ",%.17g",
                     *(const PetscReal *)(const void *)((const char *)step + losses[k].from));
-    if (s->active)
+    if (s->active || s->active_strain)
       (void)fprintf(h->text, ",%.17g", e->active_work);
+    if (s->grows)
+      (void)fprintf(h->text, ",%.17g", e->growth_work);
     if (s->softening)
       (void)fprintf(h->text, ",%.17g", e->mullins_loss);
     for (PetscInt k = 0; k < h->nextra; k++)

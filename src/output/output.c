@@ -17,8 +17,8 @@ const SbOption SbOutputRows[] = {
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
    "contact_pressure, contact_gap, nodal_stress, nodal_von_mises, stress, von_mises, pressure, "
-   "mean_pressure, J, energy_density, space_error, fibre, sheet, active_tension, rank; sets: "
-   "where the sets and groups are that the scenario names; none: no such file"},
+   "mean_pressure, J, energy_density, space_error, fibre, sheet, active_tension, growth, rank; "
+   "sets: where the sets and groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: by output_every_steps"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",

@@ -22,7 +22,7 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
     frames, s->comm, PETSC_ERR_USER,
     "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the "
     "materials linear, and corotated with -body_<name>_tangent warped and without "
-    "active_tension: choose these, or -solver rotated");
+    "active_tension, growth and temperature: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -321,7 +321,9 @@ static PetscErrorCode begin_path(Path *p, PetscReal factor)
   for (PetscInt e = 0; e < m->nprescribe; e++)
     p->delta = m->prescribe[e]->steady ? p->delta : FINE;
   for (PetscInt k = 0; k < m->nmaterial; k++)
-    p->delta = !m->material[k]->active || m->material[k]->active->steady ? p->delta : FINE;
+    p->delta = m->material[k]->eigen || (m->material[k]->active && !m->material[k]->active->steady)
+                 ? FINE
+                 : p->delta;
   PetscCall(VecCopy(run->state.U, p->X));
   PetscCall(put_at(p, factor));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -2,7 +2,8 @@
   Energy balance. R: residual without constraints (reaction on prescribed unknowns), f: loads. The
   work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the
   change of their potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment
-  times angle), and by fibres that contract as by loads; damping dissipates (p0 + p1)/2
+  times angle), by fibres that contract as by loads, and by strains without stress likewise
+  (src/fem/eigenstrain.c); damping dissipates (p0 + p1)/2
   h, p = v . C v. Barrier contact integrates its own work (src/contact/surfaces.c), as the energy of
   its gaps may change much in a step. The rest of the difference between the energies at the start
   and now was dissipated (negative: added) by the integrator. A stable implicit one adds little; if
@@ -52,7 +53,6 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
                      own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
   Vec active = NULL;
-  PetscReal strained;
 
   PetscFunctionBeginUser;
   PetscCall(SbModelActiveAt(m, t));
@@ -68,8 +68,14 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (m->space->active) {
     PetscCall(VecDuplicate(run->state.U, &active));
-    PetscCall(SbModelActiveForce(m, t, run->state.U, first, active, &strained));
-    e->active_work += strained;
+    PetscCall(SbModelActiveForce(m, t, run->state.U, active));
+  }
+  if (m->space->eigen) {
+    PetscReal strained[2];
+
+    PetscCall(SbModelEigenWork(m, t, run->state.U, first, strained));
+    e->active_work += strained[0];
+    e->growth_work += strained[1];
   }
   if (run->solve.damped)
     PetscCall(SbModelDampingPower(m, run->state.U, run->state.V, &power));
@@ -121,7 +127,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     e->integrator_loss -= e->relaxation_loss + e->viscosity_loss;
   if (m->space->softening)
     e->integrator_loss -= e->mullins_loss;
-  e->integrator_loss += e->active_work;
+  e->integrator_loss += e->active_work + e->growth_work;
   run->state.energy_most = PetscMax(run->state.energy_most, e->kinetic + e->strain);
   if (m->dynamic && !run->monitors.warned_gain &&
       -e->integrator_loss > GIVEN * run->state.energy_most + rounding(m)) {

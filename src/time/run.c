@@ -101,15 +101,16 @@ static PetscErrorCode check_rigid(const SbBody *body, SbRun r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Integrators that an active strain, and a relation of force and velocity, do not go with. */
+/* Integrators that strains without stress, and a relation of force and velocity, do not go
+   with. */
 static PetscErrorCode check_active(const SbMaterial m, PetscBool body, SbRun r)
 {
   PetscFunctionBeginUser;
-  if (m->active && m->active->strains)
+  if (m->eigen && !m->linear)
     PetscCheck(!SbRunIsExplicit(r), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s: the stable step of explicit integrators does not know how stiff it makes a "
                "body; take -time euler_implicit, newmark or genalpha",
-               m->active->strain_option);
+               m->eigen->name);
   if (!m->active || m->active->velocity == 0.)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(!SbRunIsExplicit(r) && r->solve.preset != SB_TIME_ALPHA2, PETSC_COMM_SELF,

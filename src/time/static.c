@@ -63,6 +63,10 @@ static PetscErrorCode predict(void *ctx)
 
   PetscFunctionBeginUser;
   l->run->model->load = l->factor;
+  if (l->run->model->space->eigen) {
+    PetscCall(SbModelActiveAt(l->run->model, l->factor - l->length));
+    PetscCall(SbSpaceEigenKeep(l->run->model->space));
+  }
   PetscCall(SbModelActiveAt(l->run->model, l->factor));
   PetscCall(VecCopy(l->run->state.U, l->X));
   PetscCall(SbModelPrescribe(l->run->model, l->factor, l->X));

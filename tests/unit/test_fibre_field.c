@@ -1,8 +1,8 @@
 // @ranks 1 2 3
 /*
-  Directions of fibres that do not come from formulas: arrays of gmsh, VTK and .h5 files, of bodies
-  that are scaled, turned, moved, copied and refined; and the rule of Bayer et al., on a block,
-  whose Laplace problems have linear solutions.
+  Directions of fibres, and temperatures, that do not come from formulas: arrays of gmsh, VTK and
+  .h5 files, of bodies that are scaled, turned, moved, copied and refined; and the rule of Bayer et
+  al., on a block, whose Laplace problems have linear solutions.
 */
 #include <sbmeshio.h>
 #include "../verify/verify.h"
@@ -19,6 +19,12 @@ static void direction(const PetscReal x[3], int what, PetscReal v[3])
   v[0] = 1. + x[1] + what;
   v[1] = x[0] - 0.4 * what;
   v[2] = 0.3 - x[2];
+}
+
+/* Likewise its temperature, K. */
+static PetscReal heat(const PetscReal x[3])
+{
+  return 5. + x[0] - 2. * x[1] + 3. * x[2];
 }
 
 /* Centre of a tet of the file, before the body is placed. */
@@ -67,6 +73,14 @@ static PetscErrorCode write_gmsh(char path[512], PetscBool lacks)
       }
       fprintf(f, "$EndElementData\n");
     }
+    fprintf(f, "$ElementData\n1\n\"heat\"\n1\n0.0\n3\n0\n1\n%d\n", TETS);
+    for (PetscInt t = 0; t < TETS; t++) {
+      PetscReal x[3];
+
+      centre(n3, t, x);
+      fprintf(f, "%d %.17g\n", (int)t + 1, heat(x));
+    }
+    fprintf(f, "$EndElementData\n");
   }
   PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,6 +119,13 @@ static PetscErrorCode write_vtk(char path[512])
         direction(x, what, v);
         fprintf(f, "%.17g %.17g %.17g\n", v[0], v[1], v[2]);
       }
+    }
+    fprintf(f, "SCALARS heat double 1\nLOOKUP_TABLE default\n");
+    for (PetscInt t = 0; t < TETS; t++) {
+      PetscReal x[3];
+
+      centre(n3, t, x);
+      fprintf(f, "%.17g\n", heat(x));
     }
   }
   PetscCall(test_file_close(f));
@@ -172,7 +193,14 @@ static PetscErrorCode write_vtu(int npiece, char path[512])
         fprintf(f, "%.17g\n", value[k]);
       fprintf(f, "</DataArray>\n");
     }
-    fprintf(f, "</CellData></Piece>\n");
+    fprintf(f, "<DataArray type=\"Float64\" Name=\"heat\" format=\"ascii\">\n");
+    for (PetscInt t = first; t < first + n; t++) {
+      PetscReal x[3];
+
+      centre(n3, t, x);
+      fprintf(f, "%.17g\n", heat(x));
+    }
+    fprintf(f, "</DataArray></CellData></Piece>\n");
   }
   if (f)
     fprintf(f, "</UnstructuredGrid></VTKFile>\n");
@@ -210,6 +238,22 @@ static PetscErrorCode write_h5(const char *msh, char path[512])
       (void)H5Dclose(set);
       (void)H5Sclose(space);
     }
+    const hsize_t size = TETS;
+    const hid_t space = H5Screate_simple(1, &size, NULL);
+    const hid_t set = H5Dcreate2(file, "/mesh/heat", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT,
+                                 H5P_DEFAULT, H5P_DEFAULT);
+    PetscReal value[TETS];
+
+    for (PetscInt t = 0; t < TETS; t++) {
+      PetscReal x[3];
+
+      centre(n3, t, x);
+      value[t] = heat(x);
+    }
+    SB_CHECK(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, value) >= 0,
+             "an array is not written");
+    (void)H5Dclose(set);
+    (void)H5Sclose(space);
     (void)H5Fclose(file);
     PetscCall(SbImportDestroy(&im));
   }
@@ -222,19 +266,21 @@ static PetscErrorCode write_h5(const char *msh, char path[512])
   "-body_a_a_s 1e2 -body_a_b_s 1 -body_a_bulk 1e5 -body_a_density 1000 -time newmark -ts_dt 1e-3 " \
   "-ts_max_time 1e-3 "
 
-/* Largest difference of the axes from those of the file, for a body that is scaled by 0.1 and
-   turned by 90 degrees about z, all copies alike. */
+/* Largest difference of the axes and temperatures from those of the file, for a body that is scaled
+   by 0.1 and turned by 90 degrees about z, all copies alike. */
 static PetscErrorCode check_file(const char *path, const char *more)
 {
   TestScene t;
   PetscReal worst = 0.;
+  PetscReal hottest = 0.;
   PetscReal *value[2];
 
   PetscFunctionBeginUser;
   PetscCall(test_open(&t,
                       "-bodies a -body_a_mesh %s -body_a_scale 0.1 -body_a_rotate 0,0,1,90 "
                       "-body_a_translate 1,2,3 -body_a_fibre_field fibre -body_a_sheet_field sheet "
-                      "%s %s",
+                      "-body_a_thermal_expansion 1e-5 -body_a_temperature 2 "
+                      "-body_a_temperature_field heat %s %s",
                       path, LAW, more));
   const SbMesh mesh = t.model->mesh;
   for (int i = 0; i < 2; i++) {
@@ -252,6 +298,7 @@ static PetscErrorCode check_file(const char *path, const char *more)
     for (int k = 0; k < 3; k++)
       x[k] = (x[k] - body->translate[k]) / 0.1;
     const PetscReal X[3] = {x[1], -x[0], x[2]};
+    hottest = PetscMax(hottest, PetscAbsReal(mesh->temperature[c] - heat(X)));
     for (int i = 0; i < 2; i++) {
       PetscReal a[3];
 
@@ -271,6 +318,7 @@ static PetscErrorCode check_file(const char *path, const char *more)
     }
   }
   SB_CHECK(worst < 1e-12, "%s %s: axes off by %g", path, more, worst);
+  SB_CHECK(hottest < 1e-12, "%s %s: temperatures off by %g K", path, more, hottest);
   for (int i = 0; i < 2; i++)
     PetscCall(PetscFree(value[i]));
   PetscCall(test_scene_close(&t));
@@ -290,6 +338,13 @@ static PetscErrorCode test_files(void)
   SB_CHECK_ERROR(test_open(&t, "-bodies a -body_a_mesh %s -body_a_fibre_field fiber %s", path,
                            LAW "-body_a_sheet 0,1,0"),
                  PETSC_ERR_USER_INPUT, "-body_a_fibre_field|fiber");
+  PetscCall(test_scene_close(&t));
+  SB_CHECK_ERROR(test_open(&t,
+                           "-bodies a -body_a_mesh %s -body_a_thermal_expansion 1e-5 "
+                           "-body_a_temperature 1 -body_a_temperature_field fibre "
+                           "-body_a_fibre 1,0,0 %s",
+                           path, LAW "-body_a_sheet 0,1,0"),
+                 PETSC_ERR_USER_INPUT, "-body_a_temperature_field|fibre|one number");
   PetscCall(test_scene_close(&t));
   PetscCall(write_gmsh(bad, PETSC_TRUE));
   SB_CHECK_ERROR(test_open(&t, "-bodies a -body_a_mesh %s -body_a_fibre_field fibre %s", bad,

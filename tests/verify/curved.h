@@ -90,6 +90,65 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same of a box of n[3] cells, x in the unit cube, with curved tets. */
+static inline PetscErrorCode curved_box_write(const PetscInt n[3], CurvedMap map, char path[512])
+{
+  static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}}; /* gmsh's order */
+  const PetscInt half[3] = {2 * n[0], 2 * n[1], 2 * n[2]};
+  PetscInt at[3], c[3];
+  PetscInt number = 0;
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_open(".msh", path, &f));
+  if (f) {
+    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n",
+            (int)((half[0] + 1) * (half[1] + 1) * (half[2] + 1)));
+    for (at[2] = 0; at[2] <= half[2]; at[2]++) {
+      for (at[1] = 0; at[1] <= half[1]; at[1]++) {
+        for (at[0] = 0; at[0] <= half[0]; at[0]++) {
+          PetscReal x[3];
+
+          for (int k = 0; k < 3; k++)
+            x[k] = (PetscReal)at[k] / (PetscReal)half[k];
+          map(x);
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(half, at) + 1, x[0], x[1], x[2]);
+        }
+      }
+    }
+    fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(6 * n[0] * n[1] * n[2]));
+    for (c[2] = 0; c[2] < n[2]; c[2]++) {
+      for (c[1] = 0; c[1] < n[1]; c[1]++) {
+        for (c[0] = 0; c[0] < n[0]; c[0]++) {
+          for (int w = 0; w < 6; w++) {
+            PetscInt v[4], place[4][3];
+
+            verify_tet(n, c, w, v);
+            fprintf(f, "%d 11 2 0 1", (int)++number);
+            for (int a = 0; a < 4; a++) {
+              place[a][0] = 2 * (v[a] % (n[0] + 1));
+              place[a][1] = 2 * (v[a] / (n[0] + 1) % (n[1] + 1));
+              place[a][2] = 2 * (v[a] / ((n[0] + 1) * (n[1] + 1)));
+              fprintf(f, " %d", (int)verify_vertex(half, place[a]) + 1);
+            }
+            for (int e = 0; e < 6; e++) {
+              PetscInt middle[3];
+
+              for (int k = 0; k < 3; k++)
+                middle[k] = (place[edge[e][0]][k] + place[edge[e][1]][k]) / 2;
+              fprintf(f, " %d", (int)verify_vertex(half, middle) + 1);
+            }
+            fprintf(f, "\n");
+          }
+        }
+      }
+    }
+    fprintf(f, "$EndElements\n");
+  }
+  PetscCall(test_file_close(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Map without any straight edge. */
 static inline void curved_wobble(PetscReal x[3])
 {

@@ -195,6 +195,13 @@ int main(int argc, char **argv)
               "-body_block_active_length gaussian -effects gravity,hold -effect_hold_type fixed "
               "-effect_hold_on bar.xmin -time genalpha -ts_dt 0.01 -ts_max_time 0.2 -snes_rtol "
               "1e-9 -solver direct"));
+  PetscCall(check("growth", 1e-8,
+                  TWO "-body_bar_material neohookean -body_bar_fibre 1;z;0 -body_bar_growth_fibre "
+                      "0.2*(1+x)*sin(8*t)^2 -body_bar_growth 0.1*z -body_bar_element p2 "
+                      "-body_block_material stvk -body_block_thermal_expansion 1e-4 "
+                      "-body_block_temperature 300*sin(20*t)*x -effects gravity,hold "
+                      "-effect_hold_type fixed -effect_hold_on bar.xmin -time genalpha -ts_dt 0.01 "
+                      "-ts_max_time 0.2 -snes_rtol 1e-9 -solver direct"));
   PetscCall(
     check("explicit, consistent mass", 1e-10,
           TWO CLAMP
