@@ -210,18 +210,12 @@ void SbMullinsSoften(struct _p_SbMaterial *m, const struct _p_SbMaterial *law,
 /* Laws and other options that softening does not go with. */
 static PetscErrorCode check(const SbMaterial m, const SbScope *scope, const char *option)
 {
-  char laws[SB_MATERIAL_TYPES * SB_NAME_MAX] = "";
-  const char *names[SB_MATERIAL_TYPES];
-  const PetscInt n = SbMaterialTypes(names);
-
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++)
-    if (SbMaterialFind(names[i])->share == SPLIT)
-      SbAppend(sizeof(laws), laws, "%s%s", laws[0] ? ", " : "", names[i]);
   PetscCheck(m->type->share == SPLIT, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s: the law %s does not split the energy of the shape, which softens, from that of "
-             "the volume; -%s_%s_material takes %s with it",
-             option, m->type->name, scope->klass, scope->instance, laws);
+             "the volume; take one that does for -%s_%s_material (docs/reference/materials.md, "
+             "softening), or leave %s out",
+             option, m->type->name, scope->klass, scope->instance, option);
   PetscCheck(!m->viscous, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s: a viscoelastic material does not soften, as which of its stresses would is not "
              "known; leave prony_times and viscosity out, or mullins_r",
@@ -238,7 +232,6 @@ PetscErrorCode SbMullinsRead(SbMaterial m, const SbScope *scope)
   static const char *const keys[2] = {"mullins_m", "mullins_beta"};
   struct _p_SbMullins a = {0};
   char option[3 * SB_NAME_MAX], of[2][3 * SB_NAME_MAX];
-  PetscBool given[2];
   SbMullins own;
 
   PetscFunctionBeginUser;
@@ -248,8 +241,7 @@ PetscErrorCode SbMullinsRead(SbMaterial m, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "mullins_beta", &a.beta));
   for (int k = 0; k < 2; k++) {
     SbOptionName(scope, keys[k], sizeof(of[k]), of[k]);
-    PetscCall(SbOptionGiven(scope, keys[k], &given[k]));
-    PetscCheck(!given[k] || a.r != 0., PETSC_COMM_SELF, PETSC_ERR_USER,
+    PetscCheck((k ? a.beta : a.m) == 0. || a.r != 0., PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s is a constant of softening, which %s above 1 begins: give that, or leave %s out",
                of[k], option, of[k]);
   }

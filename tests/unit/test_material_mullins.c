@@ -200,7 +200,7 @@ static PetscErrorCode test_options(void)
      "-body_sample_fibre 1,0,0",
      "-body_sample_mullins_r|-body_sample_active_strain"},
     {"neohookean", "-body_sample_mullins_r 2 -body_sample_mullins_m 1",
-     "-body_sample_mullins_r|neohookean|-body_sample_material|yeoh"},
+     "-body_sample_mullins_r|neohookean|-body_sample_material"},
     {"stable_neohookean", "-body_sample_mullins_r 2 -body_sample_mullins_m 1",
      "-body_sample_mullins_r|stable_neohookean"},
     {"linear", "-body_sample_mullins_r 2 -body_sample_mullins_m 1",
