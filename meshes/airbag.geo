@@ -2,7 +2,7 @@
 //
 //   gmsh -3 -format msh41 -o meshes/airbag.msh meshes/airbag.geo
 //
-// Physical groups: volume `cushion`; surfaces `chamber`, the wall of the chamber, `bottom` (z = 0) and `skin`, the rest of the outside.
+// Physical groups: volume `cushion`; surfaces `chamber`, the wall of the chamber, `bottom` (z = 0) and `outside`, the rest of the outside.
 SetFactory("OpenCASCADE");
 DefineConstant[ size = {0.02, Name "Edge length, m"} ];
 
@@ -13,12 +13,12 @@ BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
 e = 1e-6;
 bottom() = Surface In BoundingBox {-e, -e, -e, 0.12 + e, 0.12 + e, e};
 chamber() = Surface In BoundingBox {0.01 - e, 0.01 - e, 0.01 - e, 0.11 + e, 0.11 + e, 0.05 + e};
-skin() = Surface In BoundingBox {-1, -1, -1, 1, 1, 1};
-skin() -= bottom();
-skin() -= chamber();
+outside() = Surface In BoundingBox {-1, -1, -1, 1, 1, 1};
+outside() -= bottom();
+outside() -= chamber();
 Physical Volume("cushion") = {3};
 Physical Surface("bottom") = {bottom()};
 Physical Surface("chamber") = {chamber()};
-Physical Surface("skin") = {skin()};
+Physical Surface("outside") = {outside()};
 Mesh.CharacteristicLengthMin = size;
 Mesh.CharacteristicLengthMax = size;

@@ -646,7 +646,7 @@ PetscErrorCode SbPressureVolume(SbEffect e, PetscReal t, PetscReal pressure[])
   PetscReal p;
 
   PetscFunctionBeginUser;
-  PetscCall((*load->at)(e, NULL, &stage, &p));
+  PetscCall((*load->at)(e, load->surface->space, &stage, &p));
   for (PetscInt b = 0; b < load->surface->space->mesh->nbody; b++)
     pressure[b] += p * load->share[b];
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -13,8 +13,7 @@ typedef struct {
 
 /* First in the data of an effect that has one. */
 typedef struct {
-  /* the pressure at a stage, Pa; collective. space NULL: without displacements, that at the time or
-     of the last stage */
+  /* the pressure at a stage, Pa; collective */
   PetscErrorCode (*at)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal *p);
   PetscBool follower;
   PetscInt nfacet, nedge;

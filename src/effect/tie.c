@@ -22,8 +22,11 @@
   FACTOR E / h, E Young's modulus of the softer body, h the longest side of A's facet: the tie
   yields as a layer of the body of h / FACTOR does.
 
+  A facet of B may lie inside of A's body by a part of the cells behind both: else the far side of a
+  sheet would be tied through it.
+
   With a strength patches part for good at the end of a step in which their mean traction is above
-  it.
+  it. The state of that step still has their forces.
 
   Every rank has the facets of both surfaces at set-up, and keeps the patches with a node of its
   own.
@@ -33,6 +36,7 @@
 
 #define FACTOR 100.   /* stiffness of the tie over that of a cell: see docs/reference/effects.md */
 #define NEAR 0.1      /* of a facet's longest side: how far the other surface may be, by default */
+#define INSIDE 0.25   /* of the lower cell: how far the surfaces may overlap at rest */
 #define FACING -0.5   /* cosine of two outward normals, at most: facets that look at each other */
 #define SLIVER 1e-12  /* of a facet's area: smaller patches are rounding */
 #define ROUNDING 1e-9 /* basis functions below it are those of nodes off the facet */
@@ -44,6 +48,7 @@ typedef struct {
   PetscReal x[3][3];      /* its corners, counter-clockwise seen from outside, m */
   PetscReal normal[3];    /* outward unit vector */
   PetscReal area, size;   /* m^2; longest side, m */
+  PetscReal height;       /* of the cell over it, m */
   PetscReal corner[4][3]; /* those of the cell, m */
   PetscReal off[18];      /* curved: its edges off their middles, m */
   PetscReal basis[4][4];  /* without nodes at edges: weights of the nodes in the corners */
@@ -52,6 +57,7 @@ typedef struct {
   PetscInt gnode[SB_CELL_NODES];
   PetscInt number; /* 4 cell_orig + face */
   PetscBool curved;
+  PetscBool both; /* the other surface has it, too */
 } Side;
 
 typedef struct {
@@ -67,12 +73,15 @@ typedef struct {
   SbEffectOn to;
   PetscReal stiffness, distance, strength; /* Pa/m, m, Pa; 0: by default, none */
   PetscInt n, size;
-  Patch *patch;      /* [n] */
-  PetscReal *work;   /* [9 most^2] of the tangent */
-  PetscReal area[3]; /* of both surfaces, and held, m^2 */
-  PetscReal missed,
-    farthest; /* what faces the other surface beyond `distance`: area, m^2, and how far, m */
+  Patch *patch;    /* [n] */
+  PetscReal *work; /* [9 most^2] of the tangent */
 } Tie;
+
+/* What a search found. */
+typedef struct {
+  PetscReal held, missed; /* areas that are tied, and that face the other surface beyond, m^2 */
+  PetscReal farthest;     /* how far these are, m */
+} Found;
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
@@ -82,7 +91,8 @@ static const SbOption rows[] = {
    "stress over the distance by which the surfaces part; 0: a hundred times that of a cell of the "
    "softer body, E / h"},
   {"distance", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "largest gap or overlap at rest of what is tied; 0: a tenth of a facet's longest side"},
+   "largest gap at rest of what is tied, and overlap, up to a quarter of the cells; 0: a tenth of "
+   "a facet's longest side"},
   {"strength", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
    "traction above which places part for good at the end of a step; 0: never"},
 };
@@ -115,7 +125,9 @@ static void set_side(SbSpace space, const SbFacet *facet, Side *side)
   const PetscInt cell = facet->cell;
   const SbElement element = SbSpaceCellElement(space, cell);
 
-  *side = (Side){.area = facet->area, .number = 4 * mesh->cell_orig[cell] + facet->face};
+  *side = (Side){.area = facet->area,
+                 .height = facet->height,
+                 .number = 4 * mesh->cell_orig[cell] + facet->face};
   for (int c = 0; c < 3; c++)
     for (int k = 0; k < 3; k++)
       side->x[c][k] = mesh->x[3 * facet->vertex[c] + k];
@@ -139,9 +151,8 @@ static void set_side(SbSpace space, const SbFacet *facet, Side *side)
     side->gnode[a] = space->gnode[SbSpaceCellNode(space, cell, a)];
 }
 
-/* The facets of a surface on all ranks, and their area. */
-static PetscErrorCode gather(SbSpace space, const SbEffectOn *on, PetscInt *n, Side **side,
-                             PetscReal *area)
+/* The facets of a surface on all ranks. */
+static PetscErrorCode gather(SbSpace space, const SbEffectOn *on, PetscInt *n, Side **side)
 {
   SbFacet *facets;
   Side *mine;
@@ -161,9 +172,28 @@ static PetscErrorCode gather(SbSpace space, const SbEffectOn *on, PetscInt *n, S
   PetscCall(SbAllgatherv(space->comm, type, nmine, mine, n, side, NULL));
   PetscCallMPI(MPI_Type_free(&type));
   PetscCall(PetscFree(mine));
-  *area = 0;
-  for (PetscInt i = 0; i < *n; i++)
-    *area += (*side)[i].area;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks the facets that both surfaces have. */
+static PetscErrorCode mark_both(PetscInt na, Side a[], PetscInt nb, Side b[])
+{
+  SbKey *key;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(nb, &key));
+  for (PetscInt j = 0; j < nb; j++)
+    key[j] = (SbKey){(uint64_t)b[j].number, j};
+  SbKeysSort(nb, key);
+  for (PetscInt i = 0; i < na; i++) {
+    const PetscInt at = SbKeysFind(nb, key, (uint64_t)a[i].number);
+
+    if (at < 0)
+      continue;
+    a[i].both = PETSC_TRUE;
+    b[key[at].slot].both = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(key));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -268,12 +298,12 @@ static void sum_patch(const Side *a, const Side *b, PetscReal distance, PetscRea
 
       for (int i = 0; i < 3; i++)
         x[i] -= gap * a->normal[i];
+      if (gap < -INSIDE * PetscMin(a->height, b->height) || gap > BESIDE * distance)
+        continue;
       if (PetscAbsReal(gap) <= distance) {
         add_point(a, b, x, area * SbRuleFacet.weight[q], k, sum);
         continue;
       }
-      if (PetscAbsReal(gap) > BESIDE * distance)
-        continue;
       sum->missed += area * SbRuleFacet.weight[q];
       sum->farthest = PetscMax(sum->farthest, PetscAbsReal(gap));
     }
@@ -354,9 +384,9 @@ static PetscReal distance_between(PetscInt n, const Side a[], const SbBoxTree *t
   return PetscSqrtReal(least);
 }
 
-/* All patches of two surfaces. */
+/* All patches of two surfaces; a pair of facets that both of them have is one patch. */
 static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const Side a[],
-                                   const SbBoxTree *tree, const Side b[])
+                                   const SbBoxTree *tree, const Side b[], Found *found)
 {
   Tie *tie = (Tie *)e->data;
 
@@ -375,24 +405,51 @@ static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const
       PetscReal k;
       Sum sum;
 
-      if (a[i].number == b[j].number || SbDot3(a[i].normal, b[j].normal) > FACING)
+      if (SbDot3(a[i].normal, b[j].normal) > FACING)
+        continue;
+      if (a[i].both && b[j].both && a[i].number >= b[j].number)
         continue;
       PetscCall(stiffness_between(e, &a[i], &b[j], &k));
       sum_patch(&a[i], &b[j], distance, k, &sum);
-      tie->missed += sum.missed;
-      tie->farthest = PetscMax(tie->farthest, sum.farthest);
+      found->missed += sum.missed;
+      found->farthest = PetscMax(found->farthest, sum.farthest);
       if (sum.area <= SLIVER * a[i].area)
         continue;
-      tie->area[2] += sum.area;
+      found->held += sum.area;
       PetscCall(keep(space, tie, &a[i], &b[j], &sum));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An error if nothing is tied, a warning if more could be, and the note of the set-up. */
+static PetscErrorCode report(SbEffect e, SbSpace space, PetscInt na, const Side a[],
+                             const SbBoxTree *tree, const Side b[], const Found *found)
+{
+  const Tie *tie = (const Tie *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCheck(found->held > 0, space->comm, PETSC_ERR_USER_INPUT,
+             "%s: nothing of these surfaces lies on those of %s: the nearest place is %.4g m away, "
+             "and -effect_%s_distance allows %.4g m; they must also face each other, seen along "
+             "their normals, and overlap by less than a quarter of a cell",
+             e->on.option, tie->to.option, (double)distance_between(na, a, tree, b), e->name,
+             (double)(tie->distance > 0 ? tie->distance : NEAR * a[0].size));
+  if (found->missed > MISSED * found->held)
+    PetscCall(
+      SbWarning(space->comm,
+                "%s: %.3g m^2 are held; %.3g m^2 more face %s at up to %.3g m, and are free: "
+                "set -effect_%s_distance to hold them",
+                e->on.option, (double)found->held, (double)found->missed, tie->to.option,
+                (double)found->farthest, e->name));
+  SbFormat(sizeof(e->note), e->note, "%.6g m^2 held", (double)found->held);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
 {
   Tie *tie = (Tie *)e->data;
+  Found found = {0};
   PetscReal(*box)[6];
   PetscInt na, nb;
   PetscInt most = 0;
@@ -400,8 +457,11 @@ static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
   Side *a, *b;
 
   PetscFunctionBeginUser;
-  PetscCall(gather(space, &e->on, &na, &a, &tie->area[0]));
-  PetscCall(gather(space, &tie->to, &nb, &b, &tie->area[1]));
+  PetscCall(gather(space, &e->on, &na, &a));
+  PetscCall(gather(space, &tie->to, &nb, &b));
+  PetscCall(mark_both(na, a, nb, b));
+
+  /* the patches, by a tree over the facets of B */
   PetscCall(PetscMalloc1(nb, &box));
   for (PetscInt j = 0; j < nb; j++) {
     SbBoxClear(box[j]);
@@ -409,26 +469,8 @@ static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
       SbBoxAdd(box[j], b[j].x[c]);
   }
   PetscCall(SbBoxTreeCreate(nb, (const PetscReal(*)[6])box, &tree));
-  PetscCall(find_patches(e, space, na, a, &tree, b));
-  if (tie->area[2] == 0) {
-    const PetscReal apart = distance_between(na, a, &tree, b);
-    const PetscReal allowed = tie->distance > 0 ? tie->distance : NEAR * a[0].size;
-
-    SETERRQ(space->comm, PETSC_ERR_USER_INPUT,
-            "%s: nothing of these surfaces lies on those of %s: the nearest place is %.4g m away, "
-            "and -effect_%s_distance allows %.4g m; they must also face each other, seen along "
-            "their normals",
-            e->on.option, tie->to.option, (double)apart, e->name, (double)allowed);
-  }
-  if (tie->missed > MISSED * tie->area[2])
-    PetscCall(
-      SbWarning(space->comm,
-                "%s: %.3g m^2 are held; %.3g m^2 more face %s at up to %.3g m, and are free: "
-                "set -effect_%s_distance to hold them",
-                e->on.option, (double)tie->area[2], (double)tie->missed, tie->to.option,
-                (double)tie->farthest, e->name));
-  SbFormat(sizeof(e->note), e->note, "%.6g m^2 held, of %.6g and %.6g m^2", (double)tie->area[2],
-           (double)tie->area[0], (double)tie->area[1]);
+  PetscCall(find_patches(e, space, na, a, &tree, b, &found));
+  PetscCall(report(e, space, na, a, &tree, b, &found));
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree(box));
   PetscCall(PetscFree(a));
@@ -496,10 +538,11 @@ static PetscErrorCode tangent_tie(SbEffect e, SbSpace space, const SbStage *stag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With a strength: what is torn parts. */
+/* With a strength: what is torn parts. A static run has no step after the last one. */
 static PetscErrorCode accept_tie(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Tie *tie = (Tie *)e->data;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   if (!SbEffectActs(e, stage->t))
@@ -508,9 +551,21 @@ static PetscErrorCode accept_tie(SbEffect e, SbSpace space, const SbStage *stage
     PetscReal f[3];
 
     force_on(space, patch, stage->u, f);
-    if (PetscSqrtReal(SbDot3(f, f)) > tie->strength * patch->area)
-      patch->parted = PETSC_TRUE;
+    if (patch->parted || PetscSqrtReal(SbDot3(f, f)) <= tie->strength * patch->area)
+      continue;
+    n += counts(space, patch);
+    patch->parted = PETSC_TRUE;
   }
+  if (e->dynamic || stage->t < 1)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, space->comm));
+  if (n)
+    PetscCall(SbWarning(space->comm,
+                        "effect %s: %" PetscInt_FMT
+                        " places of the tie part in the last load step, whose state still has "
+                        "their forces: it is no equilibrium without them; take more load steps "
+                        "(-static_steps), a load that the rest bears, or time steps",
+                        e->name, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,7 +3,7 @@
   cube, mean stresses, the tangent beside a state.
 */
 #pragma once
-#include "verify.h"
+#include "derivatives.h"
 
 /* The displacement of the corner at (1, 1, 1) m at the end of a run, m. */
 static inline PetscErrorCode strained_corner(PetscReal u[3], const char *format, ...)
@@ -77,49 +77,17 @@ static inline void strained_ripple(const PetscReal x[3], PetscReal v[3])
    force. */
 static inline PetscErrorCode strained_tangent(TestScene *t)
 {
-  PetscReal error[2], psi[2], slope, size, force;
-  PetscInt n;
-  Vec X, D, R, R0, AD;
+  Vec X, D;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(t->run->state.U, &X));
   PetscCall(VecDuplicate(X, &D));
-  PetscCall(VecDuplicate(X, &R));
-  PetscCall(VecDuplicate(X, &R0));
-  PetscCall(VecDuplicate(X, &AD));
   PetscCall(test_fill(t->model, strained_ripple, D));
   PetscCall(SbSpaceZeroPrescribed(t->model->space, PETSC_TRUE, D));
   PetscCall(VecWAXPY(X, 0.02, D, t->run->state.U));
   PetscCall(SbSpaceLineariseStress(t->model->space, NULL, NULL, 1.));
-  PetscCall(SbModelTangent(t->model, 1., 0., 0., 1., X, NULL, t->run->solve.J));
-  PetscCall(MatMult(t->run->solve.J, D, AD));
-  PetscCall(SbModelResidual(t->model, 1., X, NULL, NULL, PETSC_TRUE, R0));
-  for (int k = 0; k < 2; k++) {
-    const PetscReal h = k ? 1e-4 : 1e-3;
-
-    PetscCall(VecAXPY(X, h, D));
-    PetscCall(SbModelResidual(t->model, 1., X, NULL, NULL, PETSC_TRUE, R));
-    PetscCall(VecAXPY(X, -h, D));
-    PetscCall(VecAXPY(R, -1., R0));
-    PetscCall(VecNorm(R, NORM_2, &size));
-    PetscCall(VecAXPY(R, -h, AD));
-    PetscCall(VecNorm(R, NORM_2, &error[k]));
-    error[k] /= size;
-  }
-  VERIFY_NEAR(PetscLog10Real(error[0] / error[1]), 1., 0.1, "order of the remainder, less one");
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecAXPY(X, k ? 2e-6 : -1e-6, D));
-    PetscCall(SbModelStrainEnergy(t->model, X, NULL, &psi[k], &n));
-  }
-  PetscCall(VecAXPY(X, -1e-6, D));
-  PetscCall(SbModelStrainEnergy(t->model, X, R, &slope, &n));
-  PetscCall(VecDot(R, D, &force));
-  VERIFY_NEAR((psi[1] - psi[0]) / 2e-6 / force, 1., 1e-5,
-              "derivative of the energy over the force");
+  PetscCall(verify_derivatives(t, 1., 1e-3, X, D));
   PetscCall(VecDestroy(&X));
   PetscCall(VecDestroy(&D));
-  PetscCall(VecDestroy(&R));
-  PetscCall(VecDestroy(&R0));
-  PetscCall(VecDestroy(&AD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

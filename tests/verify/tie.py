@@ -2,7 +2,8 @@
 
 Two blocks, one on the other, with meshes that do not match, are stretched: the stress is even to rounding with every pair of elements, on 1 and 3
 ranks. Two tied bodies with a gap between them turn in space, and keep energy and momenta. A cantilever of two halves bends as one of a piece. A
-soft block hangs from a rigid plate by its weight. Glue that is too weak parts, a run that goes on from a checkpoint is the same run, and a tie lets
+soft block hangs from a rigid plate by its weight. Half and twice the stiffness that a tie has by itself change little. Thin sheets are tied where
+they touch, not at their far sides, and a pair of facets that both surfaces have counts once. Glue that is too weak parts, a run that goes on from a checkpoint is the same run, and a tie lets
 go at a given time. Surfaces that are apart, face away, or that nothing can be said of are an error.
 """
 import numpy
@@ -72,6 +73,22 @@ near(last("halves")["newton"], 1, 1, "glued halves: iterations")
 run("halves", HALVES + GLUE + "-effect_glue_stiffness 1", 2)
 near(last("halves")["strain"] / whole, 4, 0.5, "loose halves: strain energy, over that of one piece")
 
+# the same mesh in two halves: what half and twice the stiffness of 100 E / h add to the energy and to linear iterations; h = 35.4 mm
+CELLS = "-body_a_element p1 -body_b_element p1 -body_a_mesh box:0.4,0.1,0.05:16,4,2 -body_b_mesh box:0.4,0.1,0.05:16,4,2 "
+run("whole", "-bodies a " + body("a", "0.4,0.1,0.1:16,4,4") + CANTILEVER.format("a", ""))
+whole = last("whole")["strain"]
+for factor, more in ((50, 5e-6), (100, 2e-6), (200, 1e-6)):
+    run("halves", HALVES + CELLS + GLUE + f"-solver cg_two_level -effect_glue_stiffness {factor * 1e6 / (0.025 * 2**0.5):.17g}")
+    near(last("halves")["strain"] / whole - 1, more / 2, more / 2, f"halves, {factor} E / h, {last('halves')['linear']:g} linear iterations: energy, over that of one piece, less 1")
+
+# sheets that are thinner than a tenth of their cells: the upper one is tied to the lower one by the sides that touch
+SHEETS = ("-bodies a,b " + body("a", "0.2,0.2,0.002:4,4,1") + body("b", "0.2,0.2,0.002:3,3,1") + "-body_b_translate 0,0,0.002 -sets under,on -set_under_at body:a "
+          "-set_on_at body:b -effects glue -effect_glue_type tie -effect_glue_on on -effect_glue_to under -ts_max_time 0.01 ")
+run("sheets", SHEETS)
+near(last("sheets")["glue_area"], 0.04, 1e-9, "thin sheets: area, m^2")
+run("sheets", SHEETS + "-effect_glue_on on,under -effect_glue_to under,on ")
+near(last("sheets")["glue_area"], 0.04, 1e-9, "named both ways: area, m^2")
+
 # a soft block of 1 kg hangs from a rigid plate
 run("hang", "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:2 -body_a_rigid yes -body_a_density 1000 -body_a_translate 0,0,0.1 "
     + body("b", "0.1,0.1,0.1:3", law="neohookean", element="p2") + "-sets under,on -set_under_at body:a -set_on_at body:b -effects gravity,hold,glue "
@@ -85,6 +102,10 @@ run("tear", PULL + "-effect_glue_strength 3000", 2)
 tear = history("tear")
 near(tear["glue_force_z"][5], -stress * 0.01 * 5 / 8, 1e-6, "before it parts: force, N")
 near(abs(tear["glue_force_z"][7:]).max() + tear["glue_area"][-1] + tear["strain"][-1], 0, 1e-9, "after it has parted: force, area, strain")
+
+# in one load step nothing is solved after it has parted
+text = run("tear", PULL.replace("-static_steps 8", "-static_steps 1") + "-effect_glue_strength 3000", 2)
+check("warning" in text and "glue" in text and "-static_steps" in text, text)
 
 # it lets go at a given time
 run("let-go", PULL + "-effect_glue_until 0.5")

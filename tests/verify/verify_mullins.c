@@ -8,7 +8,7 @@
     start     a run that begins with a displacement remembers it
     errors    of integrators whose stable step is not known
 */
-#include "verify.h"
+#include "derivatives.h"
 
 #define BAR                                                                                     \
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:%d -body_bar_material %s -body_bar_density 1000 " \
@@ -49,10 +49,9 @@ static PetscErrorCode factors(SbModel m, Vec U, PetscReal range[2])
 
 static PetscErrorCode check_tangent(const char *law, const char *element, const char *constants)
 {
-  PetscReal error[2], psi[2], range[2], slope, size, force;
-  PetscInt n;
+  PetscReal range[2];
   TestScene t;
-  Vec X, D, R, R0, AD;
+  Vec X, D;
 
   PetscFunctionBeginUser;
   verify_case("tangent, %s, %s", law, element);
@@ -62,9 +61,6 @@ static PetscErrorCode check_tangent(const char *law, const char *element, const 
   SB_CHECK(range[1] == 1., "%s: factors %g to %g on loading", verify_title, range[0], range[1]);
   PetscCall(VecDuplicate(t.run->state.U, &X));
   PetscCall(VecDuplicate(X, &D));
-  PetscCall(VecDuplicate(X, &R));
-  PetscCall(VecDuplicate(X, &R0));
-  PetscCall(VecDuplicate(X, &AD));
   PetscCall(test_fill(t.model, ripple, D));
   PetscCall(SbSpaceZeroPrescribed(t.model->space, PETSC_TRUE, D));
 
@@ -74,36 +70,9 @@ static PetscErrorCode check_tangent(const char *law, const char *element, const 
   PetscCall(VecAXPY(X, 0.002, D));
   PetscCall(factors(t.model, X, range));
   VERIFY_LESS(range[0], 0.8, "least factor on unloading");
-  PetscCall(SbModelTangent(t.model, 1., 0., 0., 1., X, NULL, t.run->solve.J));
-  PetscCall(MatMult(t.run->solve.J, D, AD));
-  PetscCall(SbModelResidual(t.model, 1., X, NULL, NULL, PETSC_TRUE, R0));
-  for (int k = 0; k < 2; k++) {
-    const PetscReal h = k ? 1e-5 : 1e-4;
-
-    PetscCall(VecAXPY(X, h, D));
-    PetscCall(SbModelResidual(t.model, 1., X, NULL, NULL, PETSC_TRUE, R));
-    PetscCall(VecAXPY(X, -h, D));
-    PetscCall(VecAXPY(R, -1., R0));
-    PetscCall(VecNorm(R, NORM_2, &size));
-    PetscCall(VecAXPY(R, -h, AD));
-    PetscCall(VecNorm(R, NORM_2, &error[k]));
-    error[k] /= size;
-  }
-  VERIFY_NEAR(PetscLog10Real(error[0] / error[1]), 1., 0.1, "order of the remainder, less one");
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecAXPY(X, k ? 2e-6 : -1e-6, D));
-    PetscCall(SbModelStrainEnergy(t.model, X, NULL, &psi[k], &n));
-  }
-  PetscCall(VecAXPY(X, -1e-6, D));
-  PetscCall(SbModelStrainEnergy(t.model, X, R, &slope, &n));
-  PetscCall(VecDot(R, D, &force));
-  VERIFY_NEAR((psi[1] - psi[0]) / 2e-6 / force, 1., 1e-5,
-              "derivative of the energy over the force");
+  PetscCall(verify_derivatives(&t, 1., 1e-4, X, D));
   PetscCall(VecDestroy(&X));
   PetscCall(VecDestroy(&D));
-  PetscCall(VecDestroy(&R));
-  PetscCall(VecDestroy(&R0));
-  PetscCall(VecDestroy(&AD));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,7 +19,7 @@
     errors      of constants, and of what cannot keep a history
 */
 #include <unistd.h>
-#include "verify.h"
+#include "derivatives.h"
 
 #define E 3e5
 #define NU 0.3
@@ -325,10 +325,8 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
    change; the energy's derivative is the force. */
 static PetscErrorCode check_tangent(const char *law, const char *element, const char *constants)
 {
-  PetscReal error[2], psi[2], slope, size, force;
-  PetscInt n;
   TestScene t;
-  Vec X, D, R, R0, AD;
+  Vec X, D;
 
   PetscFunctionBeginUser;
   verify_case("tangent, %s, %s, %s", law, element, constants);
@@ -343,44 +341,14 @@ static PetscErrorCode check_tangent(const char *law, const char *element, const 
   PetscCall(SbSpaceViscousAt(t.model->space, 0.01, PETSC_TRUE, t.run->state.U, t.run->state.V));
   PetscCall(VecDuplicate(t.run->state.U, &X));
   PetscCall(VecDuplicate(X, &D));
-  PetscCall(VecDuplicate(X, &R));
-  PetscCall(VecDuplicate(X, &R0));
-  PetscCall(VecDuplicate(X, &AD));
   PetscCall(test_fill(t.model, ripple, D));
   PetscCall(SbSpaceZeroPrescribed(t.model->space, PETSC_TRUE, D));
 
   /* not at the state itself, where viscosities are at their rate */
   PetscCall(VecWAXPY(X, 0.02, D, t.run->state.U));
-  PetscCall(SbModelTangent(t.model, 0.21, 0., 0., 1., X, NULL, t.run->solve.J));
-  PetscCall(MatMult(t.run->solve.J, D, AD));
-  PetscCall(SbModelResidual(t.model, 0.21, X, NULL, NULL, PETSC_TRUE, R0));
-  for (int k = 0; k < 2; k++) {
-    const PetscReal h = k ? 1e-4 : 1e-3;
-
-    PetscCall(VecAXPY(X, h, D));
-    PetscCall(SbModelResidual(t.model, 0.21, X, NULL, NULL, PETSC_TRUE, R));
-    PetscCall(VecAXPY(X, -h, D));
-    PetscCall(VecAXPY(R, -1., R0));
-    PetscCall(VecNorm(R, NORM_2, &size));
-    PetscCall(VecAXPY(R, -h, AD));
-    PetscCall(VecNorm(R, NORM_2, &error[k]));
-    error[k] /= size;
-  }
-  VERIFY_NEAR(PetscLog10Real(error[0] / error[1]), 1., 0.1, "order of the remainder, less one");
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecAXPY(X, k ? 2e-6 : -1e-6, D));
-    PetscCall(SbModelStrainEnergy(t.model, X, NULL, &psi[k], &n));
-  }
-  PetscCall(VecAXPY(X, -1e-6, D));
-  PetscCall(SbModelStrainEnergy(t.model, X, R, &slope, &n));
-  PetscCall(VecDot(R, D, &force));
-  VERIFY_NEAR((psi[1] - psi[0]) / 2e-6 / force, 1., 1e-5,
-              "derivative of the energy over the force");
+  PetscCall(verify_derivatives(&t, 0.21, 1e-3, X, D));
   PetscCall(VecDestroy(&X));
   PetscCall(VecDestroy(&D));
-  PetscCall(VecDestroy(&R));
-  PetscCall(VecDestroy(&R0));
-  PetscCall(VecDestroy(&AD));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
