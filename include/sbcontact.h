@@ -212,6 +212,8 @@ static inline PetscBool SbEffectHasPotential(SbEffect e)
 PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effect[],
                                   SbContactSet *contacts);
 PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
+/* Whether it is with an obstacle, not of bodies with each other. Not collective. */
+PetscBool SbContactHasObstacle(SbContact contact);
 
 /*
   In the order of a run; collective.

@@ -49,6 +49,10 @@ typedef struct {
   /* * pressure[nbody] += the pressure of a load on the volume of all cells of a body, by
      SbSpaceAddVolume(), Pa, at t */
   PetscErrorCode (*volume_pressure)(SbEffect e, PetscReal t, PetscReal pressure[]);
+  /* of a load step of a static run. stage NULL: it begins, with the history of the last one; else
+     it was solved: what changes there, as a tie that tears; changed: the step is to be solved once
+     more from its end, with that. accept() follows where nothing changes. Collective */
+  PetscErrorCode (*settle)(SbEffect e, SbSpace space, const SbStage *stage, PetscBool *changed);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: history variables as n records of `nstate` numbers each, which identify
@@ -93,6 +97,7 @@ struct _p_SbEffect {
   char type[SB_NAME_MAX];
   SbEffectOps ops;
   SbEffectOn on; /* empty for a type without the option */
+  SbEffectOn to; /* likewise of the option "to": what the sets in `on` are tied to */
   PetscInt nformula;
   SbFormula formula[5]; /* [nformula] of all its options; owned */
   SbFormula time;       /* one of them: factor on a load; NULL for a type without the option */
@@ -165,3 +170,6 @@ PetscErrorCode SbPathRead(SbEffect e, const SbScope *scope, PetscBool position, 
    of the sets. Collective; the caller releases the array with PetscFree(). Errors
    (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set without boundary facets. */
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
+/* shared[nbody]: how many of these facets of each body are in both. Collective; errors as above. */
+PetscErrorCode SbEffectShared(SbSpace space, const SbEffectOn *one, const SbEffectOn *two,
+                              PetscInt shared[]);

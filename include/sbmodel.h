@@ -59,8 +59,10 @@ struct _p_SbModel {
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it; all of them lie in
      `lists` */
-  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, nvolume_pressure, naccept, nhistory;
-  SbEffect *lists, *prescribe, *force, *tangent, *nonsymmetric, *volume_pressure, *accept, *history;
+  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, nvolume_pressure, nsettle, naccept,
+    nhistory;
+  SbEffect *lists, *prescribe, *force, *tangent, *nonsymmetric, *volume_pressure, *settle, *accept,
+    *history;
   SbContactSet contacts; /* those effects that are contacts */
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
@@ -96,6 +98,9 @@ PetscErrorCode SbModelFollowJumps(SbModel model, PetscReal t, Vec U, SbStepsOf s
                                   PetscBool *changed);
 /* The same in a load step that failed at U, with SB_STEPS_FAILED. */
 PetscErrorCode SbModelBearStress(SbModel model, PetscReal t, Vec U, PetscBool *changed);
+/* A load step of a static run begins (U NULL), or was solved with the end U at the load factor t:
+   what effects change there; changed: it is to be solved once more from U. Collective. */
+PetscErrorCode SbModelSettle(SbModel model, PetscReal t, Vec U, PetscBool *changed);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /* Initial displacements and velocities of bodies, with their angular velocity. Collective. */

@@ -38,6 +38,11 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool SbContactHasObstacle(SbContact contact)
+{
+  return (PetscBool)(((const Contact *)contact->effect->data)->partner.obstacle != NULL);
+}
+
 PetscErrorCode SbContactSetDestroy(SbContactSet *contacts)
 {
   PetscFunctionBeginUser;

@@ -15,58 +15,6 @@ typedef struct {
   PetscInt *shared;       /* [nbody] */
 } Pair;
 
-static int by_place(const void *a, const void *b)
-{
-  const PetscInt x = *(const PetscInt *)a;
-  const PetscInt y = *(const PetscInt *)b;
-
-  return (x > y) - (x < y);
-}
-
-/* place[n]: 4 cell + face of the facets of owned cells of an effect, sorted; the caller frees. */
-static PetscErrorCode find_places(SbSpace s, SbEffect e, PetscInt *n, PetscInt **place)
-{
-  SbFacet *facet;
-  PetscInt all;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(s, &e->on, &all, &facet));
-  PetscCall(PetscMalloc1(all, place));
-  *n = 0;
-  for (PetscInt i = 0; i < all; i++)
-    if (facet[i].cell < s->mesh->ncell_owned)
-      (*place)[(*n)++] = 4 * facet[i].cell + facet[i].face;
-  if (*n)
-    qsort(*place, (size_t)*n, sizeof(**place), by_place);
-  PetscCall(PetscFree(facet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* pair->shared of two effects. Collective. */
-static PetscErrorCode find_shared(const Pair *pair)
-{
-  const SbMesh mesh = pair->space->mesh;
-  PetscInt n[2], *place[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(pair->shared, mesh->nbody));
-  for (int k = 0; k < 2; k++)
-    PetscCall(find_places(pair->space, pair->effect[k], &n[k], &place[k]));
-  for (PetscInt i = 0, j = 0; i < n[0] && j < n[1];) {
-    if (place[0][i] == place[1][j])
-      pair->shared[mesh->cell_body[place[0][i] / 4]]++;
-    if (place[0][i] <= place[1][j])
-      i++;
-    else
-      j++;
-  }
-  for (int k = 0; k < 2; k++)
-    PetscCall(PetscFree(place[k]));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, pair->shared, (PetscMPIInt)mesh->nbody, MPIU_INT,
-                             MPI_SUM, pair->space->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 #define SAMPLES 1000              /* times of the run at which paths are compared, */
 #define APART 0.61803398874989485 /* so far from each other, over the run, and modulo its length */
 #define EQUAL 1e-9                /* difference of places that are the same, over their size */
@@ -206,12 +154,13 @@ static PetscErrorCode find_bodies(const SbContactSet *contacts, PetscBool in[])
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < contacts->n; k++) {
-    PetscInt n, *place;
+    SbFacet *facet;
+    PetscInt n;
 
-    PetscCall(find_places(contacts->space, contacts->contact[k]->effect, &n, &place));
+    PetscCall(SbEffectFacets(contacts->space, &contacts->contact[k]->effect->on, &n, &facet));
     for (PetscInt i = 0; i < n; i++)
-      in[k * mesh->nbody + mesh->cell_body[place[i] / 4]] = PETSC_TRUE;
-    PetscCall(PetscFree(place));
+      in[k * mesh->nbody + mesh->cell_body[facet[i].cell]] = PETSC_TRUE;
+    PetscCall(PetscFree(facet));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, in, (PetscMPIInt)(contacts->n * mesh->nbody),
                              SB_MPI_BOOL, MPI_LOR, contacts->space->comm));
@@ -232,10 +181,8 @@ PetscErrorCode SbContactSetCheckRepeated(const SbContactSet *contacts)
   for (PetscInt k = 0; k < contacts->n; k++) {
     for (PetscInt l = k + 1; l < contacts->n; l++) {
       const SbEffect effect[2] = {contacts->contact[k]->effect, contacts->contact[l]->effect};
-      const PetscBool obstacle =
-        (PetscBool)(((Contact *)effect[0]->data)->partner.obstacle != NULL);
-      PetscBool same =
-        (PetscBool)(obstacle == (((Contact *)effect[1]->data)->partner.obstacle != NULL));
+      const PetscBool obstacle = SbContactHasObstacle(contacts->contact[k]);
+      PetscBool same = (PetscBool)(obstacle == SbContactHasObstacle(contacts->contact[l]));
       PetscInt both = 0;
 
       pair.effect = effect;
@@ -245,7 +192,7 @@ PetscErrorCode SbContactSetCheckRepeated(const SbContactSet *contacts)
         PetscCall(same_obstacle(&pair, SbBodySmallest(nbody, contacts->space->mesh->body), &same));
       if (!same || !both)
         continue;
-      PetscCall(find_shared(&pair));
+      PetscCall(SbEffectShared(pair.space, &effect[0]->on, &effect[1]->on, pair.shared));
       PetscCall(obstacle ? check_obstacle(&pair) : check_bodies(&pair));
     }
   }

@@ -20,6 +20,7 @@
   and P2.
 */
 #include "pressure.h"
+#include "sbgeometry.h"
 
 #define WATER 2.2e9 /* Pa, bulk modulus */
 #define STIFFER \
@@ -182,6 +183,128 @@ static PetscErrorCode couplings_cavity(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A facet of the wall, as ranks send it. */
+typedef struct {
+  PetscInt vertex[3]; /* gvert */
+  PetscReal x[3][3];  /* m, counter-clockwise seen from outside of its body */
+} Facet;
+
+/* A closed surface among them. */
+typedef struct {
+  PetscReal volume; /* m^3, negative around a cavity */
+  PetscReal box[6]; /* m */
+} Wall;
+
+/* The facets of all ranks. */
+static PetscErrorCode gather(const SbPressure *surface, SbSpace space, PetscInt *n, Facet **facet)
+{
+  const SbMesh mesh = space->mesh;
+  PetscInt nmine = 0;
+  Facet *mine;
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(surface->nfacet, &mine));
+  for (const SbFacet *f = surface->facet; f < surface->facet + surface->nfacet; f++) {
+    if (f->cell >= mesh->ncell_owned)
+      continue;
+    for (int c = 0; c < 3; c++) {
+      mine[nmine].vertex[c] = mesh->gvert[f->vertex[c]];
+      for (int k = 0; k < 3; k++)
+        mine[nmine].x[c][k] = mesh->x[3 * f->vertex[c] + k];
+    }
+    nmine++;
+  }
+  PetscCallMPI(MPI_Type_contiguous((int)sizeof(Facet), MPI_BYTE, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(SbAllgatherv(space->comm, type, nmine, mine, n, facet, NULL));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(PetscFree(mine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The closed surfaces, apart from each other, of n facets: wall[n], of which those with a root have
+   a volume; root[n] of each facet. */
+static PetscErrorCode find_walls(PetscInt n, const Facet facet[], PetscInt root[], Wall wall[])
+{
+  SbKey *corner; /* slot: 3 facet + corner */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * n, &corner));
+  for (PetscInt i = 0; i < 3 * n; i++)
+    corner[i] = (SbKey){(uint64_t)facet[i / 3].vertex[i % 3], i};
+  SbKeysSort(3 * n, corner);
+  for (PetscInt i = 0; i < n; i++)
+    root[i] = i;
+  for (PetscInt i = 0; i + 1 < 3 * n; i++)
+    if (corner[i].key == corner[i + 1].key)
+      (void)SbUnionJoin(root, corner[i].slot / 3, corner[i + 1].slot / 3);
+  PetscCall(PetscFree(corner));
+  for (PetscInt i = 0; i < n; i++) {
+    wall[i].volume = 0;
+    SbBoxClear(wall[i].box);
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal normal[3];
+
+    root[i] = SbUnionRoot(root, i);
+    SbCross(facet[i].x[1], facet[i].x[2], normal);
+    wall[root[i]].volume += SbDot3(facet[i].x[0], normal) / 6;
+    for (int c = 0; c < 3; c++)
+      SbBoxAdd(wall[root[i]].box, facet[i].x[c]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a wall lies within the box of another one, around a cavity. */
+static PetscBool is_within(PetscInt n, const Wall wall[], const Wall *which)
+{
+  for (PetscInt j = 0; j < n; j++) {
+    PetscBool in = (PetscBool)(wall[j].volume < 0);
+
+    for (int k = 0; k < 3; k++)
+      in = (PetscBool)(in && which->box[k] >= wall[j].box[k] &&
+                       which->box[3 + k] <= wall[j].box[3 + k]);
+    if (in)
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Surfaces apart from each other: chambers with one filling, in the note, and what is in them; an
+   error if one is around a body elsewhere. */
+static PetscErrorCode check_walls(SbEffect e, SbSpace space)
+{
+  const Cavity *c = (const Cavity *)e->data;
+  PetscInt nchamber = 0;
+  PetscInt n, *root;
+  Facet *facet;
+  Wall *wall;
+
+  PetscFunctionBeginUser;
+  PetscCall(gather(&c->surface, space, &n, &facet));
+  PetscCall(PetscMalloc2(n, &root, n, &wall));
+  PetscCall(find_walls(n, facet, root, wall));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *box = wall[i].box;
+
+    if (root[i] != i)
+      continue;
+    nchamber += wall[i].volume < 0;
+    PetscCheck(
+      wall[i].volume < 0 || is_within(n, wall, &wall[i]), space->comm, PETSC_ERR_USER_INPUT,
+      "%s: a closed part of this surface, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) m, "
+      "is around bodies of %.4g m^3, not around a cavity or in it: leave its sets out",
+      e->on.option, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
+      (double)box[5], (double)wall[i].volume);
+  }
+  if (nchamber > 1)
+    SbAppend(sizeof(e->note), e->note, ", %" PetscInt_FMT " chambers with one pressure", nchamber);
+  PetscCall(PetscFree2(root, wall));
+  PetscCall(PetscFree(facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_cavity(SbEffect e, SbSpace space)
 {
   Cavity *c = (Cavity *)e->data;
@@ -197,6 +320,7 @@ static PetscErrorCode setup_cavity(SbEffect e, SbSpace space)
              "%s: this surface is around bodies, not around a cavity: take the facets of the wall "
              "inside",
              e->on.option);
+  PetscCall(check_walls(e, space));
   PetscCall(SbPressureInside(&c->surface, space, NULL, &c->rest));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->rest, 1, MPIU_REAL, MPI_SUM, space->comm));
   c->rest *= c->surface.sign;

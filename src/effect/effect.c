@@ -88,6 +88,9 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
     if (!strcmp(is->row[i].key, "on")) {
       SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option);
       PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
+    } else if (!strcmp(is->row[i].key, "to")) {
+      SbOptionName(&scope, "to", sizeof(e->to.option), e->to.option);
+      PetscCall(SbOptionNames(&scope, "to", &e->to.n, &e->to.name));
     } else if (!strcmp(is->row[i].key, "time"))
       PetscCall(SbEffectFormulas(e, &scope, "time", 1, PETSC_FALSE, &e->time));
   if (e->ops.setfromoptions)
@@ -137,6 +140,7 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   for (PetscInt i = 0; i < (*effect)->nformula; i++)
     PetscCall(SbFormulaDestroy(&(*effect)->formula[i]));
   PetscCall(PetscFree((*effect)->on.name));
+  PetscCall(PetscFree((*effect)->to.name));
   PetscCall(PetscFree((*effect)->data));
   PetscCall(PetscFree(*effect));
   PetscFunctionReturn(PETSC_SUCCESS);

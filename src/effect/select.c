@@ -75,6 +75,58 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static int by_place(const void *a, const void *b)
+{
+  const PetscInt x = *(const PetscInt *)a;
+  const PetscInt y = *(const PetscInt *)b;
+
+  return (x > y) - (x < y);
+}
+
+/* place[n]: 4 cell + face of the facets of owned cells, sorted; the caller frees. */
+static PetscErrorCode find_places(SbSpace s, const SbEffectOn *on, PetscInt *n, PetscInt **place)
+{
+  SbFacet *facet;
+  PetscInt all;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFacets(s, on, &all, &facet));
+  PetscCall(PetscMalloc1(all, place));
+  *n = 0;
+  for (PetscInt i = 0; i < all; i++)
+    if (facet[i].cell < s->mesh->ncell_owned)
+      (*place)[(*n)++] = 4 * facet[i].cell + facet[i].face;
+  if (*n)
+    qsort(*place, (size_t)*n, sizeof(**place), by_place);
+  PetscCall(PetscFree(facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectShared(SbSpace s, const SbEffectOn *one, const SbEffectOn *two,
+                              PetscInt shared[])
+{
+  const SbEffectOn *const on[2] = {one, two};
+  PetscInt n[2], *place[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(shared, s->mesh->nbody));
+  for (int k = 0; k < 2; k++)
+    PetscCall(find_places(s, on[k], &n[k], &place[k]));
+  for (PetscInt i = 0, j = 0; i < n[0] && j < n[1];) {
+    if (place[0][i] == place[1][j])
+      shared[s->mesh->cell_body[place[0][i] / 4]]++;
+    if (place[0][i] <= place[1][j])
+      i++;
+    else
+      j++;
+  }
+  for (int k = 0; k < 2; k++)
+    PetscCall(PetscFree(place[k]));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, shared, (PetscMPIInt)s->mesh->nbody, MPIU_INT, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A body with nodes at faces that has vertices in the sets must have nodes there. Collective. */
 static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t mask)
 {

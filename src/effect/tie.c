@@ -25,8 +25,9 @@
   A facet of B may lie inside of A's body by a part of the cells behind both: else the far side of a
   sheet would be tied through it.
 
-  With a strength patches part for good at the end of a step in which their mean traction is above
-  it. The state of that step still has their forces.
+  With a strength patches part for good where their mean traction is above it: in a dynamic run at
+  the end of a step, whose state still has their forces; a load step of a static run is solved again
+  without them, until no more of them part.
 
   Every rank has the facets of both surfaces at set-up, and keeps the patches with a node of its
   own.
@@ -67,10 +68,10 @@ typedef struct {
   PetscReal area;       /* m^2 */
   PetscInt facet[2];    /* Side.number of both */
   PetscBool parted;
+  PetscBool kept; /* parted at the end of the last step that was accepted */
 } Patch;
 
 typedef struct {
-  SbEffectOn to;
   PetscReal stiffness, distance, strength; /* Pa/m, m, Pa; 0: by default, none */
   PetscInt n, size;
   Patch *patch;    /* [n] */
@@ -94,7 +95,7 @@ static const SbOption rows[] = {
    "largest gap at rest of what is tied, and overlap, up to a quarter of the cells; 0: a tenth of "
    "a facet's longest side"},
   {"strength", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
-   "traction above which places part for good at the end of a step; 0: never"},
+   "traction above which places part for good; 0: never"},
 };
 
 static PetscErrorCode options_tie(SbEffect e, const SbScope *scope)
@@ -102,8 +103,6 @@ static PetscErrorCode options_tie(SbEffect e, const SbScope *scope)
   Tie *tie = (Tie *)e->data;
 
   PetscFunctionBeginUser;
-  SbOptionName(scope, "to", sizeof(tie->to.option), tie->to.option);
-  PetscCall(SbOptionNames(scope, "to", &tie->to.n, &tie->to.name));
   PetscCall(SbOptionReal(scope, "stiffness", &tie->stiffness));
   PetscCall(SbOptionReal(scope, "distance", &tie->distance));
   PetscCall(SbOptionReal(scope, "strength", &tie->strength));
@@ -112,6 +111,7 @@ static PetscErrorCode options_tie(SbEffect e, const SbScope *scope)
   e->nstate = 2;
   if (tie->strength > 0)
     PetscFunctionReturn(PETSC_SUCCESS);
+  e->ops.settle = NULL;
   e->ops.accept = NULL;
   e->ops.save = NULL;
   e->ops.load = NULL;
@@ -433,14 +433,14 @@ static PetscErrorCode report(SbEffect e, SbSpace space, PetscInt na, const Side 
              "%s: nothing of these surfaces lies on those of %s: the nearest place is %.4g m away, "
              "and -effect_%s_distance allows %.4g m; they must also face each other, seen along "
              "their normals, and overlap by less than a quarter of a cell",
-             e->on.option, tie->to.option, (double)distance_between(na, a, tree, b), e->name,
+             e->on.option, e->to.option, (double)distance_between(na, a, tree, b), e->name,
              (double)(tie->distance > 0 ? tie->distance : NEAR * a[0].size));
   if (found->missed > MISSED * found->held)
     PetscCall(
       SbWarning(space->comm,
                 "%s: %.3g m^2 are held; %.3g m^2 more face %s at up to %.3g m, and are free: "
                 "set -effect_%s_distance to hold them",
-                e->on.option, (double)found->held, (double)found->missed, tie->to.option,
+                e->on.option, (double)found->held, (double)found->missed, e->to.option,
                 (double)found->farthest, e->name));
   SbFormat(sizeof(e->note), e->note, "%.6g m^2 held", (double)found->held);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -458,7 +458,7 @@ static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
 
   PetscFunctionBeginUser;
   PetscCall(gather(space, &e->on, &na, &a));
-  PetscCall(gather(space, &tie->to, &nb, &b));
+  PetscCall(gather(space, &e->to, &nb, &b));
   PetscCall(mark_both(na, a, nb, b));
 
   /* the patches, by a tree over the facets of B */
@@ -538,34 +538,56 @@ static PetscErrorCode tangent_tie(SbEffect e, SbSpace space, const SbStage *stag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With a strength: what is torn parts. A static run has no step after the last one. */
-static PetscErrorCode accept_tie(SbEffect e, SbSpace space, const SbStage *stage)
+/* Parts what is torn, of all ranks. */
+static PetscErrorCode tear(SbEffect e, SbSpace space, const SbStage *stage, PetscInt *n)
 {
   Tie *tie = (Tie *)e->data;
-  PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  if (!SbEffectActs(e, stage->t))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
+  *n = 0;
+  for (Patch *patch = tie->patch; patch < tie->patch + tie->n && SbEffectActs(e, stage->t);
+       patch++) {
     PetscReal f[3];
 
     force_on(space, patch, stage->u, f);
     if (patch->parted || PetscSqrtReal(SbDot3(f, f)) <= tie->strength * patch->area)
       continue;
-    n += counts(space, patch);
     patch->parted = PETSC_TRUE;
+    ++*n;
   }
-  if (e->dynamic || stage->t < 1)
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With a strength, of load steps. */
+static PetscErrorCode settle_tie(SbEffect e, SbSpace space, const SbStage *stage,
+                                 PetscBool *changed)
+{
+  Tie *tie = (Tie *)e->data;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  if (!stage) {
+    for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++)
+      patch->parted = patch->kept;
     PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(tear(e, space, stage, &n));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, space->comm));
-  if (n)
-    PetscCall(SbWarning(space->comm,
-                        "effect %s: %" PetscInt_FMT
-                        " places of the tie part in the last load step, whose state still has "
-                        "their forces: it is no equilibrium without them; take more load steps "
-                        "(-static_steps), a load that the rest bears, or time steps",
-                        e->name, n));
+  *changed = (PetscBool)(n > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With a strength. */
+static PetscErrorCode accept_tie(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Tie *tie = (Tie *)e->data;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  if (e->dynamic)
+    PetscCall(tear(e, space, stage, &n));
+  for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++)
+    patch->kept = patch->parted;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -602,7 +624,7 @@ static PetscErrorCode load_tie(SbEffect e, SbSpace space, PetscReal t, const Pet
     key[i] = (SbKey){SbKeyOfPair((PetscInt)records[2 * i], (PetscInt)records[2 * i + 1]), i};
   SbKeysSort(n, key);
   for (Patch *patch = tie->patch; patch < tie->patch + tie->n; patch++) {
-    patch->parted =
+    patch->parted = patch->kept =
       (PetscBool)(SbKeysFind(n, key, SbKeyOfPair(patch->facet[0], patch->facet[1])) >= 0);
     found += patch->parted && nodes_of(space, patch)[0] < space->nnode_owned;
   }
@@ -652,7 +674,6 @@ static PetscErrorCode destroy_tie(SbEffect e)
     PetscCall(PetscFree2(tie->patch[p].S, tie->patch[p].mean));
   PetscCall(PetscFree(tie->patch));
   PetscCall(PetscFree(tie->work));
-  PetscCall(PetscFree(tie->to.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -669,6 +690,7 @@ const SbEffectType SbEffectTie = {
           .couplings = couplings_tie,
           .force = force_tie,
           .tangent = tangent_tie,
+          .settle = settle_tie,
           .accept = accept_tie,
           .save = save_tie,
           .load = load_tie,

@@ -95,7 +95,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 
 /* Lists of the effects that have an operation, in scenario order, one after the other in
    m->lists. */
-#define NLIST 7
+#define NLIST 8
 #define SORT_INTO_LIST(m, op)                                        \
   do {                                                               \
     PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST"); \
@@ -179,9 +179,11 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, nonsymmetric);
   SORT_INTO_LIST(m, volume_pressure);
+  SORT_INTO_LIST(m, settle);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
   PetscCall(SbContactSetCreate(m->space, m->neffect, m->effect, &m->contacts));
+  PetscCall(SbModelCheckRepeated(m));
   for (PetscInt i = 0; i < m->space->nnode_owned; i++)
     mass += m->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(&mass, &m->mass, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -452,6 +454,29 @@ PetscErrorCode SbModelProjectTangent(SbModel m, PetscBool filter)
       PetscCall(
         SbMaterialSetTangent(m->material[k], filter ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
   m->space->tentative = (PetscBool)(m->may_filter && !filter);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelSettle(SbModel m, PetscReal t, Vec U, PetscBool *changed)
+{
+  SbStage stage = {.t = t, .shift_k = 1.};
+
+  PetscFunctionBeginUser;
+  if (changed)
+    *changed = PETSC_FALSE;
+  if (!m->nsettle)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  if (U)
+    PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
+  for (PetscInt e = 0; e < m->nsettle; e++) {
+    PetscBool here = PETSC_FALSE;
+
+    SbEffectCall(m->settle[e], settle, m->space, U ? &stage : NULL, &here);
+    if (changed)
+      *changed = (PetscBool)(*changed || here);
+  }
+  if (U)
+    PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,6 +15,9 @@ PetscErrorCode SbEvaluationBegin(SbModel model, PetscReal t, SbEvaluation *e);
 PetscErrorCode SbEvaluationEnd(SbModel model, SbEvaluation *e);
 /* rigid.c: the stiffness of rigid bodies, once their meshes are known. Not collective. */
 PetscErrorCode SbModelStiffenRigid(SbModel model);
+/* repeated.c: warns of effects that hold or fill the same surfaces, an error where they cannot.
+   Collective. */
+PetscErrorCode SbModelCheckRepeated(SbModel model);
 /* f[nnode][3], zero before, = sign * f_ext, N; apart: without barrier contact. Not collective. */
 PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart,
                                      PetscReal sign, PetscReal f[]);

@@ -169,8 +169,8 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with the penalty on jumps of the X that it ends with; follows: the repetitions of this
-   step, which its, the measure for the length of the next one, leaves out. */
+/* The same with what the X that it ends with changes; follows: the repetitions of this step, which
+   its, the measure for the length of the next one, leaves out. */
 static PetscErrorCode correct_followed(Path *p, PetscReal l, PetscInt *follows, PetscInt *its,
                                        PetscBool *ok)
 {
@@ -180,7 +180,7 @@ static PetscErrorCode correct_followed(Path *p, PetscReal l, PetscInt *follows, 
   PetscFunctionBeginUser;
   PetscCall(correct(p, l, its, ok));
   while (*ok) {
-    PetscCall(SbRunRepeatForJumps(p->run, p->factor, p->X, follows, &again));
+    PetscCall(SbRunRepeat(p->run, p->factor, p->X, follows, &again));
     if (!again)
       break;
     PetscCall(correct(p, l, &more, ok));
@@ -202,6 +202,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
 
   PetscFunctionBeginUser;
   PetscCall(SbModelFollowJumps(run->model, from, run->state.U, SB_STEPS_OF_LOAD, NULL));
+  PetscCall(SbModelSettle(run->model, from, NULL, NULL));
   PetscCall(product(p, p->begin, p->begin, &vv));
   PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->state.U));
   PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
@@ -236,6 +237,8 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
       PetscCall(correct_followed(p, l, &follows, &more, ok));
   }
   PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->state.U, p->X}, ok));
+  if (!*ok)
+    PetscCall(SbModelSettle(run->model, from, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

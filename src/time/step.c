@@ -41,7 +41,10 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *times, PetscBool *again)
+/* Updates the penalty on jumps from the end U of a load step; again: by more than a percent. times:
+   counts that, and ends it with a warning. */
+static PetscErrorCode repeat_for_jumps(SbRun run, PetscReal t, Vec U, PetscInt *times,
+                                       PetscBool *again)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelFollowJumps(run->model, t, U, SB_STEPS_OF_LOAD, again));
@@ -57,6 +60,18 @@ PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *time
       "-static_steps, or -body_<name>_element p2",
       (double)t, *times));
   run->monitors.warned_jumps = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunRepeat(SbRun run, PetscReal t, Vec U, PetscInt *times, PetscBool *again)
+{
+  PetscFunctionBeginUser;
+  PetscCall(repeat_for_jumps(run, t, U, times, again));
+  if (*again)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbModelSettle(run->model, t, U, again));
+  if (*again)
+    run->solve.tangent_known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,8 +132,10 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   int asked = 0;
 
   PetscFunctionBeginUser;
-  if (!m->dynamic)
+  if (!m->dynamic) {
     PetscCall(SbModelFollowJumps(m, step->t, step->U0, SB_STEPS_OF_LOAD, NULL));
+    PetscCall(SbModelSettle(m, step->t, NULL, NULL));
+  }
   while (again) {
     /* begin: effects move, surfaces are updated, candidates of contact are found; a guess */
     PetscCall(SbRunBeginSolve(run, a, warm));
@@ -149,9 +166,9 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
       }
     }
 
-    /* the penalty on jumps is that of an earlier state: repeat a load step with that of its end */
+    /* repeat a load step with what its end changes */
     if (*ok && !m->dynamic) {
-      PetscCall(SbRunRepeatForJumps(run, step->t + step->dt, step->U, &follows, &warm));
+      PetscCall(SbRunRepeat(run, step->t + step->dt, step->U, &follows, &warm));
       again = warm;
       if (warm)
         continue;
@@ -169,7 +186,9 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   if (*ok)
     PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* restore prescribed motions to the start of the step, in case the run ends there */
+  /* effects and prescribed motions of the start of the step, in case the run ends there */
+  if (!m->dynamic)
+    PetscCall(SbModelSettle(m, step->t, NULL, NULL));
   SbContactSetAdvance(&m->contacts, 0.);
   PetscCall(warn_short(run, step->dt));
   PetscFunctionReturn(PETSC_SUCCESS);

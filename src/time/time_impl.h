@@ -51,11 +51,10 @@ typedef struct {
    Explicit integrators, for their stable step, and alpha2 use the penalty of the rest state.
    Collective. */
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
-/* Updates the penalty on jumps from the end U of a load step, at the load factor t. again: by more
-   than a percent, so that the step is to be solved once more, from U; times: counts that, and ends
-   it with a warning. Collective. */
-PetscErrorCode SbRunRepeatForJumps(SbRun run, PetscReal t, Vec U, PetscInt *times,
-                                   PetscBool *again);
+/* What the end U of a load step changes, at the load factor t: the penalty on jumps of CR and DG,
+   effects such as ties that tear. again: the step is to be solved once more, from U; times: how
+   often the penalty changed, which ends with a warning. Collective. */
+PetscErrorCode SbRunRepeat(SbRun run, PetscReal t, Vec U, PetscInt *times, PetscBool *again);
 /* Attempts a step; ok: it can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode

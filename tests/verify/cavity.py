@@ -126,4 +126,17 @@ ERRORS = ((scene("air", "cr") + CAVITY, "-effect_air_on"), (scene("air", "dg") +
 for options, words in ERRORS:
     text = run("error", options, code=1)
     check(words in text, f"{words}: {text}")
+
+# two shells are chambers with one pressure, unless they are named apart; a body elsewhere is no part of the wall, and one wall has one filling
+TWO = ball("p1", "neohookean").replace("-bodies s", "-bodies s,r") + ball("p1", "neohookean").replace("-bodies s ", "").replace("_s_", "_r_") + (
+    "-body_r_translate 0.2,0,0 -sets inside,other,stone -set_other_at sphere:0.2,0,0,0.0405 -set_stone_at body:r -effects air -effect_air_type cavity "
+    "-effect_air_modulus 101325 -ts_max_time 1e-3 -ts_dt 1e-3 ")
+text = run("two", TWO + "-effect_air_on inside,other -quiet no ")
+check("2 chambers" in text, text)
+near(history("two")["air_volume"][0] / rest, 2, 1e-9, "two chambers: volume, over that of one")
+BOX = TWO.replace(f"-body_r_mesh {MESH}", "-body_r_mesh box:0.05,0.05,0.05:1") + "-set_other_at body:r "
+for options, words in ((BOX + "-effect_air_on inside,stone ", "leave its sets out"), (TWO + "-effects air,more -effect_more_type cavity -effect_more_on inside ", "in common")):
+    text = run("error", options, code=1)
+    check(words in text, f"{words}: {text}")
+near(len(run("within", BOX + "-body_r_translate -0.01,-0.01,-0.01 -body_r_mesh box:0.02,0.02,0.02:1 -set_other_at body:r -effect_air_on inside,stone ")), 0, 0, "a body in the cavity: no message")
 finish()
