@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -23,7 +24,6 @@ PALETTE = ("#b3541e", "#1f5fa8", "#2a8a57", "#8a4fa8", "#777777", "#c2185b", "#0
 SHORT, REPEATS = 1.0, 2  # CPU seconds below which a run is repeated, and how often it runs then
 LIMIT = 900  # seconds on the clock that a run may take
 BLOWN = 10.0  # relative error at which a run counts as blown up
-WILD = 0.3  # drift of the energy above which a run is about to
 LEVELS = (0.1, 0.03, 0.01, 0.003, 0.001)
 
 # ---------------------------------------------------------------- scenes
@@ -310,6 +310,12 @@ def percent(error):
     return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
 
 
+def size_of(label):
+    """The number in a label: cells, length of edges, step, tolerance; of a word 0."""
+    found = re.search(r"\d[\d.e-]*", label)
+    return float(found[0]) if found else 0.0
+
+
 def best_of(points):
     """Of points that cost the same the better one; in the order of their cost."""
     chosen = set(front((p.seconds, p.error) for p in points))
@@ -326,7 +332,7 @@ class Sweep:
 
     def __init__(self, name, title, intro):
         self.name, self.title, self.intro = name, title, intro
-        self.points, self.checks, self.seen, self.columns, self.axes = [], [], "", [], [("seconds", "CPU seconds", "seconds")]
+        self.points, self.checks, self.seen, self.tabled, self.axes = [], [], "", None, [("seconds", "CPU seconds", "seconds")]
 
     def line(self, problem, line):
         return [p for p in self.points if (p.problem, p.line) == (problem, line)]
@@ -360,30 +366,26 @@ class Sweep:
         return "\n".join(shown)
 
     def tables(self):
+        """A table per problem, of all or of those in self.tabled: error and seconds, a row per line, a column per label; those by size begin with the unknowns, the same in each problem."""
         text = []
+        if len(self.axes) > 1 and self.points:
+            text.append(self.table("Unknowns", [p for p in self.points if p.problem == self.problems[0]], lambda p: f"{p.unknowns}"))
         for problem in self.problems:
+            if self.tabled is not None and problem not in self.tabled:
+                continue
             mine = [p for p in self.points if p.problem == problem]
             ahead = best_of(mine)
-            rows = [
-                [
-                    p.line, p.label, f"**{percent(p.error)}**" if p in ahead else percent(p.error), number(p.seconds), f"{p.unknowns}", f"{p.memory:.0f}",
-                    f"{p.newton}", f"{p.linear}", *(f"{p.extra[c]:.1e}" if c in p.extra else "" for c, _ in self.columns),
-                ]
-                for p in mine
-            ]
-            text.append(table([problem, "", "error", "s", "unknowns", "MB", "Newton", "linear", *(head for _, head in self.columns)], rows))
+            text.append(self.table(f"{problem}: error, s", mine, lambda p: f"**{percent(p.error)}**, {number(p.seconds)}" if p in ahead else f"{percent(p.error)}, {number(p.seconds)}"))
         return "\n".join(text)
 
+    def table(self, head, points, cell):
+        lines = {line: {p.label: p for p in points if p.line == line} for line in dict.fromkeys(p.line for p in points)}
+        longest = max(lines.values(), key=len)
+        sizes = [size_of(label) for label in longest]
+        sign = -1 if sizes[0] > sizes[-1] else 1
+        labels = sorted({p.label for p in points}, key=lambda label: (not label, sign * size_of(label), label))
+        return table([head, *labels], [[line, *(cell(found[label]) if label in found else "" for label in labels)] for line, found in lines.items()])
+
     def text(self, folder):
-        example = max(best_of(self.points), key=lambda p: p.seconds).run.command
-        return f"""## {self.title}
-
-{self.intro}
-
-{self.plots(folder)}
-
-{self.tables()}
-{self.seen}
-
-    {example}
-"""
+        parts = (self.intro, self.plots(folder), self.tables().rstrip("\n"), self.seen)
+        return f"## {self.title}\n\n" + "\n\n".join(part for part in parts if part) + "\n"
