@@ -65,9 +65,7 @@ static PetscErrorCode fill(SbEffect e, SbSpace space, const SbStage *stage, Fill
   const Cavity *c = (const Cavity *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFormulaEval(c->added, stage->t, NULL, &now->fluid));
-  if (!e->dynamic && !SbFormulaUses(c->added, 't'))
-    now->fluid *= stage->t;
+  PetscCall(SbEffectValueAt(e, c->added, stage->t, &now->fluid));
   now->fluid += c->rest;
   PetscCheck(
     now->fluid > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

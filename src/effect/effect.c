@@ -146,6 +146,15 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbEffectValueAt(SbEffect e, SbFormula formula, PetscReal t, PetscReal *value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbFormulaEval(formula, t, NULL, value));
+  if (!e->dynamic && !SbFormulaUses(formula, 't'))
+    *value *= t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
                                 PetscBool position, SbFormula formulas[])
 {

@@ -14,6 +14,10 @@ PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
 PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *key, PetscInt n,
                                 PetscBool position, SbFormula formulas[]);
 
+/* A formula at time t; in a static run one without t grows with the load factor t. Not
+   collective. */
+PetscErrorCode SbEffectValueAt(SbEffect e, SbFormula formula, PetscReal t, PetscReal *value);
+
 /*
   Items of the named sets on this rank, each once even when it is in several of the sets.
   Collective; the caller releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on

@@ -304,16 +304,6 @@ static PetscErrorCode couplings_line(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A formula at time t; in a static run one without t grows with the load factor t. */
-static PetscErrorCode value_at(SbEffect e, SbFormula formula, PetscReal t, PetscReal *value)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbFormulaEval(formula, t, NULL, value));
-  if (!e->dynamic && !SbFormulaUses(formula, 't'))
-    *value *= t;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The displacement of the ground's points at time t. */
 static PetscErrorCode ground_at(SbEffect e, PetscReal t, PetscReal d[3])
 {
@@ -321,7 +311,7 @@ static PetscErrorCode ground_at(SbEffect e, PetscReal t, PetscReal d[3])
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++)
-    PetscCall(value_at(e, line->displacement[k], t, &d[k]));
+    PetscCall(SbEffectValueAt(e, line->displacement[k], t, &d[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,7 +398,7 @@ static PetscErrorCode find_state(SbEffect e, SbSpace space, const SbStage *stage
       rest = line->rest + stage->t * (rest - line->rest);
   }
   now->extension = now->length - rest;
-  PetscCall(value_at(e, line->tension, stage->t, &now->tension));
+  PetscCall(SbEffectValueAt(e, line->tension, stage->t, &now->tension));
   now->tension += line->stiffness * now->extension;
   if (line->damping > 0)
     PetscCall(speed(e, space, stage, now, &rate));

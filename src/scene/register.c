@@ -8,11 +8,22 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {
-    &SbEffectGravity, &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
-    &SbEffectCavity,  &SbEffectFoundation, &SbEffectTie,      &SbEffectSpring,
-    &SbEffectCable,   &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
-    &SbEffectTorque,  &SbEffectDamping,    &SbEffectContact};
+  static const SbEffectType *const effects[] = {&SbEffectGravity,
+                                                &SbEffectBodyForce,
+                                                &SbEffectTraction,
+                                                &SbEffectPressure,
+                                                &SbEffectCavity,
+                                                &SbEffectFoundation,
+                                                &SbEffectTie,
+                                                &SbEffectJoint,
+                                                &SbEffectSpring,
+                                                &SbEffectCable,
+                                                &SbEffectPointForce,
+                                                &SbEffectFixed,
+                                                &SbEffectPrescribedDisplacement,
+                                                &SbEffectTorque,
+                                                &SbEffectDamping,
+                                                &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;

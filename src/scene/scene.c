@@ -457,14 +457,11 @@ static PetscErrorCode read_sets(SbModel model)
   PetscCall(PetscFree(names));
   PetscCall(ierr);
   for (PetscInt e = 0; e < model->neffect; e++) {
-    // sets of an effect; none if its type has no such option
-    SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name);
-    if (!SbOptionFind(&scope, "on"))
-      continue;
-    PetscCall(SbOptionNames(&scope, "on", &n, &names));
-    for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++)
-      PetscCall(use_name(model, names[i]));
-    PetscCall(PetscFree(names));
+    const SbEffectOn *const on[2] = {&model->effect[e]->on, &model->effect[e]->to};
+
+    for (int k = 0; k < 2; k++)
+      for (PetscInt i = 0; i < on[k]->n && model->nset <= SB_SET_MAX; i++)
+        PetscCall(use_name(model, on[k]->name[i]));
   }
 
   /* sets over which probes average */

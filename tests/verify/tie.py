@@ -108,6 +108,10 @@ for steps, more in ((1, ""), (4, "-static_control arc_length ")):
     run("tear", PULL.replace("-static_steps 8", f"-static_steps {steps}") + more + "-effect_glue_strength 3000", 2)
     near(abs(last("tear")["glue_force_z"]) + last("tear")["glue_area"] + last("tear")["strain"], 0, 1e-9, f"{steps} steps {more}: force, area, strain")
 
+# sides of bodies are named without a set
+run("sides", PULL.replace("-effect_glue_on on -effect_glue_to under", "-effect_glue_on b.zmin -effect_glue_to a.zmax"))
+near(last("sides")["glue_force_z"], -stress * 0.01, 1e-8, "by the sides' names: force, N")
+
 # it lets go at a given time
 run("let-go", PULL + "-effect_glue_until 0.5")
 near(history("let-go")["glue_force_z"][4], -stress * 0.01 / 2, 1e-6, "a tie until 0.5: force, N")
