@@ -137,12 +137,13 @@ warns "-probe_tip_at|0.9 m" block.opts -probes tip -probe_tip_at 1,0,0
 warns "-ledger_at|0.9 m" block.opts -ledger -ledger_quantity displacement -ledger_at 1,0,0
 
 # Lines longer than any buffer: they are read whole, and counted as one.
-long=$(head -c 300000 /dev/zero | tr '\0' x)
+repeat() { head -c 300000 /dev/zero | tr '\0' "$1"; } # bash takes a minute to change the letters of such a line
+long=$(repeat x)
 printf '# %s\n0 0 0\n1 0 0 oops\n' "$long" >copies.txt
 error 2 "-body_block_copies|copies.txt|line 3" block.opts -body_block_copies copies.txt
-printf '0 0 0%s\n1 0 0 oops\n' "${long//x/ }" >copies.txt
+printf '0 0 0%s\n1 0 0 oops\n' "$(repeat " ")" >copies.txt
 error 2 "-body_block_copies|copies.txt|line 2" block.opts -body_block_copies copies.txt
-printf '# %s\n0 0.%s\n1 1\n2\n' "$long" "${long//x/1}" >table.txt
+printf '# %s\n0 0.%s\n1 1\n2\n' "$long" "$(repeat 1)" >table.txt
 error 2 "-effect_gravity_time|table.txt|line 4" block.opts -effects gravity -effect_gravity_time table:table.txt
 warns "-ts_max_steps|step 2|0.02 s|0.04 s" block.opts -ts_max_steps 2 -output_dir cut
 check "cut/run.json: $(tail -n 3 cut/run.json)" grep -q '"status": "cut short"' cut/run.json
