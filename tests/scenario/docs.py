@@ -23,7 +23,7 @@ SHORT = {
     "demo": "-ts_max_time 0.1", "organ": "-ts_max_time 0.02", "finger": "-ts_max_time 0.05", "hanging": "-ts_max_time 0.02 -body_thing_tet_size 0.006", "scan":
     "-body_organ_element p1 -body_organ_tet_size 0.006 -static_steps 1 -effect_tool_displacement '0;0;-0.001*t'", "indent":
     "-body_tissue_mesh box:0.1,0.06,0.04:4 -ts_dt 0.05 -ts_max_time 0.1", "pile": "-ts_max_time 0.09", "fold": "-ts_max_time 0.05", "press": "-ts_max_time 0.1",
-    "drop": "-ts_max_time 0.13", "rubber": "-body_block_mesh box:0.06,0.06,0.04:1 -static_steps 1", "relax": "-ts_max_time 0.1",
+    "drop": "-ts_max_time 0.13", "jaws": "-ts_max_time 0.03", "pumped": "-ts_max_time 0.03", "gripped": "-ts_max_time 0.03", "rubber": "-body_block_mesh box:0.06,0.06,0.04:1 -static_steps 1", "relax": "-ts_max_time 0.1",
 }
 
 passed = failed = 0
