@@ -114,6 +114,12 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
                "-body_%s_rigid: scenes with rigid bodies are not re-meshed: leave the options "
                "-remesh_ out",
                m->body[b].name);
+  for (PetscInt e = 0; e < m->neffect; e++)
+    PetscCheck(!m->effect[e]->ops.settle || !named, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "effect %s: what has torn is known by the cells of the mesh: scenes with "
+               "-effect_%s_strength are not re-meshed: leave the options -remesh_ out, or the "
+               "strength",
+               m->effect[e]->name, m->effect[e]->name);
   if (!named && !r->nchange)
     PetscCall(SbRemeshDestroy(remesh));
   if (*remesh)

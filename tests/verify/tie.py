@@ -149,6 +149,7 @@ RIGID = "-body_b_translate 0,0,0.1 " + "".join(f"-body_{name}_rigid yes -body_{n
 ERRORS = ((ALONE + "-body_b_translate 0,0,0.15 " + SETS, "0.05 m away"), (ALONE + "-body_b_translate 0,0,0.1 " + SETS.replace("-effect_glue_to under", ""), "-effect_glue_to"),
           ("-bodies a,b " + RIGID + SETS, "-effect_glue_stiffness (Pa/m)"),
           (ALONE + "-body_b_translate 0,0,0.1 " + SETS + "-time euler_explicit ", "euler_explicit"),
+          (ALONE + "-body_b_translate 0,0,0.1 " + SETS + "-effect_glue_strength 1e3 -remesh_times 0.005 ", "re-meshed"),
           (ALONE + "-body_b_translate 0,0,0.1 " + SETS + "-effect_glue_strength -1 ", "-effect_glue_strength"))
 for options, words in ERRORS:
     text = run("error", options, code=1)
