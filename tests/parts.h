@@ -76,6 +76,9 @@ static const Part parts[] = {
   {"effect", "foundation",
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
    NULL, PETSC_FALSE}, /* implicit only */
+  {"effect", "membrane",
+   "-effects coat -effect_coat_type membrane -effect_coat_on skin -effect_coat_tension 1", NULL,
+   NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "tie", "-effects glue -effect_glue_type tie -effect_glue_on tip -effect_glue_to skin",
    PART_BLOCK, NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "joint",

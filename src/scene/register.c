@@ -8,21 +8,14 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {&SbEffectGravity,
-                                                &SbEffectBodyForce,
-                                                &SbEffectTraction,
-                                                &SbEffectPressure,
-                                                &SbEffectCavity,
-                                                &SbEffectFoundation,
-                                                &SbEffectTie,
-                                                &SbEffectJoint,
-                                                &SbEffectSpring,
-                                                &SbEffectCable,
-                                                &SbEffectPointForce,
-                                                &SbEffectFixed,
-                                                &SbEffectPrescribedDisplacement,
-                                                &SbEffectTorque,
-                                                &SbEffectDamping,
+  static const SbEffectType *const effects[] = {&SbEffectGravity,  &SbEffectBodyForce,
+                                                &SbEffectTraction, &SbEffectPressure,
+                                                &SbEffectCavity,   &SbEffectFoundation,
+                                                &SbEffectMembrane, &SbEffectTie,
+                                                &SbEffectJoint,    &SbEffectSpring,
+                                                &SbEffectCable,    &SbEffectPointForce,
+                                                &SbEffectFixed,    &SbEffectPrescribedDisplacement,
+                                                &SbEffectTorque,   &SbEffectDamping,
                                                 &SbEffectContact};
   static const struct {
     const char *klass;
