@@ -19,6 +19,16 @@
   part indefinite: as long as it is far from that at the end of the last step, that one is taken
   (with nothing of the kind, a gripper of two fingers took 7 times as long).
 
+  With an outlet the fluid leaves by the flow Q, the windkessel of a ventricle: R resists it, behind
+  that is a vessel that yields by the compliance C and has the pressure p_c, drained by R_d to the
+  pressure p_0 (all above that outside),
+
+    R Q = p - p_c (a valve: Q >= 0),   C dp_c/dt = Q - (p_c - p_0) / R_d,   dV_f/dt = d(added)/dt -
+    Q,
+
+  by the implicit Euler method from the end of the last step: p_c is linear in Q, Q in p, and the
+  equation for p above has one root.
+
   In a static run an `added` without t grows with the load factor. Bodies have nodes at vertices: P1
   and P2.
 */
@@ -35,8 +45,18 @@
          1 and 10 take as many, 1.1 and 1.6 times as many iterations in the gripper */
 #define MANY 2000 /* nodes whose dense block is large: 300 MB */
 
+#define ITERATIONS 50 /* for the pressure of a gas with an outlet: 5 are usual */
+
+/* What the fluid leaves by, and its state at the end of the last step. */
+typedef struct {
+  PetscReal resistance, compliance, drain, outside; /* R, C, R_d, p_0; 0: none, but p_0 */
+  PetscBool valve;
+  PetscReal t, left, vessel, flow; /* s; m^3 that has left so far; p_c, Pa; Q, m^3/s */
+} Outlet;
+
 typedef struct {
   SbPressure surface;
+  Outlet outlet;
   SbFormula added; /* m^3 */
   PetscReal modulus, exponent;
   PetscReal rest;  /* volume at rest, m^3 */
@@ -51,8 +71,9 @@ typedef struct {
 
 /* What fills it at a stage. */
 typedef struct {
-  PetscReal V, fluid; /* m^3 */
-  PetscReal p;        /* Pa */
+  PetscReal V, fluid;     /* m^3 */
+  PetscReal p, slope;     /* Pa, and its derivative by V */
+  PetscReal flow, vessel; /* Q, m^3/s, p_c, Pa */
 } Filling;
 
 static const SbOption rows[] = {
@@ -67,7 +88,71 @@ static const SbOption rows[] = {
   {"exponent", SB_OPTION_REAL, 1, "", "1", "[1, 10]",
    "n of p V^n: 1 for liquids and gases at constant temperature, 1.4 for air that exchanges no "
    "heat"},
+  {"outlet_resistance", SB_OPTION_REAL, 1, "Pa s/m^3", "0", "[0, inf)",
+   "pressure over the flow that leaves by an outlet; 0: there is none"},
+  {"outlet_compliance", SB_OPTION_REAL, 1, "m^3/Pa", "0", "[0, inf)",
+   "volume over pressure of the vessel behind the outlet; 0: it does not yield"},
+  {"outlet_drain", SB_OPTION_REAL, 1, "Pa s/m^3", "0", "[0, inf)",
+   "pressure over the flow that leaves the vessel; 0: nothing resists it, or with a compliance "
+   "nothing leaves it"},
+  {"outlet_pressure", SB_OPTION_REAL, 1, "Pa", "0", "(-inf, inf)",
+   "pressure to which it drains, above that outside; the vessel begins with it"},
+  {"outlet_valve", SB_OPTION_BOOL, 1, "", "false", "", "the fluid leaves, and does not come back"},
 };
+
+/* The pressure for a fluid that has V_f = fluid - leak p: p / M + 1 = (V_f / V)^n. */
+static void solve_pressure(const Cavity *c, PetscReal fluid, PetscReal leak, Filling *now)
+{
+  PetscReal p = c->modulus * (PetscPowReal(fluid / now->V, c->exponent) - 1);
+  PetscReal part = fluid / now->V;
+
+  for (int i = 0; i < ITERATIONS && leak > 0; i++) {
+    PetscReal off, slope, step;
+
+    /* the root is below a pressure that nothing leaves by, and where V_f is positive */
+    part = (fluid - leak * p) / now->V;
+    if (part <= 0) {
+      p = (i ? p / 2 : fluid / leak * (1 - 1e-6));
+      continue;
+    }
+    off = p / c->modulus + 1 - PetscPowReal(part, c->exponent);
+    slope = 1 / c->modulus + c->exponent * PetscPowReal(part, c->exponent - 1) * leak / now->V;
+    step = off / slope;
+    p -= step;
+    if (PetscAbsReal(step) <= 4 * PETSC_MACHINE_EPSILON * (PetscAbsReal(p) + c->wall))
+      break;
+  }
+  now->p = p;
+  now->fluid = fluid - leak * p;
+  part = now->fluid / now->V;
+  now->slope = -c->exponent * PetscPowReal(part, c->exponent) / now->V /
+               (1 / c->modulus + c->exponent * PetscPowReal(part, c->exponent - 1) * leak / now->V);
+}
+
+/* The same with an outlet, a time dt after the end of the last step. */
+static void flow_out(const Cavity *c, PetscReal dt, Filling *now)
+{
+  const Outlet *out = &c->outlet;
+  const PetscReal yields = dt > 0 ? out->compliance / dt : 0;
+  const PetscReal drains = out->drain > 0 ? 1 / out->drain : 0;
+  const PetscReal all = yields + drains;
+  const PetscReal fluid = now->fluid - out->left;
+
+  /* p_c without flow, and all that resists a flow */
+  const PetscReal empty =
+    all > 0 ? (yields * out->vessel + drains * out->outside) / all : out->outside;
+  const PetscReal resists = out->resistance + (all > 0 ? 1 / all : 0);
+  const PetscReal leak = dt > 0 ? dt / resists : 0;
+
+  now->flow = dt > 0 ? 0 : out->flow;
+  now->vessel = dt > 0 ? empty : out->vessel;
+  solve_pressure(c, fluid, 0, now);
+  if (leak == 0 || (out->valve && now->p <= empty))
+    return;
+  solve_pressure(c, fluid + leak * empty, leak, now);
+  now->flow = (now->p - empty) / resists;
+  now->vessel = now->p - out->resistance * now->flow;
+}
 
 static PetscErrorCode fill(SbEffect e, SbSpace space, const SbStage *stage, Filling *now)
 {
@@ -85,9 +170,14 @@ static PetscErrorCode fill(SbEffect e, SbSpace space, const SbStage *stage, Fill
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now->V, 1, MPIU_REAL, MPI_SUM, space->comm));
   now->V *= c->surface.sign;
 
-  /* without volume: no finite pressure */
-  now->p =
-    c->modulus * (now->V > 0 ? PetscPowReal(now->fluid / now->V, c->exponent) - 1 : PETSC_INFINITY);
+  now->flow = now->vessel = 0;
+  if (now->V <= 0) { /* no finite pressure */
+    now->p = PETSC_INFINITY;
+    now->slope = -PETSC_INFINITY;
+  } else if (c->outlet.resistance > 0)
+    flow_out(c, stage->t - c->outlet.t, now);
+  else
+    solve_pressure(c, now->fluid, 0, now);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,7 +196,12 @@ static PetscErrorCode pressure_at(SbEffect e, SbSpace space, const SbStage *stag
 
 static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
 {
+  static const char *const keys[] = {"outlet_compliance", "outlet_drain", "outlet_pressure",
+                                     "outlet_valve"};
+  static const char *const outlet_columns[] = {"volume", "pressure", "energy", "flow",
+                                               "vessel_pressure"};
   Cavity *c = (Cavity *)e->data;
+  Outlet *out = &c->outlet;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFormulas(e, scope, "added", 1, PETSC_FALSE, &c->added));
@@ -116,6 +211,32 @@ static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
   c->surface.follower = PETSC_TRUE;
   e->linear = e->steady = PETSC_FALSE;
   e->stiff = PETSC_TRUE;
+
+  /* the outlet */
+  PetscCall(SbOptionReal(scope, "outlet_resistance", &out->resistance));
+  PetscCall(SbOptionReal(scope, "outlet_compliance", &out->compliance));
+  PetscCall(SbOptionReal(scope, "outlet_drain", &out->drain));
+  PetscCall(SbOptionReal(scope, "outlet_pressure", &out->outside));
+  PetscCall(SbOptionBool(scope, "outlet_valve", &out->valve));
+  out->vessel = out->outside;
+  if (out->resistance > 0) {
+    e->column = outlet_columns;
+    e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(outlet_columns);
+    e->nstate = 4;
+    e->no_potential = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
+    PetscBool given;
+
+    PetscCall(SbOptionGiven(scope, keys[k], &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_%s is of an outlet, and there is none: give "
+               "-effect_%s_outlet_resistance (Pa s/m^3)",
+               e->name, keys[k], e->name);
+  }
+  e->ops.save = NULL;
+  e->ops.load = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -321,6 +442,10 @@ static PetscErrorCode setup_cavity(SbEffect e, SbSpace space)
   Cavity *c = (Cavity *)e->data;
 
   PetscFunctionBeginUser;
+  PetscCheck(e->dynamic || c->outlet.resistance == 0, space->comm, PETSC_ERR_USER_INPUT,
+             "effect %s: fluid leaves by -effect_%s_outlet_resistance in time: take another -time "
+             "than static",
+             e->name, e->name);
   PetscCall(SbPressureSetUp(e, space));
   PetscCheck(!c->surface.nrim, space->comm, PETSC_ERR_USER_INPUT,
              "%s: a cavity needs a closed surface, and this one has a rim of %" PetscInt_FMT
@@ -355,7 +480,7 @@ static PetscErrorCode tangent_cavity(SbEffect e, SbSpace space, const SbStage *s
 
   /* dV/dx, up to its sign, and -dp/dV */
   PetscCall(fill(e, space, stage, &now));
-  factor = stage->shift_k * c->exponent * (now.p + c->modulus) / now.V;
+  factor = -stage->shift_k * now.slope;
   PetscCall(PetscArrayzero(c->g, 3 * space->nnode));
   PetscCall(SbPressureAddForce(&c->surface, space, 1., stage->u, c->g));
   PetscCall(SbSpaceUpdateGhosts(space, c->g));
@@ -372,15 +497,54 @@ static PetscErrorCode tangent_cavity(SbEffect e, SbSpace space, const SbStage *s
 
 static PetscErrorCode accept_cavity(SbEffect e, SbSpace space, const SbStage *stage)
 {
+  Cavity *c = (Cavity *)e->data;
   Filling now;
 
   PetscFunctionBeginUser;
   PetscCall(fill(e, space, stage, &now));
-  ((Cavity *)e->data)->kept = now.p;
+  c->kept = now.p;
+  c->outlet.left += now.flow * (stage->t - c->outlet.t);
+  c->outlet.vessel = now.vessel;
+  c->outlet.flow = now.flow;
+  c->outlet.t = stage->t;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The volume, m^3, on all ranks; the pressure, Pa, and the fluid's energy, J, on the first one. */
+/* One record, on the first rank. */
+static PetscErrorCode save_cavity(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
+{
+  const Outlet *out = &((const Cavity *)e->data)->outlet;
+
+  PetscFunctionBeginUser;
+  *n = !space->rank;
+  PetscCall(PetscMalloc1(4, records));
+  (*records)[0] = out->t;
+  (*records)[1] = out->left;
+  (*records)[2] = out->vessel;
+  (*records)[3] = out->flow;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode load_cavity(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[],
+                                  PetscInt n, const PetscReal records[])
+{
+  Outlet *out = &((Cavity *)e->data)->outlet;
+
+  PetscFunctionBeginUser;
+  (void)space;
+  (void)t;
+  (void)u;
+  if (n < 1)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  out->t = records[0];
+  out->left = records[1];
+  out->vessel = records[2];
+  out->flow = records[3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The volume, m^3, on all ranks; the pressure, Pa, and the fluid's energy, J, on the first one; of
+   an outlet the flow, m^3/s, and the pressure behind it, Pa. */
 static PetscErrorCode history_cavity(SbEffect e, SbSpace space, const SbStage *stage,
                                      const PetscReal residual[], PetscReal values[])
 {
@@ -397,6 +561,10 @@ static PetscErrorCode history_cavity(SbEffect e, SbSpace space, const SbStage *s
   if (!SbEffectActs(e, stage->t))
     PetscFunctionReturn(PETSC_SUCCESS);
   values[1] = now.p;
+  if (c->outlet.resistance > 0) {
+    values[3] = now.flow;
+    values[4] = now.vessel;
+  }
   if (n == 1)
     values[2] = c->modulus * (now.V - now.fluid - now.fluid * PetscLogReal(now.V / now.fluid));
   else
@@ -431,6 +599,8 @@ const SbEffectType SbEffectCavity = {
           .force = SbPressureForce,
           .tangent = tangent_cavity,
           .accept = accept_cavity,
+          .save = save_cavity,
+          .load = load_cavity,
           .history = history_cavity,
           .destroy = destroy_cavity},
 };

@@ -95,9 +95,10 @@ static const char *unit_of(const char *column)
 {
   static const struct {
     const char *word, *unit;
-  } units[] = {{"torque", "N m"}, {"force", "N"},  {"reaction", "N"},    {"penetration", "m"},
-               {"gap", "m"},      {"work", "J"},   {"energy", "J"},      {"loss", "J"},
-               {"volume", "m^3"}, {"area", "m^2"}, {"angle", "degrees"}, {"displacement", "m"}};
+  } units[] = {{"torque", "N m"},    {"force", "N"},       {"reaction", "N"}, {"penetration", "m"},
+               {"gap", "m"},         {"work", "J"},        {"energy", "J"},   {"loss", "J"},
+               {"volume", "m^3"},    {"pressure", "Pa"},   {"flow", "m^3/s"}, {"area", "m^2"},
+               {"angle", "degrees"}, {"displacement", "m"}};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
     if (strstr(column, units[i].word))

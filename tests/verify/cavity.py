@@ -118,8 +118,30 @@ run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 2e-3 -checkpoint_every_time 2e
 run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 4e-3 -checkpoint_every_time 2e-3 -restart latest", 1)
 near(last("swing-on")["air_pressure"], swing["air_pressure"][-1], 1e-6 * abs(swing["air_pressure"]).max(), "restart: pressure, Pa")
 
+# an outlet: what is pumped in steadily leaves by it, at last; its equations hold in each step, for a liquid and for a gas
+FLOW, R, C, DRAIN = 1e-4, 5e6, 1e-8, 3e6
+OUTLET = (scene("air", "p1") + f"-effect_air_type cavity -effect_air_added {FLOW}*t -effect_air_outlet_resistance {R} -effect_air_outlet_compliance {C} "
+          f"-effect_air_outlet_drain {DRAIN} -time euler_implicit -ts_dt 0.01 -ts_max_time 0.8 ")
+for what, more, n, M in (("liquid", "", 1, 2.2e9), ("gas", "-effect_air_modulus 101325 -effect_air_exponent 1.4 ", 1.4, 101325)):
+    run("outlet", OUTLET + more, 2)
+    out = history("outlet")
+    near(out["air_flow"][-1], FLOW, 1e-3 * FLOW, f"{what}: flow at last, m^3/s")
+    near(out["air_pressure"][-1], FLOW * (R + DRAIN), 1e-3 * FLOW * (R + DRAIN), f"{what}: pressure at last, Pa")
+    held = out["air_volume"][0] + FLOW * out["time"] - numpy.cumsum(out["air_flow"] * out["dt"])
+    near(abs((held / out["air_volume"]) ** n - 1 - out["air_pressure"] / M).max() * M, 0, 1e-5 * 800, f"{what}: pressure of what has not left, Pa, off")
+    vessel = C * numpy.diff(out["air_vessel_pressure"]) / out["dt"][1:] + out["air_vessel_pressure"][1:] / DRAIN - out["air_flow"][1:]
+    near(abs(vessel).max() / FLOW, 0, 1e-6, f"{what}: balance of the vessel, over the flow")
+    check(out["newton"].max() <= 8, f"{what}: {out['newton'].max()} iterations in a step")
+run("outlet-on", OUTLET + more + "-ts_max_time 0.3 -checkpoint_every_time 0.3", 1)
+run("outlet-on", OUTLET + more + "-ts_max_time 0.8 -checkpoint_every_time 0.3 -restart latest", 3)
+near(last("outlet-on")["air_pressure"], out["air_pressure"][-1], 1e-6 * out["air_pressure"][-1], "restart with an outlet: pressure, Pa")
+run("valve", OUTLET + "-effect_air_outlet_valve yes -effect_air_outlet_pressure 300 -effect_air_outlet_compliance 0 -effect_air_added 2e-5*sin(10*t)")
+valve = history("valve")
+check(valve["air_flow"].min() == 0 and valve["air_flow"].max() > 0, f"valve: flow from {valve['air_flow'].min()} to {valve['air_flow'].max()} m^3/s")
+check((valve["air_flow"][valve["air_pressure"] < 300] == 0).all() and valve["air_pressure"].min() < 0, "the valve is open below the pressure behind it")
+
 CAVITY = "-effect_air_type cavity -time static "
-ERRORS = ((scene("air", "cr") + CAVITY, "-effect_air_on"), (scene("air", "dg") + CAVITY, "-effect_air_on"),
+ERRORS = ((scene("air", "p1") + CAVITY + "-effect_air_outlet_resistance 1 ", "take another -time"), (scene("air", "p1") + CAVITY + "-effect_air_outlet_valve yes ", "-effect_air_outlet_valve"), (scene("air", "cr") + CAVITY, "-effect_air_on"), (scene("air", "dg") + CAVITY, "-effect_air_on"),
           (scene("air") + CAVITY + "-effect_air_added -1 ", "-effect_air_added"), (scene("air") + CAVITY + "-effect_air_modulus 1e14 ", "-effect_air_modulus"),
           (scene("air") + CAVITY + "-set_inside_at box:-1,-1,0,1,1,0.041 ", "-effect_air_on"), ("-bodies s " + "-body_s_mesh box:0.1,0.1,0.1:1 -body_s_material linear -body_s_young 1e5 "
           "-body_s_poisson 0.3 -body_s_density 1000 -sets inside -set_inside_at body:s -effects air -effect_air_on inside -effect_air_type cavity ", "-effect_air_on"), (scene("air") + "-effect_air_type cavity -time euler_explicit ", "euler_explicit"))
