@@ -111,10 +111,11 @@ struct _p_SbEffect {
   PetscBool no_potential; /* its force depends on the path: its work on a closed one is not zero */
   PetscBool holds;        /* its springs may hold a body that nothing else holds */
   PetscBool stiff; /* the stable step of explicit integrators does not know its springs, dampers */
-  PetscBool prescribed; /* it prescribes the nodes of its sets in all directions */
-  PetscInt nstate;      /* numbers in a record of save() */
-  PetscBool by_node;    /* the first of them is a node's original number. Default PETSC_FALSE */
-  PetscInt ncolumn;     /* history columns, known after set-up */
+  PetscInt njoined, joined[2]; /* bodies that a joint joins, from set-up on: they may overlap */
+  PetscBool prescribed;        /* it prescribes the nodes of its sets in all directions */
+  PetscInt nstate;             /* numbers in a record of save() */
+  PetscBool by_node; /* the first of them is a node's original number. Default PETSC_FALSE */
+  PetscInt ncolumn;  /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...: <name>_<column>; of the type or of `data` */
   char note[256]; /* note of the set-up for the run's header; "": none */

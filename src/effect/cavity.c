@@ -211,6 +211,7 @@ static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
   c->surface.follower = PETSC_TRUE;
   e->linear = e->steady = PETSC_FALSE;
   e->stiff = PETSC_TRUE;
+  e->nstate = 5;
 
   /* the outlet */
   PetscCall(SbOptionReal(scope, "outlet_resistance", &out->resistance));
@@ -222,8 +223,6 @@ static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
   if (out->resistance > 0) {
     e->column = outlet_columns;
     e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(outlet_columns);
-    e->nstate = 4;
-    e->no_potential = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
@@ -235,8 +234,6 @@ static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
                "-effect_%s_outlet_resistance (Pa s/m^3)",
                e->name, keys[k], e->name);
   }
-  e->ops.save = NULL;
-  e->ops.load = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -388,18 +385,39 @@ static PetscErrorCode find_walls(PetscInt n, const Facet facet[], PetscInt root[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a wall lies within the box of another one, around a cavity. */
-static PetscBool is_within(PetscInt n, const Wall wall[], const Wall *which)
+/* The solid angle of a wall seen from a place, in turns of 4 pi: -1 in the cavity that it is
+   around, 0 outside. Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983). */
+static PetscReal angle_of(PetscInt n, const Facet facet[], const PetscInt root[], PetscInt wall,
+                          const PetscReal at[3])
 {
-  for (PetscInt j = 0; j < n; j++) {
-    PetscBool in = (PetscBool)(wall[j].volume < 0);
+  PetscReal sum = 0;
 
-    for (int k = 0; k < 3; k++)
-      in = (PetscBool)(in && which->box[k] >= wall[j].box[k] &&
-                       which->box[3 + k] <= wall[j].box[3 + k]);
-    if (in)
-      return PETSC_TRUE;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal r[3][3], length[3], cross[3];
+    PetscReal below = 1;
+
+    if (root[i] != wall)
+      continue;
+    for (int c = 0; c < 3; c++) {
+      SbSubtract(facet[i].x[c], at, r[c]);
+      length[c] = PetscSqrtReal(SbDot3(r[c], r[c]));
+      below *= length[c];
+    }
+    for (int c = 0; c < 3; c++)
+      below += SbDot3(r[c], r[(c + 1) % 3]) * length[(c + 2) % 3];
+    SbCross(r[1], r[2], cross);
+    sum += 2 * PetscAtan2Real(SbDot3(r[0], cross), below);
   }
+  return sum / (4 * PETSC_PI);
+}
+
+/* Whether a wall, one of its facets at least, lies in a cavity that another one is around. */
+static PetscBool is_within(PetscInt n, const Facet facet[], const PetscInt root[],
+                           const Wall wall[], PetscInt which)
+{
+  for (PetscInt j = 0; j < n; j++)
+    if (root[j] == j && wall[j].volume < 0 && angle_of(n, facet, root, j, facet[which].x[0]) < -0.5)
+      return PETSC_TRUE;
   return PETSC_FALSE;
 }
 
@@ -424,7 +442,7 @@ static PetscErrorCode check_walls(SbEffect e, SbSpace space)
       continue;
     nchamber += wall[i].volume < 0;
     PetscCheck(
-      wall[i].volume < 0 || is_within(n, wall, &wall[i]), space->comm, PETSC_ERR_USER_INPUT,
+      wall[i].volume < 0 || is_within(n, facet, root, wall, i), space->comm, PETSC_ERR_USER_INPUT,
       "%s: a closed part of this surface, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) m, "
       "is around bodies of %.4g m^3, not around a cavity or in it: leave its sets out",
       e->on.option, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
@@ -513,11 +531,13 @@ static PetscErrorCode accept_cavity(SbEffect e, SbSpace space, const SbStage *st
 /* One record, on the first rank. */
 static PetscErrorCode save_cavity(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
-  const Outlet *out = &((const Cavity *)e->data)->outlet;
+  const Cavity *c = (const Cavity *)e->data;
+  const Outlet *out = &c->outlet;
 
   PetscFunctionBeginUser;
   *n = !space->rank;
-  PetscCall(PetscMalloc1(4, records));
+  PetscCall(PetscMalloc1(5, records));
+  (*records)[4] = c->kept;
   (*records)[0] = out->t;
   (*records)[1] = out->left;
   (*records)[2] = out->vessel;
@@ -540,6 +560,7 @@ static PetscErrorCode load_cavity(SbEffect e, SbSpace space, PetscReal t, const 
   out->left = records[1];
   out->vessel = records[2];
   out->flow = records[3];
+  ((Cavity *)e->data)->kept = records[4];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

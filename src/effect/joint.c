@@ -19,9 +19,10 @@
 
     e(q) = spring / 2 q^2 - drive(t) q + K/2 (q - given(t))^2 + K/2 (its excess over the limits)^2,
 
-  and a damper; K = k, times the square of the frame's size for an angle, whose difference from a
-  given one is that of a turn or less. E is no multiplier: the joint yields as k says, by default
-  FACTOR times the stiffness of the softer body of the two.
+  and a damper; K = k, times the square of the frame's size for an angle. An angle is followed from
+  step to step beyond half a turn; its difference from a given one is that of a turn or less. E is
+  no multiplier: the joint yields as k says, by default FACTOR times the stiffness of the softer
+  body of the two.
 
   Tangent: the exact second derivative, but of the damper's direction.
 */
@@ -52,13 +53,15 @@ typedef struct {
   SbFormula given, drive;               /* of q: degrees or m, NULL: free; N m or N, NULL: none */
   PetscReal at[3], axis[3], radius;     /* m, unit vector, m; 0: all nodes */
   PetscReal stiffness, spring, damping; /* k, N/m; of q: N m/rad and N m s, or N/m and N s/m */
-  PetscReal limit[2];                   /* of q, rad or m; infinite: none */
-  PetscReal size;                       /* of the frame, m */
-  PetscReal rest[POINTS][3];            /* the frame at rest, m */
-  PetscInt number;                      /* of the coupling; -1: none of its nodes is owned here */
-  PetscInt n;                           /* its nodes */
-  PetscReal *weight;                    /* [PLACES][n] of the nodes in the points */
-  PetscReal *work;                      /* [SIZE][3 n], then [3 n][3 n]: of the tangent */
+  PetscBool limited;
+  PetscReal limit[2];        /* of q, rad or m */
+  PetscReal kept;            /* q at the end of the last step, of a hinge, rad */
+  PetscReal size;            /* of the frame, m */
+  PetscReal rest[POINTS][3]; /* the frame at rest, m */
+  PetscInt number;           /* of the coupling; -1: none of its nodes is owned here */
+  PetscInt n;                /* its nodes */
+  PetscReal *weight;         /* [PLACES][n] of the nodes in the points */
+  PetscReal *work;           /* [SIZE][3 n], then [3 n][3 n]: of the tangent */
 } Joint;
 
 /* A node of a side, as ranks send it. */
@@ -185,12 +188,16 @@ static PetscErrorCode options_joint(SbEffect e, const SbScope *scope)
   PetscCheck(joint->limit[0] <= 0 && joint->limit[1] >= 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_limits %g,%g do not hold the state at rest, 0", e->name,
              (double)joint->limit[0], (double)joint->limit[1]);
-  for (int k = 0; k < 2 && given && kind == HINGE; k++) {
-    PetscCheck(PetscAbsReal(joint->limit[k]) <= 180, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_limits %g: limits of a hinge are between -180 and 180 degrees", e->name,
-               (double)joint->limit[k]);
+  PetscCheck(!given || !joint->given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_limits and a motor by -effect_%s_%s: what is given needs no limits",
+             e->name, e->name, kind == HINGE ? "angle" : "displacement");
+  PetscCheck(!joint->drive || !joint->given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_%s and -effect_%s_%s: a motor gives the motion or the effort, not both",
+             e->name, kind == HINGE ? "angle" : "displacement", e->name,
+             kind == HINGE ? "torque" : "force");
+  for (int k = 0; k < 2 && given && kind == HINGE; k++)
     joint->limit[k] *= PETSC_PI / 180;
-  }
+  joint->limited = given;
   PetscCall(SbOptionReal(scope, "stiffness", &joint->stiffness));
 
   e->column = kind == HINGE ? hinge_columns : kind == SLIDER ? slider_columns : free_columns;
@@ -198,7 +205,13 @@ static PetscErrorCode options_joint(SbEffect e, const SbScope *scope)
   e->linear = e->steady = PETSC_FALSE;
   e->stiff = PETSC_TRUE;
   e->holds = (PetscBool)!e->to.n;
-  e->no_potential = (PetscBool)(joint->damping > 0);
+  if (kind == HINGE) {
+    e->nstate = 1;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  e->ops.accept = NULL;
+  e->ops.save = NULL;
+  e->ops.load = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,6 +362,10 @@ static PetscErrorCode couplings_joint(SbEffect e, SbSpace space)
              "%s and %s are of one body, %s: a joint is between two", on[0]->option, on[1]->option,
              space->mesh->body[node[0][0].body].name);
 
+  e->njoined = nside;
+  for (int s = 0; s < nside; s++)
+    e->joined[s] = node[s][0].body;
+
   /* the frame, and the stiffness */
   joint->size = nside == 1 ? size[0] : PetscMin(size[0], size[1]);
   set_frame(joint);
@@ -397,6 +414,40 @@ static PetscErrorCode couplings_joint(SbEffect e, SbSpace space)
   if (joint->number >= 0)
     PetscCall(PetscMalloc1(3 * joint->n * (SIZE + 3 * joint->n), &joint->work));
   SbFormat(sizeof(e->note), e->note, "%s, %.4g N/m", kinds[joint->kind], (double)joint->stiffness);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Warnings of what the options come to. */
+static PetscErrorCode setup_joint(SbEffect e, SbSpace space)
+{
+  const Joint *joint = (const Joint *)e->data;
+  PetscInt nfree = 0;
+  int time = 0;
+
+  PetscFunctionBeginUser;
+  if (joint->number >= 0) {
+    const PetscInt *node = space->couplings.node + space->couplings.start[joint->number];
+
+    for (PetscInt a = 0; a < joint->n; a++)
+      nfree += node[a] < space->nnode_owned && (space->fixed[node[a]] & 7) != 7;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nfree, 1, MPIU_INT, MPI_SUM, space->comm));
+  if (!nfree)
+    PetscCall(
+      SbWarning(space->comm,
+                "effect %s: supports hold all that this joint joins: its motor, springs and "
+                "forces move nothing; leave a side free, or the joint out",
+                e->name));
+
+  /* newmark, genalpha */
+  if (SbOptionFind(&SbRunScope, "time"))
+    PetscCall(SbOptionChoice(&SbRunScope, "time", &time));
+  if (joint->limited && e->dynamic && (time == 1 || time == 2))
+    PetscCall(SbWarning(space->comm,
+                        "effect %s: a stop of -effect_%s_limits that is hit at speed makes energy "
+                        "with this -time, as it is stiff and comes within a step; take "
+                        "euler_implicit, or watch load_work",
+                        e->name, e->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -464,8 +515,8 @@ static PetscReal slide(const State *now, PetscReal dq[], PetscReal ddq[])
   return q;
 }
 
-/* q of a hinge, the angle of a = A_2 - A_0 among b = B_2 - B_0 and B_3 - B_0, and its derivatives
-   by these: dq[3][3], ddq[9][9]. */
+/* q of a hinge up to a turn, the angle of a = A_2 - A_0 among b = B_2 - B_0 and B_3 - B_0, and its
+   derivatives by these: dq[3][3], ddq[9][9]. */
 static PetscReal turn(const State *now, PetscReal dq[], PetscReal ddq[])
 {
   PetscReal a[3], b[2][3], c, s, r2;
@@ -514,6 +565,8 @@ static PetscErrorCode add_coordinate(SbEffect e, const SbStage *stage, State *no
 
   PetscFunctionBeginUser;
   now->q = slides ? slide(now, dq, ddq) : turn(now, dq, ddq);
+  if (!slides)
+    now->q += 2 * PETSC_PI * PetscFloorReal((joint->kept - now->q) / (2 * PETSC_PI) + 0.5);
   first = joint->spring * now->q;
   second = joint->spring;
   now->energy += joint->spring / 2 * PetscSqr(now->q);
@@ -640,6 +693,45 @@ static PetscErrorCode tangent_joint(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of hinges: the angle is followed. */
+static PetscErrorCode accept_joint(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Joint *joint = (Joint *)e->data;
+  State now;
+
+  PetscFunctionBeginUser;
+  if (joint->number < 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_state(e, space, stage, &now));
+  joint->kept = now.q;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One record, of the owner of the first node. */
+static PetscErrorCode save_joint(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
+{
+  const Joint *joint = (const Joint *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(1, records));
+  (*records)[0] = joint->kept;
+  *n = joint->number >= 0 &&
+       space->couplings.node[space->couplings.start[joint->number]] < space->nnode_owned;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode load_joint(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[],
+                                 PetscInt n, const PetscReal records[])
+{
+  PetscFunctionBeginUser;
+  (void)space;
+  (void)t;
+  (void)u;
+  if (n > 0)
+    ((Joint *)e->data)->kept = records[0];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Force, N, and moment about the joint, N m, on the first body; by how much it has come apart, m;
    energy, J; angle, degrees, or way, m. Counted by the owner of the first node. */
 static PetscErrorCode history_joint(SbEffect e, SbSpace space, const SbStage *stage,
@@ -694,8 +786,12 @@ const SbEffectType SbEffectJoint = {
   .row = rows,
   .ops = {.setfromoptions = options_joint,
           .couplings = couplings_joint,
+          .setup = setup_joint,
           .force = force_joint,
           .tangent = tangent_joint,
+          .accept = accept_joint,
+          .save = save_joint,
+          .load = load_joint,
           .history = history_joint,
           .destroy = destroy_joint},
 };

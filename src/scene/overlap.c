@@ -51,8 +51,8 @@ static PetscErrorCode find_boxes(SbMesh mesh, const PetscReal x[], PetscReal box
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* in[effect * nbody + b]: whether a contact between bodies acts on body b; row `neffect`: whether
-   there is one on all bodies. Collective. */
+/* in[effect * nbody + b]: whether a contact between bodies acts on body b, or a joint has it.
+   Collective. */
 static PetscErrorCode find_contacts(SbModel m, PetscBool in[])
 {
   PetscFunctionBeginUser;
@@ -63,6 +63,8 @@ static PetscErrorCode find_contacts(SbModel m, PetscBool in[])
     PetscBool obstacle;
     PetscInt n;
 
+    for (PetscInt k = 0; k < effect->njoined; k++)
+      in[e * m->nbody + effect->joined[k]] = PETSC_TRUE;
     if (!effect->contact)
       continue;
     SbScopeSet(&scope, "effect", effect->type, effect->name);

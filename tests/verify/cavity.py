@@ -116,6 +116,11 @@ near(made[0] / made[1], 4, 1.2, "its error, over that with half the step")
 near(abs(swing["momentum_x"]).max() + abs(swing["momentum_z"]).max(), 0, 1e-9, "swinging: momentum, N s")
 run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 2e-3 -checkpoint_every_time 2e-3", 3)
 run("swing-on", SWING + "-ts_dt 5e-5 -ts_max_time 4e-3 -checkpoint_every_time 2e-3 -restart latest", 1)
+filled = scene("air", "p1") + "-effect_air_type cavity -effect_air_added 4e-5*min(t/0.05,1) -time euler_implicit -ts_dt 0.005 -checkpoint_every_time 0.05 -ts_max_time "
+run("filled", filled + "0.06", 2)
+run("filled-on", filled + "0.05", 2)
+run("filled-on", filled + "0.06 -restart latest", 2)
+check(abs(history("filled-on")["newton"] - history("filled")["newton"]).max() <= 1, f"iterations after a restart: {history('filled-on')['newton'][-3:]}, in one run {history('filled')['newton'][-3:]}")
 near(last("swing-on")["air_pressure"], swing["air_pressure"][-1], 1e-6 * abs(swing["air_pressure"]).max(), "restart: pressure, Pa")
 
 # an outlet: what is pumped in steadily leaves by it, at last; its equations hold in each step, for a liquid and for a gas
@@ -157,7 +162,8 @@ text = run("two", TWO + "-effect_air_on inside,other -quiet no ")
 check("2 chambers" in text, text)
 near(history("two")["air_volume"][0] / rest, 2, 1e-9, "two chambers: volume, over that of one")
 BOX = TWO.replace(f"-body_r_mesh {MESH}", "-body_r_mesh box:0.05,0.05,0.05:1") + "-set_other_at body:r "
-for options, words in ((BOX + "-effect_air_on inside,stone ", "leave its sets out"), (TWO + "-effects air,more -effect_more_type cavity -effect_more_on inside ", "in common")):
+CORNER = BOX + "-body_r_translate 0.0255,0.0255,0.0255 -body_r_mesh box:0.004,0.004,0.004:1 -set_other_at body:r "
+for options, words in ((BOX + "-effect_air_on inside,stone ", "leave its sets out"), (CORNER + "-effect_air_on inside,stone ", "leave its sets out"), (TWO + "-effects air,more -effect_more_type cavity -effect_more_on inside ", "in common")):
     text = run("error", options, code=1)
     check(words in text, f"{words}: {text}")
 near(len(run("within", BOX + "-body_r_translate -0.01,-0.01,-0.01 -body_r_mesh box:0.02,0.02,0.02:1 -set_other_at body:r -effect_air_on inside,stone ")), 0, 0, "a body in the cavity: no message")

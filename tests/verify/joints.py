@@ -83,7 +83,7 @@ run("motor", SPIN + "-effect_hip_angle 2000*t^2 -time newmark -ts_dt 1e-3")
 rate = 2 * numpy.radians(2000)
 near(history("motor")["hip_torque_y"][-200:].mean(), END * rate, 0.01 * END * rate, "motor by angle: mean torque, N m")
 near(last("motor")["kinetic"] / last("motor")["load_work"], 1, 2e-3, "its work over the kinetic energy")
-near(last("motor")["hip_angle"], (2000 * 0.25 + 180) % 360 - 180, 0.05, "its angle, degrees, turned more than once")
+near(last("motor")["hip_angle"], 2000 * 0.25, 0.05, "its angle, degrees, turned more than once")
 
 run("driven", SPIN + "-effect_hip_torque 0.01 -time newmark -ts_max_time 0.2")
 near(last("driven")["hip_angle"], numpy.degrees(0.01 * 0.04 / (2 * END)), 0.02, "motor by torque: angle, degrees")
@@ -96,6 +96,17 @@ near(0.2 * angle, MASS * G * LENGTH / 2 * numpy.cos(angle), 1e-5, "static spring
 # limits: it falls to 30 degrees and stays, with a damper
 run("limit", ONE.replace("newmark", "euler_implicit") + "-effect_hip_limits -90,30 -effect_hip_damping 0.002 -ts_dt 0.005 -ts_max_time 1")
 near(last("limit")["hip_angle"], 30, 0.02, "limit: angle, degrees")
+
+# beyond half a turn: a spring draws back all the way, a stop is where it is, and a run that goes on knows
+run("whole", SPIN + "-effect_hip_spring 0.1 -effects hip,more -effect_more_type joint -effect_more_on a -effect_more_at 0,0,0 -effect_more_axis 0,1,0 -effect_more_angle 300*t "
+    "-time static -static_steps 20")
+near(last("whole")["more_torque_y"], 0.1 * numpy.radians(300), 1e-5, "motor against a spring at 300 degrees: torque, N m")
+TURN = SPIN + "-effect_hip_torque 0.02 -effect_hip_damping 0.005 -effect_hip_limits -90,400 -ts_max_time 3 -checkpoint_every_time 1.5 "
+run("stop", TURN)
+near(last("stop")["hip_angle"], 400, 0.05, "stop at 400 degrees: angle")
+run("stop-on", TURN + "-ts_max_time 1.5")
+run("stop-on", TURN + "-restart latest", 2)
+near(last("stop-on")["hip_angle"], last("stop")["hip_angle"], 1e-5, "restart beyond half a turn: angle, degrees")
 
 # sliders: down a slope of 30 degrees by g t^2 / 2 sin; by a force against a spring; by a motor
 SLOPE = ("-bodies a " + ROD.format("a", "0,-0.01,-0.01") + "-effects gravity,rail -effect_rail_type joint -effect_rail_on a -effect_rail_kind slider "
@@ -152,11 +163,15 @@ check(mixed["newton"].max() <= 8, f"{mixed['newton'].max()} iterations")
 
 FLAT = BAR.replace("box:-1,-1,-1,0.051,1,1", "plane:1,0,0,0") + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_at 0,0,0 "
 ERRORS = ((SPIN.replace("-effect_hip_axis 0,1,0", ""), "-effect_hip_axis"), (SPIN.replace("-effect_hip_kind hinge -effect_hip_axis 0,1,0", "-effect_hip_kind ball") + "-effect_hip_angle 1 ", "-effect_hip_angle"),
-          (FLAT + "-effect_clamp_kind weld ", "in a plane"), (BAR + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_at 0,0,0 -effect_clamp_kind weld -effect_clamp_radius 1e-3 ", "four or more"), (SPIN + "-effect_hip_to a ", "of one body"), (SPIN + "-effect_hip_limits 10,20 ", "-effect_hip_limits"), (SPIN + "-effect_hip_limits 0,200 ", "-effect_hip_limits"),
+          (FLAT + "-effect_clamp_kind weld ", "in a plane"), (BAR + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_at 0,0,0 -effect_clamp_kind weld -effect_clamp_radius 1e-3 ", "four or more"), (SPIN + "-effect_hip_to a ", "of one body"), (SPIN + "-effect_hip_limits 10,20 ", "-effect_hip_limits"), (SPIN + "-effect_hip_limits -10,10 -effect_hip_angle t ", "-effect_hip_limits"), (SPIN + "-effect_hip_torque 1 -effect_hip_angle t ", "-effect_hip_torque"),
           (TWO.replace("-effect_knee_on b -effect_knee_to a", "-effect_knee_on a,b") + "-effect_knee_kind ball ", "two bodies"), (BAR.replace("static", "euler_explicit") + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_kind weld -effect_clamp_at 0,0,0 ", "clamp"), (SPIN + "-effect_hip_displacement 1 ", "-effect_hip_displacement"))
 for options, words in ERRORS:
     text = run("error", options, code=1)
     check(words in text, f"{words}: {text}")
 text = run("far", SPIN + "-effect_hip_at 5,0,0 -ts_max_time 0.005 ")
 check("warning" in text and "away from" in text, text)
+for options, words in ((ONE + "-effect_hip_limits -1,1 -ts_max_time 0.01 ", "makes energy"), (SPIN + "-effects hip,hold -effect_hold_type fixed -effect_hold_on a -ts_max_time 0.005 ", "supports hold all"),
+                       (TWO.replace('0.2,-0.01', '0.19,-0.01') + "-effect_knee_kind ball -ts_max_time 0.005 ", "")):
+    text = run("said", options)
+    check(words in text if words else "warning" not in text, f"{words or 'no warning'}: {text}")
 finish()
