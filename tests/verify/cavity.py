@@ -120,7 +120,7 @@ filled = scene("air", "p1") + "-effect_air_type cavity -effect_air_added 4e-5*mi
 run("filled", filled + "0.06", 2)
 run("filled-on", filled + "0.05", 2)
 run("filled-on", filled + "0.06 -restart latest", 2)
-check(abs(history("filled-on")["newton"] - history("filled")["newton"]).max() <= 1, f"iterations after a restart: {history('filled-on')['newton'][-3:]}, in one run {history('filled')['newton'][-3:]}")
+check(history("filled-on")["newton"].max() <= history("filled")["newton"].max() + 1, f"iterations after a restart: {history('filled-on')['newton'][-3:]}, in one run {history('filled')['newton'][-3:]}")
 near(last("swing-on")["air_pressure"], swing["air_pressure"][-1], 1e-6 * abs(swing["air_pressure"]).max(), "restart: pressure, Pa")
 
 # an outlet: what is pumped in steadily leaves by it, at last; its equations hold in each step, for a liquid and for a gas
