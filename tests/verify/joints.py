@@ -60,13 +60,13 @@ TWO = ("-bodies a,b " + ROD.format("a", "0,-0.01,-0.01") + ROD.format("b", "0.2,
 
 
 def double(y):
-    """Angles below the horizontal and their rates, of two rods with mass m, length l, moment I about the middle."""
-    m, l, i = MASS, LENGTH, MIDDLE
+    """Angles below the horizontal and their rates, of two rods."""
     difference = y[0] - y[1]
-    cross = m * l * l / 2 * numpy.cos(difference)
-    matrix = [[i + m * l * l / 4 + m * l * l, cross], [cross, i + m * l * l / 4]]
-    turning = m * l * l / 2 * numpy.sin(difference)
-    force = [1.5 * m * G * l * numpy.cos(y[0]) - turning * y[3] ** 2, 0.5 * m * G * l * numpy.cos(y[1]) + turning * y[2] ** 2]
+    moment = MASS * LENGTH**2 / 2
+    matrix = [[MIDDLE + 2.5 * moment, moment * numpy.cos(difference)], [moment * numpy.cos(difference), MIDDLE + moment / 2]]
+    turning = moment * numpy.sin(difference)
+    weight = MASS * G * LENGTH / 2
+    force = [3 * weight * numpy.cos(y[0]) - turning * y[3] ** 2, weight * numpy.cos(y[1]) + turning * y[2] ** 2]
     return numpy.concatenate([y[2:], numpy.linalg.solve(matrix, force)])
 
 

@@ -3,8 +3,6 @@
 A skin on a block so soft that it bears nothing is stretched as rubber sheet is, with P1 and P2, on 1 and 3 ranks. Surface tension of a cube compresses it
 by the mean of the stress, 2 s A / (3 V). A block with a skin that is let go keeps energy and momentum. What is no skin is an error.
 """
-import numpy
-
 from scene_common import check, finish, history, near, start
 
 COMMON = "-quiet -output_fields none -output_precision double -reproducible -snes_rtol 1e-10 -ksp_rtol 1e-10 "
