@@ -71,6 +71,7 @@ def hertz_scene():
 -effect_far_displacement x*{side};y*{side};-{c:.15g}*({2 * (1 - nu):.15g}/{r}+z^2/{r}^3)
 -effect_ball_type contact
 -effect_ball_on meet
+-effect_ball_response projected
 -effect_ball_obstacle sphere:0,0,{HERTZ["radius"] - depth:.15g},{HERTZ["radius"]:g}
 -time static
 """
@@ -130,6 +131,7 @@ SCENES = {
 -effects gravity,floor
 -effect_floor_type contact
 -effect_floor_obstacle plane:0,0,1,0
+-effect_floor_response projected
 -ts_max_time 0.35
 """,
 }
