@@ -12,7 +12,9 @@
      Contact between bodies, which A lacks, counts as a row for each active pair, with the largest
      entry of D as its stiffness.
 
-  Not found: parts that are free only together, connected by contact. A part on springs whose
+  Parts that effects join, as joints and ties, may be free only together: where no part alone is,
+  those with common couplings are examined as one. Not found: parts that contact connects. A part on
+  springs whose
   stiffness is within the rounding of that of its cells counts as free.
 */
 #include "sbgeometry.h"
@@ -23,9 +25,9 @@
 #define FREE 1e-13    /* largest l of a free motion: sums over the nodes have rounding of 1e-15 */
 #define FAR 1e6 /* displacement over the body's size beyond which a static system was singular */
 
-/* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees
-   it. */
-static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
+/* label[nnode_owned]: the lowest global number of a node's part; joined: with what couplings join
+   to it. Collective; the caller frees it. */
+static PetscErrorCode label_parts(SbSpace s, PetscBool joined, PetscInt **label)
 {
   PetscInt *parent, *lowest;
   PetscBool changed = PETSC_TRUE;
@@ -54,6 +56,10 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
                           s->batch_clique[(s->width * b + 4) * SB_BATCH + k]);
     }
   }
+
+  for (PetscInt c = 0; c < s->couplings.n && joined; c++)
+    for (PetscInt k = s->couplings.start[c] + 1; k < s->couplings.start[c + 1]; k++)
+      (void)SbUnionJoin(parent, s->couplings.node[k - 1], s->couplings.node[k]);
 
   /* the lowest number in parts on several ranks: exchanged with the owners until it does not
      change */
@@ -106,20 +112,22 @@ static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
 {
   SbSpace s = run->model->space;
-  PetscReal sum[6] = {0.}; /* sums: nodes, coordinates, squares, body */
+  PetscReal sum[5] = {0.}; /* sums: nodes, coordinates, squares */
   const PetscScalar *u;
 
   PetscFunctionBeginUser;
+  part->body = run->model->nbody;
   PetscCall(VecGetArrayRead(run->state.U, &u));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] != part->label)
       continue;
+    part->body = PetscMin(part->body, s->node_body[i]);
     sum[0] += 1.;
     for (PetscInt c = 0; c < 3; c++)
       sum[1 + c] += coordinate(s, u, 3 * i + c);
-    sum[5] += s->node_body[i];
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 6, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &part->body, 1, MPIU_INT, MPI_MIN, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 5, MPIU_REAL, MPI_SUM, s->comm));
   for (int c = 0; c < 3; c++)
     part->centre[c] = sum[1 + c] / sum[0];
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -131,7 +139,6 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscCall(VecRestoreArrayRead(run->state.U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum[4], 1, MPIU_REAL, MPI_SUM, s->comm));
   part->size = PetscSqrtReal(sum[4] / sum[0]);
-  part->body = (PetscInt)(sum[5] / sum[0] + 0.5);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,30 +396,21 @@ static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
+/* Among parts, or joined ones, the first with a free motion. */
+static PetscErrorCode find_free(SbRun run, PetscBool joined, Vec d, Mat C, PetscInt *body,
+                                size_t size, char motion[], Vec along)
 {
   const SbSpace s = run->model->space;
   PetscInt *label, *own, *list;
   PetscInt mine = 0;
   PetscInt npart = 0;
   PetscInt nbrother = 0;
-  PetscBool diagonal;
   Part part;
-  Vec d;
-  Mat C;
 
   PetscFunctionBeginUser;
-  *body = -1;
-  PetscCall(MatHasOperation(run->solve.J, MATOP_GET_DIAGONAL, &diagonal));
-  if (!diagonal)
-    PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
 
-  /* the first part with a free motion; the labels of all parts are sorted, the same on all ranks */
-  PetscCall(SbSpaceCreateVec(s, &d));
-  PetscCall(MatGetDiagonal(run->solve.J, d));
-  PetscCall(VecAbs(d));
-  PetscCall(find_rows(run, &C));
-  PetscCall(label_parts(s, &label));
+  /* the labels of all parts are sorted, the same on all ranks */
+  PetscCall(label_parts(s, joined, &label));
   PetscCall(PetscMalloc1(s->nnode_owned, &own));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     if (label[i] == s->gnode[i])
@@ -435,10 +433,35 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
       nbrother += other.body == *body;
     }
     PetscCall(describe(run, label, &part, nbrother, size, motion));
+    if (joined)
+      SbAppend(size, motion, ", with all that effects join to it");
   }
   PetscCall(PetscFree(label));
   PetscCall(PetscFree(own));
   PetscCall(PetscFree(list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
+{
+  const SbSpace s = run->model->space;
+  PetscBool diagonal;
+  PetscBool coupled = (PetscBool)(s->couplings.n > 0);
+  Vec d;
+  Mat C;
+
+  PetscFunctionBeginUser;
+  *body = -1;
+  PetscCall(MatHasOperation(run->solve.J, MATOP_GET_DIAGONAL, &diagonal));
+  if (!diagonal)
+    PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
+  PetscCall(SbSpaceCreateVec(s, &d));
+  PetscCall(MatGetDiagonal(run->solve.J, d));
+  PetscCall(VecAbs(d));
+  PetscCall(find_rows(run, &C));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &coupled, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  for (int joined = 0; joined <= (int)coupled && *body < 0; joined++)
+    PetscCall(find_free(run, (PetscBool)joined, d, C, body, size, motion, along));
   PetscCall(MatDestroy(&C));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -164,6 +164,8 @@ check(mixed["newton"].max() <= 8, f"{mixed['newton'].max()} iterations")
 FLAT = BAR.replace("box:-1,-1,-1,0.051,1,1", "plane:1,0,0,0") + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_at 0,0,0 "
 ERRORS = ((SPIN.replace("-effect_hip_axis 0,1,0", ""), "-effect_hip_axis"), (SPIN.replace("-effect_hip_kind hinge -effect_hip_axis 0,1,0", "-effect_hip_kind ball") + "-effect_hip_angle 1 ", "-effect_hip_angle"),
           (FLAT + "-effect_clamp_kind weld ", "in a plane"), (BAR + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_at 0,0,0 -effect_clamp_kind weld -effect_clamp_radius 1e-3 ", "four or more"), (SPIN + "-effect_hip_to a ", "of one body"), (SPIN + "-effect_hip_limits 10,20 ", "-effect_hip_limits"), (SPIN + "-effect_hip_limits -10,10 -effect_hip_angle t ", "-effect_hip_limits"), (SPIN + "-effect_hip_torque 1 -effect_hip_angle t ", "-effect_hip_torque"),
+          (TWO.replace("-time newmark", "-time static").replace("gravity,", "") + "-effect_knee_kind weld -effects hip,knee,push -effect_push_type body_force -effect_push_density 0;0;100 ",
+           "join to it"),
           (TWO.replace("-effect_knee_on b -effect_knee_to a", "-effect_knee_on a,b") + "-effect_knee_kind ball ", "two bodies"), (BAR.replace("static", "euler_explicit") + "-effects gravity,clamp -effect_clamp_type joint -effect_clamp_kind weld -effect_clamp_at 0,0,0 ", "clamp"), (SPIN + "-effect_hip_displacement 1 ", "-effect_hip_displacement"))
 for options, words in ERRORS:
     text = run("error", options, code=1)
