@@ -17,7 +17,7 @@
 #define P_MULTIGRID 5000 /* a factorisation for P2, up to nu = NU_SLIVERS: as fast as p-multigrid */
 #define DIRECT_NEXT \
   200000 /* a factorisation with slivers from NU_PRESSURE on, or as first fallback */
-#define SADDLE_STATIC 30000 /* a factorisation with multipliers; docs/reports/contact.md */
+#define SADDLE_STATIC 30000 /* a factorisation with multipliers; not measured beside others */
 #define SADDLE_DYNAMIC 1000
 
 /* Poisson's ratio ... */
