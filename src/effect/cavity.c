@@ -29,9 +29,14 @@
   by the implicit Euler method from the end of the last step: p_c is linear in Q, Q in p, and the
   equation for p above has one root.
 
+  Openings may be closed by lids: each rim of the wall gets a fan of triangles around the mean of
+  its vertices, which moves with them and bears nothing but the pressure. They are facets like those
+  of pressure.c, with that mean in the place of a node.
+
   In a static run an `added` without t grows with the load factor. Bodies have nodes at vertices: P1
   and P2.
 */
+#include "lid.h"
 #include "pressure.h"
 #include "sbgeometry.h"
 
@@ -56,6 +61,8 @@ typedef struct {
 
 typedef struct {
   SbPressure surface;
+  PetscBool has_lids;
+  SbLids lids;
   Outlet outlet;
   SbFormula added; /* m^3 */
   PetscReal modulus, exponent;
@@ -88,6 +95,8 @@ static const SbOption rows[] = {
   {"exponent", SB_OPTION_REAL, 1, "", "1", "[1, 10]",
    "n of p V^n: 1 for liquids and gases at constant temperature, 1.4 for air that exchanges no "
    "heat"},
+  {"lids", SB_OPTION_BOOL, 1, "", "false", "",
+   "openings of the wall are closed by lids that bear nothing: its rims bear their pressure"},
   {"outlet_resistance", SB_OPTION_REAL, 1, "Pa s/m^3", "0", "[0, inf)",
    "pressure over the flow that leaves by an outlet; 0: there is none"},
   {"outlet_compliance", SB_OPTION_REAL, 1, "m^3/Pa", "0", "[0, inf)",
@@ -167,6 +176,7 @@ static PetscErrorCode fill(SbEffect e, SbSpace space, const SbStage *stage, Fill
     "drawn out",
     e->name, (double)(now->fluid - c->rest), (double)stage->t, (double)c->rest);
   PetscCall(SbPressureInside(&c->surface, space, stage->u, &now->V));
+  now->V += SbLidsInside(&c->lids, space, c->number, stage->u);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now->V, 1, MPIU_REAL, MPI_SUM, space->comm));
   now->V *= c->surface.sign;
 
@@ -207,6 +217,7 @@ static PetscErrorCode options_cavity(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectFormulas(e, scope, "added", 1, PETSC_FALSE, &c->added));
   PetscCall(SbOptionReal(scope, "modulus", &c->modulus));
   PetscCall(SbOptionReal(scope, "exponent", &c->exponent));
+  PetscCall(SbOptionBool(scope, "lids", &c->has_lids));
   c->surface.at = pressure_at;
   c->surface.follower = PETSC_TRUE;
   e->linear = e->steady = PETSC_FALSE;
@@ -262,8 +273,9 @@ static PetscErrorCode couplings_cavity(SbEffect e, SbSpace space)
 {
   Cavity *c = (Cavity *)e->data;
   SbFacet *facets;
+  SbWallFacet *facet;
   PetscInt *mine, *all;
-  PetscInt nfacet;
+  PetscInt nfacet, nall;
   PetscInt n = 0;
   PetscReal wall = 0;
 
@@ -294,6 +306,7 @@ static PetscErrorCode couplings_cavity(SbEffect e, SbSpace space)
         mine[n++] = space->gnode[SbSpaceCellNode(space, cell, a)];
     }
   }
+  PetscCall(SbWallGather(space, nfacet, facets, &nall, &facet));
   PetscCall(PetscFree(facets));
   PetscCall(choose_modulus(e, space, wall));
   PetscCall(PetscSortRemoveDupsInt(&n, mine));
@@ -307,16 +320,13 @@ static PetscErrorCode couplings_cavity(SbEffect e, SbSpace space)
                         "all with each other: %.2g GB in the matrix; a coarser wall, or a pressure "
                         "in its place, is faster",
                         e->name, c->n, 72e-9 * (double)c->n * (double)c->n));
+  if (c->has_lids)
+    PetscCall(SbLidsFind(&c->lids, e, space->comm, nall, facet, c->n, all));
   PetscCall(SbSpaceCouple(space, c->n, all, &c->number));
   PetscCall(PetscFree(all));
+  PetscCall(PetscFree(facet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* A facet of the wall, as ranks send it. */
-typedef struct {
-  PetscInt vertex[3]; /* gvert */
-  PetscReal x[3][3];  /* m, counter-clockwise seen from outside of its body */
-} Facet;
 
 /* A closed surface among them. */
 typedef struct {
@@ -324,37 +334,10 @@ typedef struct {
   PetscReal box[6]; /* m */
 } Wall;
 
-/* The facets of all ranks. */
-static PetscErrorCode gather(const SbPressure *surface, SbSpace space, PetscInt *n, Facet **facet)
-{
-  const SbMesh mesh = space->mesh;
-  PetscInt nmine = 0;
-  Facet *mine;
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(surface->nfacet, &mine));
-  for (const SbFacet *f = surface->facet; f < surface->facet + surface->nfacet; f++) {
-    if (f->cell >= mesh->ncell_owned)
-      continue;
-    for (int c = 0; c < 3; c++) {
-      mine[nmine].vertex[c] = mesh->gvert[f->vertex[c]];
-      for (int k = 0; k < 3; k++)
-        mine[nmine].x[c][k] = mesh->x[3 * f->vertex[c] + k];
-    }
-    nmine++;
-  }
-  PetscCallMPI(MPI_Type_contiguous((int)sizeof(Facet), MPI_BYTE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(SbAllgatherv(space->comm, type, nmine, mine, n, facet, NULL));
-  PetscCallMPI(MPI_Type_free(&type));
-  PetscCall(PetscFree(mine));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The closed surfaces, apart from each other, of n facets: wall[n], of which those with a root have
    a volume; root[n] of each facet. */
-static PetscErrorCode find_walls(PetscInt n, const Facet facet[], PetscInt root[], Wall wall[])
+static PetscErrorCode find_walls(PetscInt n, const SbWallFacet facet[], PetscInt root[],
+                                 Wall wall[])
 {
   SbKey *corner; /* slot: 3 facet + corner */
 
@@ -387,8 +370,8 @@ static PetscErrorCode find_walls(PetscInt n, const Facet facet[], PetscInt root[
 
 /* The solid angle of a wall seen from a place, in turns of 4 pi: -1 in the cavity that it is
    around, 0 outside. Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983). */
-static PetscReal angle_of(PetscInt n, const Facet facet[], const PetscInt root[], PetscInt wall,
-                          const PetscReal at[3])
+static PetscReal angle_of(PetscInt n, const SbWallFacet facet[], const PetscInt root[],
+                          PetscInt wall, const PetscReal at[3])
 {
   PetscReal sum = 0;
 
@@ -412,7 +395,7 @@ static PetscReal angle_of(PetscInt n, const Facet facet[], const PetscInt root[]
 }
 
 /* Whether a wall, one of its facets at least, lies in a cavity that another one is around. */
-static PetscBool is_within(PetscInt n, const Facet facet[], const PetscInt root[],
+static PetscBool is_within(PetscInt n, const SbWallFacet facet[], const PetscInt root[],
                            const Wall wall[], PetscInt which)
 {
   for (PetscInt j = 0; j < n; j++)
@@ -428,11 +411,13 @@ static PetscErrorCode check_walls(SbEffect e, SbSpace space)
   const Cavity *c = (const Cavity *)e->data;
   PetscInt nchamber = 0;
   PetscInt n, *root;
-  Facet *facet;
+  SbWallFacet *facet;
   Wall *wall;
 
   PetscFunctionBeginUser;
-  PetscCall(gather(&c->surface, space, &n, &facet));
+  if (c->has_lids) /* parts that lids close are no closed surfaces by themselves */
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbWallGather(space, c->surface.nfacet, c->surface.facet, &n, &facet));
   PetscCall(PetscMalloc2(n, &root, n, &wall));
   PetscCall(find_walls(n, facet, root, wall));
   for (PetscInt i = 0; i < n; i++) {
@@ -455,28 +440,45 @@ static PetscErrorCode check_walls(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode history_cavity(SbEffect e, SbSpace space, const SbStage *stage,
+                                     const PetscReal residual[], PetscReal values[]);
+
 static PetscErrorCode setup_cavity(SbEffect e, SbSpace space)
 {
   Cavity *c = (Cavity *)e->data;
+  PetscInt columns;
 
   PetscFunctionBeginUser;
   PetscCheck(e->dynamic || c->outlet.resistance == 0, space->comm, PETSC_ERR_USER_INPUT,
              "effect %s: fluid leaves by -effect_%s_outlet_resistance in time: take another -time "
              "than static",
              e->name, e->name);
+  columns = e->ncolumn;
   PetscCall(SbPressureSetUp(e, space));
-  PetscCheck(!c->surface.nrim, space->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!c->surface.nrim || c->has_lids, space->comm, PETSC_ERR_USER_INPUT,
              "%s: a cavity needs a closed surface, and this one has a rim of %" PetscInt_FMT
-             " edges, the first at (%.4g, %.4g, %.4g) m: add the facets that close it",
+             " edges, the first at (%.4g, %.4g, %.4g) m: add the facets that close it, or give "
+             "-effect_%s_lids yes",
              e->on.option, c->surface.nrim, (double)c->surface.rim_at[0],
-             (double)c->surface.rim_at[1], (double)c->surface.rim_at[2]);
+             (double)c->surface.rim_at[1], (double)c->surface.rim_at[2], e->name);
+  PetscCall(SbPressureInside(&c->surface, space, NULL, &c->rest));
+  c->rest += SbLidsInside(&c->lids, space, c->number, NULL);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->rest, 1, MPIU_REAL, MPI_SUM, space->comm));
+
+  /* closed by them, it has a potential and a history */
+  if (c->has_lids) {
+    c->surface.sign = c->rest < 0 ? -1 : 1;
+    e->no_potential = PETSC_FALSE;
+    e->ops.history = history_cavity;
+    e->ncolumn = columns;
+    SbFormat(sizeof(e->note), e->note, "a cavity of %.6g m^3, with %" PetscInt_FMT " lid%s",
+             (double)PetscAbsReal(c->rest), c->lids.n, c->lids.n > 1 ? "s" : "");
+  }
   PetscCheck(c->surface.sign < 0, space->comm, PETSC_ERR_USER_INPUT,
              "%s: this surface is around bodies, not around a cavity: take the facets of the wall "
              "inside",
              e->on.option);
   PetscCall(check_walls(e, space));
-  PetscCall(SbPressureInside(&c->surface, space, NULL, &c->rest));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->rest, 1, MPIU_REAL, MPI_SUM, space->comm));
   c->rest *= c->surface.sign;
   PetscCall(PetscMalloc1(3 * space->nnode, &c->g));
   if (c->number >= 0)
@@ -484,15 +486,29 @@ static PetscErrorCode setup_cavity(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode force_cavity(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const Cavity *c = (const Cavity *)e->data;
+  PetscReal p = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(pressure_at(e, space, stage, &p));
+  PetscCall(SbPressureAddForce(&c->surface, space, p, stage->u, f));
+  SbLidsPush(&c->lids, space, c->number, p, stage->u, f);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode tangent_cavity(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   Cavity *c = (Cavity *)e->data;
   const PetscInt *node;
+  PetscReal bending = 0;
   PetscReal factor;
   Filling now;
 
   PetscFunctionBeginUser;
   c->bends = PETSC_TRUE;
+  PetscCall(pressure_at(e, space, stage, &bending));
   PetscCall(SbPressureTangent(e, space, stage, A));
   c->bends = PETSC_FALSE;
 
@@ -501,6 +517,7 @@ static PetscErrorCode tangent_cavity(SbEffect e, SbSpace space, const SbStage *s
   factor = -stage->shift_k * now.slope;
   PetscCall(PetscArrayzero(c->g, 3 * space->nnode));
   PetscCall(SbPressureAddForce(&c->surface, space, 1., stage->u, c->g));
+  SbLidsPush(&c->lids, space, c->number, 1., stage->u, c->g);
   PetscCall(SbSpaceUpdateGhosts(space, c->g));
   if (c->number < 0)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -509,6 +526,7 @@ static PetscErrorCode tangent_cavity(SbEffect e, SbSpace space, const SbStage *s
     for (PetscInt j = 0; j < 3 * c->n; j++)
       c->K[3 * c->n * i + j] =
         factor * c->g[3 * node[i / 3] + i % 3] * c->g[3 * node[j / 3] + j % 3];
+  SbLidsTurn(&c->lids, space, c->number, stage->shift_k * bending, stage->u, c->n, c->K);
   PetscCall(SbSpaceAddCoupling(space, A, c->number, c->K));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -599,6 +617,7 @@ static PetscErrorCode destroy_cavity(SbEffect e)
   Cavity *c = (Cavity *)e->data;
 
   PetscFunctionBeginUser;
+  PetscCall(SbLidsDestroy(&c->lids));
   PetscCall(PetscFree(c->g));
   PetscCall(PetscFree(c->K));
   PetscCall(SbPressureDestroy(e));
@@ -617,7 +636,7 @@ const SbEffectType SbEffectCavity = {
   .ops = {.setfromoptions = options_cavity,
           .couplings = couplings_cavity,
           .setup = setup_cavity,
-          .force = SbPressureForce,
+          .force = force_cavity,
           .tangent = tangent_cavity,
           .accept = accept_cavity,
           .save = save_cavity,
