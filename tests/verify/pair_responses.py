@@ -2,7 +2,7 @@
 
 Patch test: two blocks, one on the other, with meshes that do not match and sides that cannot move outwards, are pressed with 1e4 Pa: the
 stress is uniform, exactly so for multiplier and projected. A cube flies into another: momentum stays, no energy is made, nothing passes
-through anything, and no pair pulls. A block lands with generalized-alpha. Multipliers that do not settle. A block falls on a wider one, on 1, 2 and 3 ranks. A checkpoint in the middle of contact with friction.
+through anything, and no pair pulls. A block lands with generalized-alpha. Multipliers that do not settle. A block falls on a wider one, on 1 and 2 or 3 ranks. A checkpoint in the middle of contact with friction.
 A strip that is folded meets itself. What a response lacks is an error.
 """
 import re
@@ -185,9 +185,9 @@ def check_ranks():
         if response == "projected":
             options += " -body_b_element cr"
         run(f"ranks-{response}-1", options)
-        for ranks in (2, 3):
-            run(f"ranks-{response}-{ranks}", options, ranks)
-            compare("ranks", f"ranks-{response}-1", f"ranks-{response}-{ranks}", 1e-6)
+        ranks = 2 if response in ("penalty", "projected") else 3
+        run(f"ranks-{response}-{ranks}", options, ranks)
+        compare("ranks", f"ranks-{response}-1", f"ranks-{response}-{ranks}", 1e-6)
 
 
 def check_restart():
