@@ -141,6 +141,14 @@ static PetscErrorCode options_joint(SbEffect e, const SbScope *scope)
                                                "torque_x", "torque_y", "torque_z",
                                                "gap",      "energy",   "displacement"};
   Joint *joint = (Joint *)e->data;
+  const struct {
+    const char *key;
+    Kind kind;
+    SbFormula *to;
+  } motors[] = {{"angle", HINGE, &joint->given},
+                {"displacement", SLIDER, &joint->given},
+                {"torque", HINGE, &joint->drive},
+                {"force", SLIDER, &joint->drive}};
   PetscReal length;
   PetscBool given;
   Kind kind;
@@ -161,18 +169,11 @@ static PetscErrorCode options_joint(SbEffect e, const SbScope *scope)
              "-effect_%s_axis has no direction", e->name);
 
   /* of the coordinate */
-  PetscCall(given_for(e, scope, "angle", HINGE, HINGE, &given));
-  if (given)
-    PetscCall(SbEffectFormulas(e, scope, "angle", 1, PETSC_FALSE, &joint->given));
-  PetscCall(given_for(e, scope, "displacement", SLIDER, SLIDER, &given));
-  if (given)
-    PetscCall(SbEffectFormulas(e, scope, "displacement", 1, PETSC_FALSE, &joint->given));
-  PetscCall(given_for(e, scope, "torque", HINGE, HINGE, &given));
-  if (given)
-    PetscCall(SbEffectFormulas(e, scope, "torque", 1, PETSC_FALSE, &joint->drive));
-  PetscCall(given_for(e, scope, "force", SLIDER, SLIDER, &given));
-  if (given)
-    PetscCall(SbEffectFormulas(e, scope, "force", 1, PETSC_FALSE, &joint->drive));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(motors); k++) {
+    PetscCall(given_for(e, scope, motors[k].key, motors[k].kind, motors[k].kind, &given));
+    if (given)
+      PetscCall(SbEffectFormulas(e, scope, motors[k].key, 1, PETSC_FALSE, motors[k].to));
+  }
   PetscCall(given_for(e, scope, "spring", HINGE, SLIDER, &given));
   PetscCall(given_for(e, scope, "damping", HINGE, SLIDER, &given));
   PetscCall(given_for(e, scope, "limits", HINGE, SLIDER, &given));
