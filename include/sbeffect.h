@@ -89,9 +89,9 @@ typedef struct {
   SbEffectOps ops;
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
-  SbEffectCavity, SbEffectPointForce, SbEffectFoundation, SbEffectMembrane, SbEffectTie,
-  SbEffectJoint, SbEffectSpring, SbEffectCable, SbEffectFixed, SbEffectPrescribedDisplacement,
-  SbEffectDamping, SbEffectTorque;
+  SbEffectCavity, SbEffectPointForce, SbEffectFoundation, SbEffectMembrane, SbEffectMass,
+  SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable, SbEffectFixed,
+  SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];

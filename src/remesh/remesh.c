@@ -120,6 +120,11 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
                "-effect_%s_strength are not re-meshed: leave the options -remesh_ out, or the "
                "strength",
                m->effect[e]->name, m->effect[e]->name);
+  for (PetscInt e = 0; e < m->neffect; e++)
+    PetscCheck(strcmp(m->effect[e]->type, "mass") || !named, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "effect %s: the mass of a body that is re-meshed is its own: leave the options "
+               "-remesh_ out, or the effect",
+               m->effect[e]->name);
   if (!named && !r->nchange)
     PetscCall(SbRemeshDestroy(remesh));
   if (*remesh)

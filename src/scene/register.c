@@ -8,15 +8,13 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {&SbEffectGravity,  &SbEffectBodyForce,
-                                                &SbEffectTraction, &SbEffectPressure,
-                                                &SbEffectCavity,   &SbEffectFoundation,
-                                                &SbEffectMembrane, &SbEffectTie,
-                                                &SbEffectJoint,    &SbEffectSpring,
-                                                &SbEffectCable,    &SbEffectPointForce,
-                                                &SbEffectFixed,    &SbEffectPrescribedDisplacement,
-                                                &SbEffectTorque,   &SbEffectDamping,
-                                                &SbEffectContact};
+  static const SbEffectType *const effects[] = {
+    &SbEffectGravity,    &SbEffectBodyForce, &SbEffectTraction,
+    &SbEffectPressure,   &SbEffectCavity,    &SbEffectFoundation,
+    &SbEffectMembrane,   &SbEffectMass,      &SbEffectTie,
+    &SbEffectJoint,      &SbEffectSpring,    &SbEffectCable,
+    &SbEffectPointForce, &SbEffectFixed,     &SbEffectPrescribedDisplacement,
+    &SbEffectTorque,     &SbEffectDamping,   &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;
