@@ -114,7 +114,8 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define ROUNDING 1e-9 /* relative rounding of the end of a step */
+#define ROUNDING 1e-9   /* relative rounding of the end of a step */
+#define DIFFERENCE 1e-6 /* of the run: half the time over which a formula is differentiated */
 
 PetscBool SbEffectActs(SbEffect e, PetscReal t)
 {
@@ -152,6 +153,24 @@ PetscErrorCode SbEffectValueAt(SbEffect e, SbFormula formula, PetscReal t, Petsc
   PetscCall(SbFormulaEval(formula, t, NULL, value));
   if (!e->dynamic && !SbFormulaUses(formula, 't'))
     *value *= t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRateAt(SbEffect e, SbFormula formula, PetscReal t, PetscReal *rate)
+{
+  PetscReal end = 1;
+  PetscReal before, after, first, last;
+
+  PetscFunctionBeginUser;
+  *rate = 0;
+  if (!e->dynamic || !SbFormulaUses(formula, 't'))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsGetReal(NULL, NULL, "-ts_max_time", &end, NULL));
+  before = PetscMax(PetscMin(t, 0), t - DIFFERENCE * end);
+  after = t + DIFFERENCE * end;
+  PetscCall(SbFormulaEval(formula, before, NULL, &first));
+  PetscCall(SbFormulaEval(formula, after, NULL, &last));
+  *rate = (last - first) / (after - before);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

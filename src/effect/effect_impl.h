@@ -17,6 +17,9 @@ PetscErrorCode SbEffectFormulas(SbEffect e, const SbScope *scope, const char *ke
 /* A formula at time t; in a static run one without t grows with the load factor t. Not
    collective. */
 PetscErrorCode SbEffectValueAt(SbEffect e, SbFormula formula, PetscReal t, PetscReal *value);
+/* Its derivative by the time, by a difference over a millionth of the run; 0 in a static run. Not
+   collective. */
+PetscErrorCode SbEffectRateAt(SbEffect e, SbFormula formula, PetscReal t, PetscReal *rate);
 
 /*
   Items of the named sets on this rank, each once even when it is in several of the sets.

@@ -361,19 +361,15 @@ static PetscErrorCode speed(SbEffect e, SbSpace space, const SbStage *stage, con
                             PetscReal *rate)
 {
   const Line *line = (const Line *)e->data;
-  PetscReal before[3], after[3], moving[POINTS][3];
+  PetscReal ground[3], moving[POINTS][3];
 
   PetscFunctionBeginUser;
   *rate = 0;
   if (!stage->v)
     PetscFunctionReturn(PETSC_SUCCESS);
-
-  /* of the ground by a central difference over the step */
-  PetscCall(ground_at(e, stage->t - 0.5 * stage->dt, before));
-  PetscCall(ground_at(e, stage->t + 0.5 * stage->dt, after));
   for (int k = 0; k < 3; k++)
-    after[k] = stage->dt > 0 ? (after[k] - before[k]) / stage->dt : 0;
-  points_of(space, line, stage->v, after, moving);
+    PetscCall(SbEffectRateAt(e, line->displacement[k], stage->t, &ground[k]));
+  points_of(space, line, stage->v, ground, moving);
   for (PetscInt p = 0; p < line->n; p++)
     *rate += SbDot3(now->g[p], moving[p]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,12 +9,11 @@
 PetscErrorCode SbRegisterAll(void)
 {
   static const SbEffectType *const effects[] = {
-    &SbEffectGravity,    &SbEffectBodyForce, &SbEffectTraction,
-    &SbEffectPressure,   &SbEffectCavity,    &SbEffectFoundation,
-    &SbEffectMembrane,   &SbEffectMass,      &SbEffectTie,
-    &SbEffectJoint,      &SbEffectSpring,    &SbEffectCable,
-    &SbEffectPointForce, &SbEffectFixed,     &SbEffectPrescribedDisplacement,
-    &SbEffectTorque,     &SbEffectDamping,   &SbEffectContact};
+    &SbEffectGravity, &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
+    &SbEffectCavity,  &SbEffectFoundation, &SbEffectMembrane, &SbEffectMass,
+    &SbEffectFrame,   &SbEffectTie,        &SbEffectJoint,    &SbEffectSpring,
+    &SbEffectCable,   &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
+    &SbEffectTorque,  &SbEffectDamping,    &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;

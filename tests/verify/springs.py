@@ -63,6 +63,11 @@ near(damper["s_tension"], -30 * math.exp(-30 * 0.05 / 0.75), 0.05, "damper: tens
 # a pendulum on a stiff spring of 1 m: it swings through 60 degrees, and keeps its energy; its spring feels the rotation
 SWING = ("-bodies b " + body("b", "0.1,0.1,0.1:2") + "-effects gravity,s -effect_s_type spring -effect_s_points 0.05,0.05,0.05;ground:1.05,0.05,0.05 "
          "-effect_s_stiffness 1e4 -time newmark -ts_dt 0.005 -ts_max_time 0.6 ")
+# a damper to a point of the ground that moves away at 1 m/s draws the block of 1 kg along: v = 1 - exp(-c t / m)
+run("drawn", GUIDED.format(body("b", "0.2,0.1,0.05:2"), "").replace("gravity,", "") + "-effect_s_points 0.1,0.05,0.05;ground:0.1,0.05,0.55 -effect_s_damping 5 "
+    "-effect_s_displacement 0;0;t -time newmark -ts_dt 0.002 -ts_max_time 0.4", 2)
+near(last("drawn")["momentum_z"], 1 - numpy.exp(-2), 2e-3, "block drawn along by a damper: momentum, N s")
+
 run("swing", SWING + "-checkpoint_every_time 0.3", 2)
 swing = history("swing")
 total = swing["kinetic"] + swing["strain"] + swing["s_energy"] + 9.81 * swing["centre_z"]
