@@ -120,6 +120,7 @@ struct _p_SbSpace {
   PetscReal *node_mass;    /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscReal *node_share;   /* [nnode] integral of density phi_a, kg; node_mass itself without P2 */
   PetscReal *alpha, *beta; /* [nbody] Rayleigh damping C = alpha M + beta K, 1/s and s */
+  PetscReal added_mass;    /* in node_mass of owned nodes besides that of the cells, kg */
   PetscBool consistent_mass; /* -mass consistent */
   PetscBool
     tentative; /* the tangent may be indefinite: a failed solve is repeated with a definite one */

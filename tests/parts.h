@@ -77,7 +77,7 @@ static const Part parts[] = {
    "-effects bed -effect_bed_type foundation -effect_bed_on tip -effect_bed_stiffness 1e4", NULL,
    NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "frame", "-effects ride -effect_ride_type frame -effect_ride_acceleration 1;0;0", NULL,
-   NULL, PETSC_TRUE},
+   NULL, PETSC_FALSE}, /* acts on all bodies */
   {"effect", "mass", "-effects load -effect_load_type mass -effect_load_on tip -effect_load_mass 1",
    NULL, NULL, PETSC_TRUE},
   {"effect", "membrane",

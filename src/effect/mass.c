@@ -55,6 +55,7 @@ static PetscErrorCode check_body(SbEffect e, SbSpace space, PetscInt body)
 static void add(SbSpace space, PetscInt node, PetscReal mass)
 {
   space->node_mass[node] += mass;
+  space->added_mass += node < space->nnode_owned ? mass : 0;
   if (space->node_share != space->node_mass)
     space->node_share[node] += mass;
 }

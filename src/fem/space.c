@@ -348,7 +348,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
 
 PetscErrorCode SbSpaceValidate(SbSpace s)
 {
-  PetscReal sums[2] = {0., 0.};
+  PetscReal sums[2] = {0., s->added_mass};
   PetscReal all[2];
 
   PetscFunctionBeginUser;

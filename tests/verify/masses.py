@@ -7,7 +7,7 @@ import numpy
 from scene_common import check, finish, history, near, start
 
 COMMON = "-quiet -output_fields none -output_precision double -reproducible -snes_rtol 1e-10 -ksp_rtol 1e-10 "
-CUBE = "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material linear -body_a_young 1e7 -body_a_poisson 0.3 -body_a_density 1 -body_a_element {} "
+CUBE = "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material linear -body_a_young 1e7 -body_a_poisson 0.3 -body_a_density 1 -validate -body_a_element {} "
 LOAD = "-effect_load_type mass -effect_load_mass 2 "
 TOP, POINT = LOAD + "-effect_load_on zmax ", LOAD + "-effect_load_on a -effect_load_at 0.1,0.1,0.1 "
 
