@@ -50,7 +50,7 @@ error 1 "-bodies"
 error 3 "-body_bar_yuong|-body_bar_young" bar.opts -body_bar_yuong 3
 error 1 "-body_bra_young|-body_bar_young" bar.opts -body_bra_young 3
 error 1 "-effcts|-effects" bar.opts -effcts gravity
-error 1 "-effect_pull_radius|type, on, time, vector" bar.opts -effect_pull_radius 1
+error 1 "-effect_pull_colour|type, on, time, vector" bar.opts -effect_pull_colour 1
 error 1 "-bodies|'bar'" bar.opts -bodies bar,bar
 error 1 "-body_rod_mesh" bar.opts -bodies bar,rod
 error 1 "-body_bar_material|arruda_boyce, corotated, gent, guccione, holmes_mow, holzapfel_gasser_ogden, holzapfel_ogden, isochoric_neohookean, linear, mooney_rivlin, neohookean, ogden, stable_neohookean, stvk, transversely_isotropic, yeoh" -bodies bar -body_bar_mesh box:1,1,1:1
