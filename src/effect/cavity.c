@@ -23,8 +23,8 @@
   that is a vessel that yields by the compliance C and has the pressure p_c, drained by R_d to the
   pressure p_0 (all above that outside),
 
-    R Q = p - p_c (a valve: Q >= 0),   C dp_c/dt = Q - (p_c - p_0) / R_d,   dV_f/dt = d(added)/dt -
-    Q,
+    R Q = p - p_c (a valve: Q >= 0),   C dp_c/dt = Q - (p_c - p_0) / R_d,
+    dV_f/dt = d(added)/dt - Q,
 
   by the implicit Euler method from the end of the last step: p_c is linear in Q, Q in p, and the
   equation for p above has one root.

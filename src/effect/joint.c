@@ -95,8 +95,7 @@ static const SbOption rows[] = {
   {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "of a hinge or slider: its direction at rest"},
   {"angle", SB_OPTION_FORMULA, 1, "degrees", "", "",
    "motor of a hinge: angle of `on` about the axis, right-handed, a formula of the time t; "
-   "default: "
-   "free"},
+   "default: free"},
   {"displacement", SB_OPTION_FORMULA, 1, "m", "", "",
    "motor of a slider: way of `on` along the axis, a formula of the time t; default: free"},
   {"torque", SB_OPTION_FORMULA, 1, "N m", "", "",

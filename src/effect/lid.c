@@ -40,25 +40,16 @@ PetscErrorCode SbWallGather(SbSpace space, PetscInt nfacet, const SbFacet facets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An edge of a rim, from one node to the next. */
-static int by_from(const void *a, const void *b)
-{
-  const PetscInt x = *(const PetscInt *)a;
-  const PetscInt y = *(const PetscInt *)b;
-
-  return (x > y) - (x < y);
-}
-
 PetscErrorCode SbLidsFind(SbLids *lids, SbEffect e, MPI_Comm comm, PetscInt n,
                           const SbWallFacet facet[], PetscInt nnode, const PetscInt all[])
 {
   PetscInt nedge = 0;
-  PetscInt(*edge)[2]; /* from, to */
+  PetscInt *from, *to; /* [nedge] nodes of the edges of all rims */
   PetscBool *done;
   SbKey *key;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(3 * n, &key, 3 * n, &edge, 3 * n, &done));
+  PetscCall(PetscMalloc4(3 * n, &key, 3 * n, &from, 3 * n, &to, 3 * n, &done));
   for (PetscInt i = 0; i < 3 * n; i++)
     key[i] = (SbKey){SbKeyOfPair(facet[i / 3].node[i % 3], facet[i / 3].node[(i + 1) % 3]), i};
   SbKeysSort(3 * n, key);
@@ -69,47 +60,41 @@ PetscErrorCode SbLidsFind(SbLids *lids, SbEffect e, MPI_Comm comm, PetscInt n,
     m = SbKeysAlike(3 * n, key, i);
     if (m != 1)
       continue;
-    edge[nedge][0] = facet[f].node[(k + 1) % 3];
-    edge[nedge][1] = facet[f].node[k];
+    from[nedge] = facet[f].node[(k + 1) % 3];
+    to[nedge] = facet[f].node[k];
     done[nedge++] = PETSC_FALSE;
   }
-  if (nedge)
-    qsort(edge, (size_t)nedge, sizeof(*edge), by_from);
+  PetscCall(PetscSortIntWithArray(nedge, from, to));
+
+  /* around each rim */
   for (PetscInt i = 0; i < nedge; i++) {
     PetscInt size = 0;
     PetscInt at = i;
     SbLid lid = {0};
 
     while (!done[at]) {
-      PetscInt low = 0;
-      PetscInt high = nedge;
+      PetscInt next;
 
       PetscCall(SbReserve(lid.n + 1, sizeof(*lid.node), &size, &lid.node));
-      PetscCall(PetscFindInt(edge[at][0], nnode, all, &lid.node[lid.n++]));
+      PetscCall(PetscFindInt(from[at], nnode, all, &lid.node[lid.n++]));
       done[at] = PETSC_TRUE;
 
-      /* the edge that begins where this one ends */
-      while (high - low > 1) {
-        const PetscInt middle = (low + high) / 2;
-
-        if (edge[middle][0] <= edge[at][1])
-          low = middle;
-        else
-          high = middle;
-      }
-      PetscCheck(edge[low][0] == edge[at][1] && (low == 0 || edge[low - 1][0] != edge[at][1]), comm,
-                 PETSC_ERR_USER_INPUT,
+      /* the edge that begins where this one ends, the only one */
+      PetscCall(PetscFindInt(to[at], nedge, from, &next));
+      PetscCheck(next >= 0 && (next == 0 || from[next - 1] != to[at]) &&
+                   (next == nedge - 1 || from[next + 1] != to[at]),
+                 comm, PETSC_ERR_USER_INPUT,
                  "%s: rims of this surface touch each other at a vertex, so that no lid closes "
                  "them: take another set of facets",
                  e->on.option);
-      at = low;
+      at = next;
     }
     if (!lid.n)
       continue;
     PetscCall(SbReserve(lids->n + 1, sizeof(lid), &lids->size, &lids->lid));
     lids->lid[lids->n++] = lid;
   }
-  PetscCall(PetscFree3(key, edge, done));
+  PetscCall(PetscFree4(key, from, to, done));
   PetscCheck(lids->n > 0, comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_lids: the surface of %s has no opening: leave it out", e->name,
              e->on.option);

@@ -75,14 +75,6 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int by_place(const void *a, const void *b)
-{
-  const PetscInt x = *(const PetscInt *)a;
-  const PetscInt y = *(const PetscInt *)b;
-
-  return (x > y) - (x < y);
-}
-
 /* place[n]: 4 cell + face of the facets of owned cells, sorted; the caller frees. */
 static PetscErrorCode find_places(SbSpace s, const SbEffectOn *on, PetscInt *n, PetscInt **place)
 {
@@ -96,8 +88,7 @@ static PetscErrorCode find_places(SbSpace s, const SbEffectOn *on, PetscInt *n, 
   for (PetscInt i = 0; i < all; i++)
     if (facet[i].cell < s->mesh->ncell_owned)
       (*place)[(*n)++] = 4 * facet[i].cell + facet[i].face;
-  if (*n)
-    qsort(*place, (size_t)*n, sizeof(**place), by_place);
+  PetscCall(PetscSortInt(*n, *place));
   PetscCall(PetscFree(facet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

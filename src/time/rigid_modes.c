@@ -14,8 +14,7 @@
 
   Parts that effects join, as joints and ties, may be free only together: where no part alone is,
   those with common couplings are examined as one. Not found: parts that contact connects. A part on
-  springs whose
-  stiffness is within the rounding of that of its cells counts as free.
+  springs whose stiffness is within the rounding of that of its cells counts as free.
 */
 #include "sbgeometry.h"
 #include "time_impl.h"
@@ -57,6 +56,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscBool joined, PetscInt **label)
     }
   }
 
+  /* with those that a coupling joins */
   for (PetscInt c = 0; c < s->couplings.n && joined; c++)
     for (PetscInt k = s->couplings.start[c] + 1; k < s->couplings.start[c + 1]; k++)
       (void)SbUnionJoin(parent, s->couplings.node[k - 1], s->couplings.node[k]);
