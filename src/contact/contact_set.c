@@ -38,11 +38,6 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbContactHasObstacle(SbContact contact)
-{
-  return (PetscBool)(((const Contact *)contact->effect->data)->partner.obstacle != NULL);
-}
-
 PetscErrorCode SbContactSetDestroy(SbContactSet *contacts)
 {
   PetscFunctionBeginUser;

@@ -72,3 +72,8 @@ void SbPartnerAddForce(const SbPartner *p, const SbPose *pose, const PetscReal x
     values[3 + i] += moment[i];
   }
 }
+
+PetscBool SbContactHasObstacle(SbContact contact)
+{
+  return (PetscBool)(((const Contact *)contact->effect->data)->partner.obstacle != NULL);
+}
