@@ -116,6 +116,9 @@ PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_B
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /* Warns, once, of a rigid body that is strained by more than 1e-3 at U, m. Collective. */
 PetscErrorCode SbModelWarnStrained(SbModel model, PetscReal t, Vec U);
+/* Warns of loads at U, m, with the velocities V, m/s (or NULL), that act on held nodes alone.
+   Collective. */
+PetscErrorCode SbModelWarnHeldLoads(SbModel model, PetscReal t, Vec U, Vec V);
 /* The speed v of a step from t to t + dt, m/s, the scale of contact's tolerances: m v^2 / 2 is the
    kinetic and strain energy of the bodies, of mass m, at its start U, V, plus half of the work of
    all loads and support forces along the size of the smallest body. 0 in a static run (V NULL).

@@ -269,6 +269,7 @@ PetscErrorCode SbReportSummary(SbRun run)
                         "degrees at the end: the law is one of small rotations, and takes a turn "
                         "for a strain; corotated or neohookean do not",
                         (double)(100. * turned), TURNED));
+  PetscCall(SbModelWarnHeldLoads(run->model, run->clock.t, run->state.U, run->state.V));
   PetscCall(SbContactSetWarnAtEnd(&run->model->contacts));
   if (out->quiet)
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,5 @@
 """What a run says of a scene that it computes, but hardly as it was meant: two supports that differ at one node, parts of
-a mesh that touch but do not join, tets too long for an element; and a group whose name has letters beyond ASCII."""
+a mesh that touch but do not join, tets too long for an element, loads on held nodes; and a group whose name has letters beyond ASCII."""
 import os
 import subprocess
 import sys
@@ -57,6 +57,23 @@ for n in (1, 2):
 supports("f2", "f1", "0.001;0;0", said=("f2 and f1", "0.001 and 0 m", "f2 counts"))
 supports("f1", "f2", "0;z*t;0")  # nothing where they meet
 supports("f1", "f2", "0;0;0.001*t", said=("f1 and f2", "direction z"))
+
+
+def load(kind, on, said, ranks=1, components="xyz"):
+    case(f"{kind} on {on}", [*BOX, "-effects", "hold,push", "-effect_hold_type", "fixed", "-effect_hold_on", "zmin", "-effect_hold_components", components, "-effect_push_type",
+                             *kind.split(), *on.split()], ranks=ranks, said=said)
+
+
+# loads on held nodes alone; one of them is free, or free in the direction of the load
+HELD = ("effect push", "held nodes alone")
+for n in (1, 3):
+    load("traction -effect_push_on", "zmin -effect_push_total 1,0,0", HELD, ranks=n)
+load("pressure -effect_push_value 5 -effect_push_on", "zmin", HELD)
+load("point_force -effect_push_vector 0;0;1 -effect_push_on", "zmin", HELD)
+load("spring -effect_push_stiffness 1 -effect_push_length 0.1 -effect_push_points", "0.05,0.05,0;ground:0,0,-0.2", HELD)
+load("spring -effect_push_stiffness 1 -effect_push_length 0.1 -effect_push_points", "0.05,0.05,0.1;ground:0,0,-0.2", ())
+load("traction -effect_push_on", "xmin -effect_push_total 0,0,-1", ())
+load("foundation -effect_push_stiffness 1e3 -effect_push_on", "zmin", ())
 
 # an obstacle that is driven onto nodes that a support holds
 for n in (1, 2):
