@@ -98,6 +98,9 @@ typedef struct {
   PetscInt alone; /* tag set with only this group; -1: not created yet */
 } SbGroup;
 
+/* Compares the name of a group; option values have no blanks, so an underscore matches a blank. */
+PetscBool SbGroupIsNamed(const SbGroup *group, const char *name);
+
 /* gmsh's numbers of element types, by which readers of all formats count. */
 enum {
   SB_GMSH_LINE = 1,

@@ -56,6 +56,22 @@ PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
 PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface,
                                 const SbTetOptions *options, SbImport *body);
 
+typedef struct {
+  PetscInt nvert, ntri;
+  PetscReal area, volume; /* m^2; enclosed, m^3, if it is closed */
+  PetscBool closed;       /* of tets, not a surface of the file */
+  PetscBool curved;       /* the mesh has curved edges: four triangles for each facet */
+} SbSurfaceFacts;
+/*
+  SbMeshFileSurface - writes the surface of a mesh of tets, oriented outwards: .stl, .obj, .ply.
+
+  Not collective. Input: group - "", or the region or surface of the file that is written alone; of
+  a region all of its surface, also where it meets others; path. The mesh is checked as for a run.
+  Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_WRITE, one line with the group or file.
+*/
+PetscErrorCode SbMeshFileSurface(SbImport *import, const char *group, const char *path,
+                                 SbSurfaceFacts *facts);
+
 /* The reader of a body that is a surface, which becomes tets by body->tet. */
 PetscErrorCode SbImportRead_Surface(const char *path, SbImport *body);
 extern const SbOption SbTetRows[];

@@ -117,8 +117,7 @@ static const char *group_in_body(const SbSet *set, PetscInt nbody, const SbBody 
   return set->group;
 }
 
-/* Compares the name of a group; option values have no blanks, so an underscore matches a blank. */
-static PetscBool is_named(const SbGroup *group, const char *name)
+PetscBool SbGroupIsNamed(const SbGroup *group, const char *name)
 {
   const char *p = group->name;
 
@@ -137,7 +136,7 @@ void SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[], PetscIn
 
     for (PetscInt t = 0; name && t < im->ntags; t++)
       for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++)
-        if (is_named(&im->group[im->tags_group[i]], name))
+        if (SbGroupIsNamed(&im->group[im->tags_group[i]], name))
           bits[t] |= SB_SET_BIT(k);
   }
 }
@@ -275,7 +274,7 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
 
     for (PetscInt g = 0; g < import[b].ngroup; g++) {
       names[n++] = import[b].group[g].name;
-      exists += name && is_named(&import[b].group[g], name);
+      exists += name && SbGroupIsNamed(&import[b].group[g], name);
     }
   }
   SbSuggestNames(wanted, n, names, sizeof(near), near);
@@ -333,7 +332,7 @@ static PetscErrorCode hidden_groups(PetscInt nbody, const SbBody body[], const S
     for (PetscInt g = 0; g < import[b].ngroup; g++) {
       const SbGroup *group = &import[b].group[g];
 
-      if (!is_named(group, set->name) || (own && group->dim == 3))
+      if (!SbGroupIsNamed(group, set->name) || (own && group->dim == 3))
         continue;
       PetscCall(SbWarning(PETSC_COMM_SELF,
                           "the name '%s' is %s; the group '%s' in the mesh of body '%s' is another "

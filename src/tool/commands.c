@@ -76,6 +76,35 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode surface(SbTool *tool, SbImport *mesh)
+{
+  SbSurfaceFacts facts;
+  char phase[PETSC_MAX_PATH_LEN + 16];
+  char note[256] = "";
+  char number[2][32];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
+  SB_TOOL_PHASE(tool, phase, SbMeshFileSurface(mesh, tool->group, tool->out, &facts));
+  if (tool->quiet)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices, %s triangles, %.6g m^2", tool->out,
+                        SbToolNumber(facts.nvert, number[0]), SbToolNumber(facts.ntri, number[1]),
+                        (double)facts.area));
+  if (facts.closed)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, ", around %.6g m^3", (double)facts.volume));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
+  if (facts.curved)
+    SbAppend(sizeof(note), note, "curved edges: four flat triangles for each facet");
+  SbNoteCount(sizeof(note), note, "inverted tets turned", mesh->nreoriented);
+  SbNoteCount(sizeof(note), note, "triangles of groups that are no face of a tet, left out",
+              mesh->nlost);
+  SbNoteCount(sizeof(note), note, "edges with more than two triangles", mesh->npinched);
+  if (note[0])
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "to know: %s\n", note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const SbToolCommand SbToolCommands[] = {
   {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1,
    SbToolInfo},
@@ -83,6 +112,11 @@ const SbToolCommand SbToolCommands[] = {
   {"tet", "SURFACE OUT",
    "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2,
    write_mesh},
+  {"surface", "FILE OUT",
+   "writes the surface of the tets, seen from outside, to .stl, .obj or .ply; of one region, body "
+   "or "
+   "surface by -group",
+   2, surface},
   {"repair", "FILE OUT",
    "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did",
    2, repair},
@@ -102,6 +136,10 @@ PetscErrorCode SbToolRun(SbTool *tool)
     "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
     ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
     tool->in);
+
+  PetscCheck(strcmp(tool->command->name, "surface") || !SbMeshFileIsSurface(tool->in),
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: is a surface already, by its name; give a mesh of tets", tool->in);
 
   // read the mesh, with a progress message
   (void)snprintf(phase, sizeof(phase), "%s %s",

@@ -31,6 +31,8 @@ static const SbOption rows[] = {
    "number of refinements, each into 8 times as many tets"},
   {"format", SB_OPTION_CHOICE, 1, "", "auto", "auto|msh41|msh41_binary|msh22|msh22_binary|h5",
    "output format; auto: .msh is msh41 (text), .h5 is h5"},
+  {"group", SB_OPTION_STRING, 1, "", "", "",
+   "region, body or surface of FILE, by its name in info: its surface alone"},
   {"step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
    "when FILE is the output of a run (fields.h5): number of the frame whose positions are taken; "
    "0: "
@@ -44,9 +46,22 @@ static const SbOption rows[] = {
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print nothing but errors"},
 };
 /* Commands that read each row; "" for all. */
-static const char *const readers[] = {
-  "tet", "tet", "tet", "tet", "tet", "tet", "tet repair", "refine", "convert tet repair refine",
-  "",    "",    "",    "",    "",    ""};
+static const char *const readers[] = {"tet",
+                                      "tet",
+                                      "tet",
+                                      "tet",
+                                      "tet",
+                                      "tet",
+                                      "tet repair",
+                                      "refine",
+                                      "convert tet repair refine",
+                                      "surface",
+                                      "",
+                                      "",
+                                      "",
+                                      "",
+                                      "",
+                                      ""};
 _Static_assert(PETSC_STATIC_ARRAY_LENGTH(rows) == SB_TOOL_OPTIONS &&
                  PETSC_STATIC_ARRAY_LENGTH(readers) == SB_TOOL_OPTIONS,
                "one entry for each option");
@@ -66,7 +81,8 @@ PetscErrorCode SbToolHelp(void)
       PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
-                        "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
+                        "(gmsh), or .h5 (supple's own, with an .xmf for ParaView); of surface "
+                        ".stl, .obj or .ply.\n\nOptions\n"));
   for (int i = 0; i < SB_TOOL_OPTIONS; i++) {
     const SbOption *r = &rows[i];
 
@@ -194,6 +210,7 @@ PetscErrorCode SbToolSetFromOptions(const SbToolLine *line, SbTool *tool)
   PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->body.tet.merge_tolerance));
   PetscCall(SbOptionInt(&SbRunScope, "levels", &tool->levels));
   PetscCall(SbOptionChoice(&SbRunScope, "format", &tool->format));
+  PetscCall(SbOptionString(&SbRunScope, "group", sizeof(tool->group), tool->group));
   PetscCall(SbOptionInt(&SbRunScope, "step", &tool->body.mesh_step));
   PetscCall(SbOptionReal(&SbRunScope, "scale", &tool->body.scale));
   PetscCall(SbOptionReals(&SbRunScope, "rotate", tool->body.rotate));

@@ -5,7 +5,7 @@
 #include "sbmeshio.h"
 #include "sbsurface.h"
 
-#define SB_TOOL_OPTIONS 15
+#define SB_TOOL_OPTIONS 16
 
 /* Command line of supple-mesh, parsed. */
 typedef struct {
@@ -18,10 +18,11 @@ typedef struct {
 
 typedef struct _SbTool {
   const struct _SbToolCommand *command;
-  const char *in, *out; /* out: NULL if the command writes no mesh */
-  SbBody body;          /* body of the file `in`: name, step, scale, rotate, translate, tet */
-  PetscInt levels;      /* option -levels */
-  SbMeshFormat format;  /* option -format */
+  const char *in, *out;     /* out: NULL if the command writes no mesh */
+  SbBody body;              /* body of the file `in`: name, step, scale, rotate, translate, tet */
+  PetscInt levels;          /* option -levels */
+  SbMeshFormat format;      /* option -format */
+  char group[SB_GROUP_MAX]; /* option -group; "": the whole mesh */
   char view[PETSC_MAX_PATH_LEN]; /* option -view; "": no picture */
   PetscBool quiet;
   PetscLogDouble start,
