@@ -30,6 +30,13 @@ typedef enum {
   SB_TET_KEEP,
   SB_TET_REMESH
 } SbTetSurface;
+#define SB_TET_NEAR_MAX 8 /* places with finer tets */
+/* A place with finer tets: within `radius` of a box of half edges half[3]; a sphere has none. */
+typedef struct {
+  PetscReal x[3];                  /* its middle, m */
+  PetscReal axes[3][3];            /* unit vectors along its edges */
+  PetscReal half[3], radius, size; /* m */
+} SbTetNear;
 /* Parameters of filling a surface with tets; lengths in the surface's unit. */
 typedef struct {
   PetscReal size;            /* wanted edge; 0: the mean edge of the surface */
@@ -40,6 +47,8 @@ typedef struct {
   PetscReal seconds; /* time limit of gmsh, and of tetgen, s */
   SbTetBackend backend;
   SbTetSurface surface;
+  PetscInt nnear;
+  SbTetNear near[SB_TET_NEAR_MAX]; /* [nnear] as the body is placed; of SbImport: before that */
 } SbTetOptions;
 /*
   A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is

@@ -383,6 +383,9 @@ PetscErrorCode SbMeshFileWrite(const SbImport *import, const char *path, SbMeshF
   X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                              \
   X(void, ModelMeshGenerate, (int, int *))                                                      \
   X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                    \
+  X(int, ModelMeshFieldAdd, (const char *, int, int *))                                         \
+  X(void, ModelMeshFieldSetString, (int, const char *, const char *, int *))                    \
+  X(void, ModelMeshFieldSetAsBackgroundMesh, (int, int *))                                      \
   X(void, ModelMeshClassifySurfaces, (double, int, int, double, int, int *))                    \
   X(void, ModelMeshCreateGeometry, (int *, size_t, int *))                                      \
   X(void, ModelMeshAddNodes,                                                                    \

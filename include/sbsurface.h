@@ -13,6 +13,9 @@ PetscBool SbMeshFileIsSurface(const char *path);
    collective. */
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
+/* Reads the option `key` of a scope: the places with finer tets, sphere:x,y,z,r,size or
+   box:x0,y0,z0,x1,y1,z1,size (m), separated by ; "": none. Error: PETSC_ERR_USER_INPUT. */
+PetscErrorCode SbTetNearRead(const SbScope *scope, const char *key, SbTetOptions *options);
 
 /*
   Surfaces that cut space into regions; every triangle knows the region on each of its sides.

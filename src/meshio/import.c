@@ -10,14 +10,12 @@
 #include "meshio_impl.h"
 #include "sbsurface.h"
 
-static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
+/* Rotation about an axis; exact for multiples of 90 degrees about the coordinate axes. */
+static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
 {
-  PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
-
   PetscFunctionBeginUser;
-
-  // rotation about an axis; exact for multiples of 90 degrees about the coordinate axes
+  for (int i = 0; i < 9; i++)
+    R[i / 3][i % 3] = i % 4 == 0;
   if (body->rotate[3] != 0) {
     const PetscReal *w = body->rotate;
     const PetscReal angle = body->rotate[3] * PETSC_PI / 180;
@@ -44,6 +42,16 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
       R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
+{
+  PetscReal R[3][3];
+  char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(rotation(body, R));
   for (PetscInt m = 0; m < im->nmiddle.n; m++) {
     PetscReal *off = im->middle[m].off;
     PetscReal y[3];
@@ -177,6 +185,7 @@ static PetscErrorCode check_contents(const SbBody *body, SbImport *im, SbReader 
 /* Sets the inputs of a reader from the body. */
 static PetscErrorCode begin(const SbBody *body, SbImport *im)
 {
+  PetscReal R[3][3];
   PetscInt none;
 
   PetscFunctionBeginUser;
@@ -187,6 +196,19 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   im->tet = body->tet;
   im->scale = body->scale;
+
+  // places with finer tets, where they are before the body is placed: x <- R^T (x - t)
+  if (im->tet.nnear)
+    PetscCall(rotation(body, R));
+  for (SbTetNear *near = im->tet.near; near < im->tet.near + im->tet.nnear; near++) {
+    PetscReal away[3];
+
+    SbSubtract(near->x, body->translate, away);
+    for (int i = 0; i < 3; i++) {
+      near->x[i] = R[0][i] * away[0] + R[1][i] * away[1] + R[2][i] * away[2];
+      PetscCall(PetscArraycpy(near->axes[i], R[i], 3));
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -20,6 +20,10 @@ const SbOption SbTetRows[] = {
   {"tet_feature_angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
    "feature angle: edges where the normals of the surface differ by more are kept when it is "
    "remeshed"},
+  {"tet_near", SB_OPTION_STRING, 1, "m", "", "",
+   "places with finer tets, where the body is placed: sphere:x,y,z,r,size or "
+   "box:x0,y0,z0,x1,y1,z1,size, several "
+   "separated by semicolons; sizes grow away from them"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
    "program that fills a surface with tets: auto tries gmsh, then tetgen"},
   {"tet_seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)",
@@ -50,6 +54,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
   PetscCall(SbOptionReal(scope, "tet_size", &o->size));
   PetscCall(SbOptionChoice(scope, "tet_surface", &o->surface));
   PetscCall(SbOptionReal(scope, "tet_feature_angle", &o->angle));
+  PetscCall(SbTetNearRead(scope, "tet_near", o));
   PetscCall(SbOptionChoice(scope, "tetrahedralizer", &o->backend));
   PetscCall(SbOptionReal(scope, "tet_seconds", &o->seconds));
   PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));

@@ -141,6 +141,13 @@ typedef struct {
     remesh; /* remesh the surface with triangles of the target size; else keep its triangles */
 } SbTetJob;
 
+/* tet_near.c: finer tets near places. Checks them with the size of the job, before it is scaled;
+   volume of the regions, m^3; adds the tets in them to the number that is expected. */
+PetscErrorCode SbTetNearCheck(const SbTetJob *job, PetscReal volume, PetscReal *expected);
+/* The size by x, y and z as a formula of gmsh's field MathEval. */
+#define SB_TET_FORMULA_MAX (640 * SB_TET_NEAR_MAX)
+void SbTetNearFormula(const SbTetOptions *options, size_t size, char text[]);
+
 /* Each backend sets x, vert_number, item[3] with the region number as tags, and item[2], the facets
    between regions and outside, with the number of a surface triangle as tags: the facet's own or,
    after remeshing, the nearest one. Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason of

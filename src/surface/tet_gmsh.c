@@ -158,11 +158,21 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   SB_GMSH0(g, ModelGeoSynchronize);
   PetscCall(PetscFree(tag));
   SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeMax", m.job->size);
-  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeMin", m.job->remesh ? m.job->size : 0);
+  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeMin",
+          m.job->remesh && !m.job->options.nnear ? m.job->size : 0);
   SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeFromPoints", 0);
   SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeExtendFromBoundary", m.job->remesh ? 0 : 1);
   SB_GMSH(g, OptionSetNumber, "Mesh.Optimize", 1);
   SB_GMSH(g, OptionSetNumber, "Mesh.OptimizeThreshold", 0.4);
+  if (m.job->options.nnear) {
+    char formula[SB_TET_FORMULA_MAX];
+    int field = 1;
+
+    SbTetNearFormula(&m.job->options, sizeof(formula), formula);
+    SB_GMSH(g, ModelMeshFieldAdd, "MathEval", field);
+    SB_GMSH(g, ModelMeshFieldSetString, field, "F", formula);
+    SB_GMSH(g, ModelMeshFieldSetAsBackgroundMesh, field);
+  }
   SB_GMSH(g, ModelMeshGenerate, 3);
 
   // optimise further; Netgen's optimiser is not in every build of gmsh

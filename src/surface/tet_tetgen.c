@@ -192,6 +192,8 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
   char path[PATH_LENGTH];
 
   PetscFunctionBeginUser;
+  PetscCheck(!job->options.nnear, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "it makes tets of one size only, and places with finer ones are given");
 
   // temporary folder
   (void)snprintf(folder, sizeof(folder) - 16, "%s/supple-tetgen-XXXXXX",

@@ -90,7 +90,10 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
 
 void SbTetDefaults(SbTetOptions *o)
 {
-  *o = (SbTetOptions){.merge_tolerance = -1, .untangle = -1, .angle = 40, .seconds = 600};
+  memset(o, 0, sizeof(*o)); /* its padding, too: copies are compared by their bytes */
+  o->merge_tolerance = o->untangle = -1;
+  o->angle = 40;
+  o->seconds = 600;
 }
 
 /* Runs the first backend that works; the body gets its mesh. An error about the input becomes a
@@ -171,10 +174,10 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
                      shape.nsliver, (double)SLIVER,
                      acos(PetscMin((double)shape.most[0], 1)) * 180 / PETSC_PI);
     SbAppend(sizeof(body->note), body->note,
-             "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
+             "%s%" PetscInt_FMT " tets of size %.3g m%s by %s, surface %s%s%s%.200s%s",
              body->note[0] ? ", " : "", body->item[3].n, (double)(job->size / factor),
-             backends[backend].name, surface, slivers, reasons[0] ? " (before that " : "", reasons,
-             reasons[0] ? ")" : "");
+             job->options.nnear ? ", finer near places," : "", backends[backend].name, surface,
+             slivers, reasons[0] ? " (before that " : "", reasons, reasons[0] ? ")" : "");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,7 +193,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
-  PetscReal *volume, edge, expected;
+  PetscReal *volume, edge, expected, least;
   PetscReal all = 0;
   PetscReal last = 1;
   PetscInt region = 0;
@@ -214,12 +217,16 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
              where, region, (double)last);
   job = (SbTetJob){.where = where, .body = body, .surface = s, .options = *o, .edge = edge};
   job.size = o->size > 0 ? o->size : edge;
-  job.remesh = (PetscBool)(o->surface == SB_TET_REMESH ||
-                           (o->surface == SB_TET_SURFACE_AUTO &&
-                            (job.size > NEAR * edge || edge > NEAR * job.size)));
+  least = job.size;
+  for (PetscInt k = 0; k < o->nnear; k++)
+    least = PetscMin(least, o->near[k].size);
+  job.remesh =
+    (PetscBool)(o->surface == SB_TET_REMESH || (o->surface == SB_TET_SURFACE_AUTO &&
+                                                (job.size > NEAR * edge || edge > NEAR * least)));
 
   /* a regular tet of edge h has the volume h^3 / (6 sqrt(2)) */
   expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
+  PetscCall(SbTetNearCheck(&job, all, &expected));
   PetscCheck(
     expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
     "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
@@ -238,6 +245,16 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   job.surface = &scaled;
   job.size *= factor;
   job.edge *= factor;
+  for (PetscInt k = 0; k < o->nnear; k++) {
+    SbTetNear *near = &job.options.near[k];
+
+    near->size *= factor;
+    near->radius *= factor;
+    for (int i = 0; i < 3; i++) {
+      near->x[i] *= factor;
+      near->half[i] *= factor;
+    }
+  }
   ierr = run_backends(&job, factor, &done, sizeof(reasons), reasons, body);
   PetscCall(PetscFree(scaled.x));
   PetscCall(ierr);

@@ -10,6 +10,9 @@
 static const SbOption rows[] = {
   {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
    "edge length of the tets; default: the mean edge of the surface's triangles"},
+  {"near", SB_OPTION_STRING, 1, "m", "", "",
+   "places with finer tets, in the mesh that is written: sphere:x,y,z,r,size or "
+   "box:x0,y0,z0,x1,y1,z1,size, several separated by semicolons; sizes grow away from them"},
   {"surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
    "keep the triangles of the surface, or remesh it: auto keeps them when their mean edge is "
    "within a factor "
@@ -46,22 +49,11 @@ static const SbOption rows[] = {
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print nothing but errors"},
 };
 /* Commands that read each row; "" for all. */
-static const char *const readers[] = {"tet",
-                                      "tet",
-                                      "tet",
-                                      "tet",
-                                      "tet",
-                                      "tet",
-                                      "tet repair",
-                                      "refine",
-                                      "convert tet repair refine",
-                                      "surface",
-                                      "",
-                                      "",
-                                      "",
-                                      "",
-                                      "",
-                                      ""};
+static const char *const readers[] = {
+  "tet",     "tet", "tet",        "tet",    "tet",
+  "tet",     "tet", "tet repair", "refine", "convert tet repair refine",
+  "surface", "",    "",           "",       "",
+  "",        ""};
 _Static_assert(PETSC_STATIC_ARRAY_LENGTH(rows) == SB_TOOL_OPTIONS &&
                  PETSC_STATIC_ARRAY_LENGTH(readers) == SB_TOOL_OPTIONS,
                "one entry for each option");
@@ -202,6 +194,7 @@ PetscErrorCode SbToolSetFromOptions(const SbToolLine *line, SbTool *tool)
   /* options of tetrahedralization */
   SbTetDefaults(&tool->body.tet);
   PetscCall(SbOptionReal(&SbRunScope, "size", &tool->body.tet.size));
+  PetscCall(SbTetNearRead(&SbRunScope, "near", &tool->body.tet));
   PetscCall(SbOptionChoice(&SbRunScope, "surface", &tool->body.tet.surface));
   PetscCall(SbOptionReal(&SbRunScope, "angle", &tool->body.tet.angle));
   PetscCall(SbOptionChoice(&SbRunScope, "tetrahedralizer", &tool->body.tet.backend));

@@ -5,7 +5,7 @@
 #include "sbmeshio.h"
 #include "sbsurface.h"
 
-#define SB_TOOL_OPTIONS 16
+#define SB_TOOL_OPTIONS 17
 
 /* Command line of supple-mesh, parsed. */
 typedef struct {
