@@ -214,6 +214,10 @@ PetscErrorCode SbContactSetCreate(SbSpace space, PetscInt n, const SbEffect effe
 PetscErrorCode SbContactSetDestroy(SbContactSet *contacts);
 /* Whether it is with an obstacle, not of bodies with each other. Not collective. */
 PetscBool SbContactHasObstacle(SbContact contact);
+/* least[nbody]: distances from the obstacle of contact k at t to the nearest vertex of each body at
+   U, m, negative inside; PETSC_MAX_REAL for bodies that it is not for. Collective. */
+PetscErrorCode SbContactSetDistances(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
+                                     PetscReal least[]);
 
 /*
   In the order of a run; collective.

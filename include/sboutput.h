@@ -115,6 +115,8 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event);
    Collective. */
 PetscErrorCode SbReportHeader(SbRun run);
 PetscErrorCode SbReportSummary(SbRun run);
+/* The same at the end of -show: run.json gets the status "shown". */
+PetscErrorCode SbReportShown(SbRun run);
 
 /* Path of a file in the run's folder, and whether nothing is to be printed. Not collective. */
 void SbOutputFile(SbRun run, const char *name, char path[PETSC_MAX_PATH_LEN], PetscBool *quiet);

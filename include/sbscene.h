@@ -63,6 +63,10 @@ PetscErrorCode SbSceneCheck(SbModel model);
 /* Warns of bodies so large that their files may be in mm. Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneCheckSizes(SbModel model);
 
+/* -show: prints where bodies, sets, effects and obstacles are at the start, m. Collective; after
+   SbRunSetUp(). */
+PetscErrorCode SbSceneShow(SbRun run);
+
 /* Warns of bodies that overlap and have no contact with each other; `when`: begins the sentence. It
    looks at boxes first, and further only at bodies whose boxes overlap. found: whether it warned.
    Collective. */

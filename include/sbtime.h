@@ -321,4 +321,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to);
 PetscErrorCode SbRunRestartAcceleration(SbRun run);
 /* The whole time loop or load path; an early end is in run->clock.stop_reason, not an error. */
 PetscErrorCode SbRunSolve(SbRun run);
+/* Instead of it: monitors see the state that the run would begin with, and nothing is solved.
+   Collective. */
+PetscErrorCode SbRunShow(SbRun run);
 PetscErrorCode SbRunDestroy(SbRun *run);

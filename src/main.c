@@ -29,7 +29,7 @@ static void report_failure(const char *message, void *scene)
 static PetscErrorCode simulate(Scene *s)
 {
   char file[PETSC_MAX_PATH_LEN];
-  PetscBool quiet, overlap;
+  PetscBool quiet, overlap, show;
 
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
@@ -51,6 +51,14 @@ static PetscErrorCode simulate(Scene *s)
 
   /* run, from header to summary */
   PetscCall(SbReportHeader(s->run));
+  PetscCall(SbOptionBool(&SbRunScope, "show", &show));
+  if (show) {
+    PetscCall(SbSceneShow(s->run));
+    PetscCall(SbRunShow(s->run));
+    PetscCall(SbReportShown(s->run));
+    SbErrorSetFailureHandler(NULL, NULL);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
   PetscCall(SbReportSummary(s->run));
   if (!overlap)

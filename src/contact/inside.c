@@ -60,6 +60,31 @@ static PetscErrorCode find_tested(SbEffect e, SbSpace s, uint8_t tested[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbContactSetDistances(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
+                                     PetscReal least[])
+{
+  const SbSpace s = contacts->space;
+  const PetscInt nbody = s->mesh->nbody;
+  const SbEffect e = contacts->contact[k]->effect;
+  const SbPartner *partner = &((const Contact *)contacts->contact[k])->partner;
+  PetscReal *x, *most;
+  uint8_t *tested;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(3 * s->mesh->nvert, &x, nbody, &most));
+  PetscCall(PetscCalloc1(nbody, &tested));
+  PetscCall(SbSpaceVertexPositions(s, U, x));
+  PetscCall(find_tested(e, s, tested));
+  PetscCall(SbPartnerPose(partner, t, &pose));
+  PetscCall(find_gaps(s, partner->obstacle, &pose, x, least, most));
+  for (PetscInt b = 0; b < nbody; b++)
+    least[b] = tested[b] & 1 ? least[b] : PETSC_MAX_REAL;
+  PetscCall(PetscFree(tested));
+  PetscCall(PetscFree2(x, most));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbContactSetCheckInside(const SbContactSet *contacts, PetscReal t, Vec U)
 {
   const SbSpace s = contacts->space;

@@ -11,6 +11,10 @@
 const SbOption SbOutputRows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
+  {"show", SB_OPTION_BOOL, 1, "", "false", "",
+   "print where bodies, sets, effects and obstacles are at the start, write this frame with the "
+   "sets to the folder <output_dir>_show, and end without computing anything; scripts/render "
+   "FOLDER --show draws it"},
   {"output_overwrite", SB_OPTION_BOOL, 1, "", "false", "",
    "replace the results of an earlier run in the folder; if not, they are moved into its subfolder "
    "before_DATE"},
@@ -70,8 +74,11 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
   PetscInt nname;
   char(*names)[SB_NAME_MAX];
+  static const char *const shown[] = {"displacement", "sets"}; /* fields of -show */
+  PetscBool show;
 
   PetscFunctionBeginUser;
+  PetscCall(SbOptionBool(&SbRunScope, "show", &show));
 
   /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbOptionString(&SbRunScope, "output_dir", sizeof(out->dir), out->dir));
@@ -83,19 +90,28 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
     SbFormat(sizeof(out->dir), out->dir, "out/%.*s",
              dot && dot > base ? (int)(dot - base) : (int)sizeof(out->dir), base[0] ? base : "run");
   }
+
+  // not that of the run, whose results stay
+  for (size_t n = strlen(out->dir); show && n > 1 && out->dir[n - 1] == '/';)
+    out->dir[--n] = 0;
+  if (show)
+    SbAppend(sizeof(out->dir), out->dir, "_show");
   PetscCheck(strlen(out->dir) + SB_FILE_MAX < PETSC_MAX_PATH_LEN, out->comm, PETSC_ERR_USER,
              "-output_dir %s is too long", out->dir);
   PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
+  out->overwrite = (PetscBool)(out->overwrite || show);
 
   /* the fields of -output_fields, without those that a static run lacks; and body */
   PetscCall(SbOptionNames(&SbRunScope, "output_fields", &nname, &names));
   if (nname == 1 && !strcmp(names[0], "none"))
     nname = 0;
+  if (show)
+    nname = PETSC_STATIC_ARRAY_LENGTH(shown);
   for (PetscInt i = 0; i < nname || (i == nname && out->nfield); i++) {
     const SbField *f;
     PetscInt k = 0;
 
-    PetscCall(SbFieldFind("-output_fields", i < nname ? names[i] : "body", &f));
+    PetscCall(SbFieldFind("-output_fields", i < nname ? (show ? shown[i] : names[i]) : "body", &f));
     while (k < out->nfield && out->field[k] != f)
       k++;
     if (k == out->nfield && (model->dynamic || !f->dynamic))
@@ -128,6 +144,15 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscCall(SbOptionString(&SbRunScope, "restart", sizeof(out->restart), out->restart));
   PetscCall(SbProbesSetFromOptions(out, model->dynamic));
 
+  // -show writes one frame, whatever the scenario asks for
+  if (show) {
+    out->contact_points = out->history = PETSC_FALSE;
+    out->checkpoint_every = 0.;
+    out->checkpoint_every_steps = 0;
+    PetscCheck(!out->restart[0], out->comm, PETSC_ERR_USER_INPUT,
+               "-show shows the start of a run; leave out -restart %s", out->restart);
+  }
+
   /* live.txt, which has the values of live formulas */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
@@ -143,6 +168,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   /* console output */
   PetscCall(SbOptionBool(&SbRunScope, "progress", &out->progress));
   PetscCall(SbOptionBool(&SbRunScope, "quiet", &out->quiet));
+  out->progress = (PetscBool)(out->progress && !show);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

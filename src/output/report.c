@@ -203,6 +203,18 @@ PetscErrorCode SbReportHeader(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbReportShown(SbRun run)
+{
+  SbOutput out = (SbOutput)run->monitors.output;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFramesClose(out));
+  PetscCall(SbRunJson(run, out, "shown", "-show"));
+  PetscCall(PetscPrintf(out->comm, "\nNothing was computed. A picture: scripts/render %s --show\n",
+                        out->dir));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 {
   SbOutput out = (SbOutput)run->monitors.output;

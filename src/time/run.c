@@ -404,6 +404,15 @@ static PetscErrorCode start_contacts(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbRunShow(SbRun run)
+{
+  PetscFunctionBeginUser;
+  run->clock.wall_start = MPI_Wtime();
+  PetscCall(SbModelActiveAt(run->model, run->clock.t0));
+  PetscCall(SbRunStepAccepted(run, run->clock.step0, run->clock.t0, 0., PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolve(SbRun run)
 {
   const SbModel m = run->model;
