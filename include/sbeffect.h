@@ -90,7 +90,7 @@ typedef struct {
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
   SbEffectCavity, SbEffectPointForce, SbEffectFoundation, SbEffectMembrane, SbEffectMass,
-  SbEffectFrame, SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable, SbEffectFixed,
+  SbEffectFrame, SbEffectWater, SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable, SbEffectFixed,
   SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {

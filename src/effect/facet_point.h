@@ -1,6 +1,6 @@
 /*
   facet_point.h - points of facets with the derivatives of their maps, for effects whose forces
-  depend on how a facet moves: pressure.c, membrane.c.
+  depend on how a facet moves: pressure.c, membrane.c, water.c.
 */
 #pragma once
 #include "effect_impl.h"
@@ -21,16 +21,17 @@ static inline int first_point(SbSpace space, const SbFacet *facet)
   return SbSpaceCellElement(space, facet->cell)->nodes_per[1] ? 0 : SbRuleFacet.n - 1;
 }
 
-static inline void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *p)
+/* The point with the barycentric coordinates at[3] in the facet; the weight is the caller's. */
+static inline void facet_point_at(SbSpace space, const SbFacet *facet, const PetscReal at[3],
+                                  FacetPoint *p)
 {
   const PetscInt *v = facet->corner;
   PetscReal L[4] = {0};
   PetscReal corner[3][SB_CELL_NODES];
 
   for (int c = 0; c < 3; c++)
-    L[v[c]] = SbRuleFacet.L[q][c];
+    L[v[c]] = at[c];
   p->n = SbCellBasis(space, facet->cell, L, p->phi);
-  p->weight = p->n == 4 ? 0.5 : 0.5 * SbRuleFacet.weight[q];
   for (int a = 0; a < p->n; a++) {
     p->node[a] = SbSpaceCellNode(space, facet->cell, a);
     for (int c = 0; c < 3; c++) {
@@ -45,6 +46,12 @@ static inline void facet_point(SbSpace space, const SbFacet *facet, int q, Facet
     for (int k = 0; k < 2; k++)
       p->along[k][a] = corner[k + 1][a] - corner[0][a];
   }
+}
+
+static inline void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *p)
+{
+  facet_point_at(space, facet, SbRuleFacet.L[q], p);
+  p->weight = p->n == 4 ? 0.5 : 0.5 * SbRuleFacet.weight[q];
 }
 
 /* side += the derivatives of a field w[nnode][3] there; NULL: none. */

@@ -203,11 +203,7 @@ static PetscErrorCode find_rim(SbPressure *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, and of
-   those that no facet of a body with nodes at faces goes on behind which is held in its normal
-   direction; the middle of the first one by original numbers, m. */
-static PetscErrorCode measure_rim(const SbPressure *p, SbMesh mesh, PetscInt nrim[2],
-                                  PetscReal at[3])
+PetscErrorCode SbPressureRim(const SbPressure *p, SbMesh mesh, PetscInt nrim[2], PetscReal at[3])
 {
   PetscInt n = p->nall; /* facets under pressure, then held ones */
   const SbFacet **facet;
@@ -487,7 +483,7 @@ PetscErrorCode SbPressureSetUp(SbEffect e, SbSpace space)
     e->ops.nonsymmetric = NULL;
 
   /* what the surface is, in words; a free rim is known of nodes at vertices only */
-  PetscCall(measure_rim(p, mesh, nrim, at));
+  PetscCall(SbPressureRim(p, mesh, nrim, at));
   p->nrim = nrim[0];
   PetscCall(PetscArraycpy(p->rim_at, at, 3));
   p->prisms = (PetscBool)!nrim[1];

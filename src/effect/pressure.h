@@ -43,6 +43,11 @@ PetscErrorCode SbPressureBeside(SbEffect e, SbSpace space, const SbStage *stage,
                                 const PetscReal x[], PetscReal y[]);
 PetscErrorCode SbPressureVolume(SbEffect e, PetscReal t, PetscReal pressure[]);
 PetscErrorCode SbPressureDestroy(SbEffect e);
+/* The rim of the surface, between vertices of the mesh: number of its edges on all ranks, and of
+   those that no facet of a body with nodes at faces goes on behind which is held in its normal
+   direction; the middle of the first one by original numbers, m. Collective; of p: nall, facet, and
+   what belongs to `surface`. */
+PetscErrorCode SbPressureRim(const SbPressure *p, SbMesh mesh, PetscInt nrim[2], PetscReal at[3]);
 /* f[nnode][3] += the forces of the pressure p, Pa, at the displacements u; right on owned nodes. */
 PetscErrorCode SbPressureAddForce(const SbPressure *load, SbSpace space, PetscReal p,
                                   const PetscReal u[], PetscReal f[]);

@@ -177,6 +177,44 @@ static PetscErrorCode check_materials(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Water that has a level weighs as the bodies do, unless its gravity is given: an error. */
+static PetscErrorCode check_water(SbModel model, SbEffect water)
+{
+  PetscReal sum[3] = {0};
+  PetscReal own[3], vector[3];
+  const char *weight = NULL;
+  PetscBool level, given;
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  SbScopeSet(&scope, "effect", water->type, water->name);
+  PetscCall(SbOptionGiven(&scope, "level", &level));
+  PetscCall(SbOptionGiven(&scope, "gravity", &given));
+  PetscCall(SbOptionReals(&scope, "gravity", own));
+  if (!level || given)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < model->neffect; e++) {
+    if (strcmp(model->effect[e]->type, SbEffectGravity.name))
+      continue;
+    weight = model->effect[e]->name;
+    SbScopeSet(&scope, "effect", SbEffectGravity.name, weight);
+    PetscCall(SbOptionReals(&scope, "vector", vector));
+    for (int k = 0; k < 3; k++)
+      sum[k] += vector[k];
+  }
+  PetscCheck(weight, model->comm, PETSC_ERR_USER_INPUT,
+             "effect %s: there is water, and bodies have no weight: name an effect of type gravity; "
+             "-effect_%s_gravity (m/s^2) says that it is meant",
+             water->name, water->name);
+  for (int k = 0; k < 3; k++)
+    PetscCheck(sum[k] == own[k], model->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_vector is %g,%g,%g m/s^2, and the water of effect %s has "
+               "%g,%g,%g m/s^2: give -effect_%s_gravity",
+               weight, (double)sum[0], (double)sum[1], (double)sum[2], water->name, (double)own[0],
+               (double)own[1], (double)own[2], water->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSceneCheck(SbModel model)
 {
   PetscBool constrained = model->dynamic;
@@ -188,6 +226,9 @@ PetscErrorCode SbSceneCheck(SbModel model)
     constrained =
       (PetscBool)(model->effect[e]->ops.prescribe || model->effect[e]->holds ||
                   (SbEffectHasPotential(model->effect[e]) && model->effect[e]->contact->springs));
+  for (PetscInt e = 0; e < model->neffect; e++)
+    if (!strcmp(model->effect[e]->type, SbEffectWater.name))
+      PetscCall(check_water(model, model->effect[e]));
   for (PetscInt i = 0; i < model->nbody; i++) {
     if (strncmp(model->body[i].mesh, "box:", 4))
       PetscCall(check_mesh_file(model->comm, &model->body[i]));

@@ -11,7 +11,7 @@ PetscErrorCode SbRegisterAll(void)
   static const SbEffectType *const effects[] = {
     &SbEffectGravity, &SbEffectBodyForce,  &SbEffectTraction, &SbEffectPressure,
     &SbEffectCavity,  &SbEffectFoundation, &SbEffectMembrane, &SbEffectMass,
-    &SbEffectFrame,   &SbEffectTie,        &SbEffectJoint,    &SbEffectSpring,
+    &SbEffectFrame, &SbEffectWater,   &SbEffectTie,        &SbEffectJoint,    &SbEffectSpring,
     &SbEffectCable,   &SbEffectPointForce, &SbEffectFixed,    &SbEffectPrescribedDisplacement,
     &SbEffectTorque,  &SbEffectDamping,    &SbEffectContact};
   static const struct {
