@@ -90,8 +90,8 @@ typedef struct {
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
   SbEffectCavity, SbEffectPointForce, SbEffectFoundation, SbEffectMembrane, SbEffectMass,
-  SbEffectFrame, SbEffectWater, SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable, SbEffectFixed,
-  SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
+  SbEffectFrame, SbEffectWater, SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable,
+  SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];

@@ -78,6 +78,10 @@ static const Part parts[] = {
    NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "frame", "-effects ride -effect_ride_type frame -effect_ride_acceleration 1;0;0", NULL,
    NULL, PETSC_FALSE}, /* acts on all bodies */
+  {"effect", "water",
+   "-effects sea -effect_sea_type water -effect_sea_on skin -effect_sea_level 0.05 "
+   "-effect_sea_gravity 0,0,-9.81",
+   NULL, NULL, PETSC_TRUE},
   {"effect", "mass", "-effects load -effect_load_type mass -effect_load_on tip -effect_load_mass 1",
    NULL, NULL, PETSC_TRUE},
   {"effect", "membrane",

@@ -85,24 +85,39 @@ class Obstacle:
 
     Where `displacement` or `angle` is live, the history of the run says where it was. Of a plane a
     piece below the places `reached` [k][3] is made, of a bowl the part deeper than half its radius;
-    `up` is a unit vector.
+    `up` is a unit vector. Water counts as one, of kind `water`, where its level is a number.
     """
 
     def __init__(self, run: Run, name: str, reached: numpy.ndarray, up: numpy.ndarray) -> None:
         self.name, self.run = name, run
-        self.kind, _, words = self.option("obstacle", "").partition(":")
+        self.kind, _, words = (self.option("obstacle", "") or self.level()).partition(":")
         self.x: Any = None
         self.triangles: Any = None
         self.open = self.kind == "bowl"
         if self.kind == "mesh":
             self.read(Path(words.split(",")[0]))
-        elif self.kind in ("plane", "bowl", "box", "sphere", "capsule", "cylinder"):
+        elif self.kind in ("plane", "water", "bowl", "box", "sphere", "capsule", "cylinder"):
             self.x, self.triangles = getattr(self, self.kind)(
                 numpy.array([float(x) for x in words.split(",")]), reached, up
             )
 
     def option(self, key: str, default: str) -> str:
         return self.run.scenario.get(f"effect_{self.name}_{key}", default)
+
+    def level(self) -> str:
+        """The words of the plane of a water line."""
+        try:
+            level = float(self.option("level", ""))
+        except ValueError:
+            return ""
+        gravity = numpy.array([float(x) for x in self.option("gravity", "0,0,-9.81").split(",")])
+        up = -gravity / numpy.linalg.norm(gravity)
+        return f"water:{up[0]},{up[1]},{up[2]},{level}"
+
+    def water(
+        self, a: numpy.ndarray, reached: numpy.ndarray, up: numpy.ndarray
+    ) -> tuple[numpy.ndarray, numpy.ndarray]:
+        return self.plane(a, reached, up)
 
     def plane(
         self, a: numpy.ndarray, reached: numpy.ndarray, up: numpy.ndarray
@@ -238,7 +253,8 @@ def obstacles(run: Run) -> list[Obstacle]:
     up = run.up()
     way = sorted({int(k) for k in numpy.linspace(0, len(run) - 1, min(len(run), 40))})
     for effect in run.scenario.get("effects", "").split(","):
-        if not run.scenario.get(f"effect_{effect}_obstacle"):
+        kind = run.scenario.get(f"effect_{effect}_type") or effect
+        if kind != "water" and not run.scenario.get(f"effect_{effect}_obstacle"):
             continue
         words = run.scenario.get(f"effect_{effect}_on", "").split(",")
         mine = [

@@ -264,8 +264,8 @@ static PetscInt find_points(const Water *w, SbSpace space, const SbFacet *facet,
   return n;
 }
 
-/* Drag at a point: the force per area, Pa; D[9], if not NULL, minus its derivative by v, Pa s/m; the
-   area of the point, m^2; v, if not NULL, its velocity. */
+/* Drag at a point: the force per area, Pa; D[9], if not NULL, minus its derivative by v, Pa s/m;
+   the area of the point, m^2; v, if not NULL, its velocity. */
 static PetscErrorCode find_drag(const Water *w, const Point *p, const SbStage *stage,
                                 PetscReal drag[3], PetscReal D[9], PetscReal *area, PetscReal v[3])
 {
@@ -292,9 +292,9 @@ static PetscErrorCode find_drag(const Water *w, const Point *p, const SbStage *s
     along[i] = r[i] - normal * n[i];
   speed = PetscSqrtReal(SbDot3(along, along));
   for (int i = 0; i < 3; i++)
-    drag[i] = -half * (w->normal * PetscAbsReal(normal) * normal * n[i] +
-                       w->tangent * speed * along[i]) -
-              w->linear * r[i];
+    drag[i] =
+      -half * (w->normal * PetscAbsReal(normal) * normal * n[i] + w->tangent * speed * along[i]) -
+      w->linear * r[i];
   for (int k = 0; D && k < 9; k++) {
     const int i = k / 3;
     const int j = k % 3;
@@ -328,8 +328,8 @@ static PetscErrorCode setup_water(SbEffect e, SbSpace space)
       continue;
     n = find_points(w, space, &w->facet[k], level, NULL, point);
     sum[0] += w->facet[k].area;
-    sum[1] += w->facet[k].area / 3 *
-              SbDot3(space->mesh->x + 3 * w->facet[k].vertex[0], w->facet[k].normal);
+    sum[1] +=
+      w->facet[k].area / 3 * SbDot3(space->mesh->x + 3 * w->facet[k].vertex[0], w->facet[k].normal);
     for (PetscInt q = 0; q < n; q++)
       sum[2] -= point[q].at.weight * point[q].depth * SbDot3(w->up, point[q].N);
   }
@@ -371,8 +371,8 @@ static PetscErrorCode force_water(SbEffect e, SbSpace space, const SbStage *stag
         PetscCall(find_drag(w, p, stage, drag, NULL, &area, NULL));
       for (int a = 0; a < p->at.n; a++)
         for (int i = 0; i < 3; i++)
-          f[3 * p->at.node[a] + i] += factor * p->at.phi[a] *
-                                      (area * drag[i] - p->at.weight * pressure * p->N[i]);
+          f[3 * p->at.node[a] + i] +=
+            factor * p->at.phi[a] * (area * drag[i] - p->at.weight * pressure * p->N[i]);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -398,8 +398,8 @@ static void add_block(const Water *w, const Point *p, int a, int b, PetscReal st
   block[6] -= d[1];
   block[7] += d[0];
   for (int k = 0; k < 9; k++)
-    block[k] -= slope * at->phi[a] * at->phi[b] *
-                (p->N[k / 3] * w->up[k % 3] + w->up[k / 3] * p->N[k % 3]);
+    block[k] -=
+      slope * at->phi[a] * at->phi[b] * (p->N[k / 3] * w->up[k % 3] + w->up[k / 3] * p->N[k % 3]);
 }
 
 static PetscErrorCode tangent_water(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
@@ -427,8 +427,7 @@ static PetscErrorCode tangent_water(SbEffect e, SbSpace space, const SbStage *st
           if (w->has_level)
             add_block(w, p, a, b, stage->shift_k * factor, block[a][b]);
           for (int i = 0; i < 9; i++)
-            block[a][b][i] +=
-              stage->shift_v * factor * area * p->at.phi[a] * p->at.phi[b] * D[i];
+            block[a][b][i] += stage->shift_v * factor * area * p->at.phi[a] * p->at.phi[b] * D[i];
         }
     }
     for (int a = 0; n && a < point[0].at.n; a++)

@@ -202,10 +202,11 @@ static PetscErrorCode check_water(SbModel model, SbEffect water)
     for (int k = 0; k < 3; k++)
       sum[k] += vector[k];
   }
-  PetscCheck(weight, model->comm, PETSC_ERR_USER_INPUT,
-             "effect %s: there is water, and bodies have no weight: name an effect of type gravity; "
-             "-effect_%s_gravity (m/s^2) says that it is meant",
-             water->name, water->name);
+  PetscCheck(
+    weight, model->comm, PETSC_ERR_USER_INPUT,
+    "effect %s: there is water, and bodies have no weight: name an effect of type gravity; "
+    "-effect_%s_gravity (m/s^2) says that it is meant",
+    water->name, water->name);
   for (int k = 0; k < 3; k++)
     PetscCheck(sum[k] == own[k], model->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_vector is %g,%g,%g m/s^2, and the water of effect %s has "

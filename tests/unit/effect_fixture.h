@@ -54,6 +54,7 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister(&SbEffectCavity));
   PetscCall(SbEffectRegister(&SbEffectPointForce));
   PetscCall(SbEffectRegister(&SbEffectFoundation));
+  PetscCall(SbEffectRegister(&SbEffectWater));
   PetscCall(SbEffectRegister(&SbEffectTie));
   PetscCall(SbEffectRegister(&SbEffectSpring));
   PetscCall(SbEffectRegister(&SbEffectCable));
