@@ -74,6 +74,12 @@ total = heave["kinetic"] + heave["strain"] + heave["water_energy"] + 0.5 * G * h
 near(total.max() - total.min(), 0, 1e-6 * heave["kinetic"].max(), "heave: energy kept, J")
 near(heave["kinetic"].max() / (1000 * G * 0.01 * 0.005**2 / 2), 1, 5e-3, "heave: kinetic energy in the middle, over that of the spring rho g A")
 
+# a soft one with added mass, whose weight a traction takes back, heaves more slowly: T = 2 pi sqrt((m + m_a) / (rho g A))
+run("added", BLOCK.format(1e6, "p1") + "-effects gravity,water,carried,lifts -effect_water_level 0.065 -effect_carried_type mass -effect_carried_on boundary -effect_carried_mass 0.4 "
+    f"-effect_lifts_type traction -effect_lifts_on boundary -effect_lifts_total 0,0,{0.4 * G} -time newmark -ts_dt 0.01 -ts_max_time 1.6")
+added = history("added")
+near(period(added["time"], added["centre_z"] - 0.055), 2 * math.pi * math.sqrt(1 / (1000 * G * 0.01)), 3e-3, "heave with added mass: period, s")
+
 # a flat one rolls: its metacentre is GM = KB + BM - KG above its centre, BM = I / V = b^2 / (12 d); until the deck is wet the righting arm is
 # (GM + BM tan^2(a) / 2) sin(a) (wall-sided formula), here without heave, as the level is half-way up
 m, b, h = 1.0, 0.2, 0.05
