@@ -90,8 +90,8 @@ typedef struct {
 } SbEffectType;
 extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
   SbEffectCavity, SbEffectPointForce, SbEffectFoundation, SbEffectMembrane, SbEffectMass,
-  SbEffectFrame, SbEffectWater, SbEffectTie, SbEffectJoint, SbEffectSpring, SbEffectCable,
-  SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
+  SbEffectFrame, SbEffectWater, SbEffectTie, SbEffectPeriodic, SbEffectJoint, SbEffectSpring,
+  SbEffectCable, SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectTorque;
 
 struct _p_SbEffect {
   char name[SB_NAME_MAX];
@@ -100,7 +100,7 @@ struct _p_SbEffect {
   SbEffectOn on; /* empty for a type without the option */
   SbEffectOn to; /* likewise of the option "to": what the sets in `on` are tied to */
   PetscInt nformula;
-  SbFormula formula[5]; /* [nformula] of all its options; owned */
+  SbFormula formula[9]; /* [nformula] of all its options; owned */
   SbFormula time;       /* one of them: factor on a load; NULL for a type without the option */
   PetscLogEvent event;  /* SbEff_<type>, around every operation from `setup` to `history` */
   PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */

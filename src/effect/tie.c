@@ -32,41 +32,21 @@
   Every rank has the facets of both surfaces at set-up, and keeps the patches with a node of its
   own.
 */
-#include "effect_impl.h"
+#include "facing.h"
 #include "sbgeometry.h"
 
 #define FACTOR 100.   /* stiffness of the tie over that of a cell: see docs/reference/effects.md */
 #define NEAR 0.1      /* of a facet's longest side: how far the other surface may be, by default */
-#define INSIDE 0.25   /* of the lower cell: how far the surfaces may overlap at rest */
 #define FACING -0.5   /* cosine of two outward normals, at most: facets that look at each other */
-#define SLIVER 1e-12  /* of a facet's area: smaller patches are rounding */
 #define ROUNDING 1e-9 /* basis functions below it are those of nodes off the facet */
-#define BESIDE 10.    /* distances within which places that are not held are looked for */
 #define MISSED 0.01   /* of the area that is held: if more of them are there, that is said */
-
-/* A facet with the cell behind it, as ranks send it. */
-typedef struct {
-  PetscReal x[3][3];      /* its corners, counter-clockwise seen from outside, m */
-  PetscReal normal[3];    /* outward unit vector */
-  PetscReal area, size;   /* m^2; longest side, m */
-  PetscReal height;       /* of the cell over it, m */
-  PetscReal corner[4][3]; /* those of the cell, m */
-  PetscReal off[18];      /* curved: its edges off their middles, m */
-  PetscReal basis[4][4];  /* without nodes at edges: weights of the nodes in the corners */
-  PetscReal young;        /* Pa; 0: rigid */
-  PetscInt n;             /* nodes */
-  PetscInt gnode[SB_CELL_NODES];
-  PetscInt number; /* 4 cell_orig + face */
-  PetscBool curved;
-  PetscBool both; /* the other surface has it, too */
-} Side;
 
 typedef struct {
   PetscInt coupling, n; /* its number here, and of its nodes */
   PetscReal *S;         /* [n][n] N/m */
   PetscReal *mean;      /* [n] N/m */
   PetscReal area;       /* m^2 */
-  PetscInt facet[2];    /* Side.number of both */
+  PetscInt facet[2];    /* SbFacing.number of both */
   PetscBool parted;
   PetscBool kept; /* parted at the end of the last step that was accepted */
 } Patch;
@@ -118,65 +98,8 @@ static PetscErrorCode options_tie(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A facet of an owned cell. */
-static void set_side(SbSpace space, const SbFacet *facet, Side *side)
-{
-  const SbMesh mesh = space->mesh;
-  const PetscInt cell = facet->cell;
-  const SbElement element = SbSpaceCellElement(space, cell);
-
-  *side = (Side){.area = facet->area,
-                 .height = facet->height,
-                 .number = 4 * mesh->cell_orig[cell] + facet->face};
-  for (int c = 0; c < 3; c++)
-    for (int k = 0; k < 3; k++)
-      side->x[c][k] = mesh->x[3 * facet->vertex[c] + k];
-  for (int c = 0; c < 3; c++) {
-    side->normal[c] = facet->normal[c];
-    side->size = PetscMax(side->size, PetscSqrtReal(SbDistance2(side->x[c], side->x[(c + 1) % 3])));
-  }
-  for (int c = 0; c < 4; c++) {
-    for (int k = 0; k < 3; k++)
-      side->corner[c][k] = mesh->x[3 * mesh->cell[4 * cell + c] + k];
-    for (int a = 0; a < 4 && !element->nodes_per[1]; a++)
-      side->basis[c][a] = SbSpaceCornerBasis(space, cell, c)[a];
-  }
-  side->curved = (PetscBool)((mesh->cell_set[cell] & SB_CURVED) != 0);
-  for (int k = 0; k < 18 && side->curved; k++)
-    side->off[k] = mesh->edge_off[18 * cell + k];
-  side->young =
-    element->rigid ? 0 : SbMaterialYoungModulus(space->material[mesh->cell_material[cell]]);
-  side->n = element->nodes_per[1] ? SB_CELL_NODES : 4;
-  for (PetscInt a = 0; a < side->n; a++)
-    side->gnode[a] = space->gnode[SbSpaceCellNode(space, cell, a)];
-}
-
-/* The facets of a surface on all ranks. */
-static PetscErrorCode gather(SbSpace space, const SbEffectOn *on, PetscInt *n, Side **side)
-{
-  SbFacet *facets;
-  Side *mine;
-  PetscInt nfacet;
-  PetscInt nmine = 0;
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(space, on, &nfacet, &facets));
-  PetscCall(PetscMalloc1(nfacet, &mine));
-  for (PetscInt i = 0; i < nfacet; i++)
-    if (facets[i].cell < space->mesh->ncell_owned)
-      set_side(space, &facets[i], &mine[nmine++]);
-  PetscCall(PetscFree(facets));
-  PetscCallMPI(MPI_Type_contiguous((int)sizeof(Side), MPI_BYTE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(SbAllgatherv(space->comm, type, nmine, mine, n, side, NULL));
-  PetscCallMPI(MPI_Type_free(&type));
-  PetscCall(PetscFree(mine));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Marks the facets that both surfaces have. */
-static PetscErrorCode mark_both(PetscInt na, Side a[], PetscInt nb, Side b[])
+static PetscErrorCode mark_both(PetscInt na, SbFacing a[], PetscInt nb, SbFacing b[])
 {
   SbKey *key;
 
@@ -197,121 +120,9 @@ static PetscErrorCode mark_both(PetscInt na, Side a[], PetscInt nb, Side b[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The basis functions of a side's cell at a place, in it or beyond; false: a curved cell has none
-   there. */
-static PetscBool basis_at(const Side *side, const PetscReal x[3], PetscReal phi[SB_CELL_NODES])
-{
-  static const PetscInt own[4] = {0, 1, 2, 3};
-  PetscReal L[4];
-
-  SbTetBarycentric(&side->corner[0][0], own, x, L);
-  if (side->curved && !SbTetCurvedBarycentric(&side->corner[0][0], own, side->off, x, L))
-    return PETSC_FALSE;
-  if (side->n == SB_CELL_NODES) {
-    SbQuadraticBasis(L, phi);
-    return PETSC_TRUE;
-  }
-  for (int a = 0; a < 4; a++) {
-    phi[a] = 0;
-    for (int c = 0; c < 4; c++)
-      phi[a] += L[c] * side->basis[c][a];
-  }
-  return PETSC_TRUE;
-}
-
-/* A patch that is being summed. */
-typedef struct {
-  PetscInt n, gnode[2 * SB_CELL_NODES];
-  PetscInt of_b[SB_CELL_NODES]; /* B's nodes among them */
-  PetscReal S[2 * SB_CELL_NODES][2 * SB_CELL_NODES], mean[2 * SB_CELL_NODES], area;
-  PetscReal missed, farthest; /* what is too far apart: area, m^2, and distance, m */
-} Sum;
-
-/* The nodes of both sides, each once. */
-static void begin_sum(const Side *a, const Side *b, Sum *sum)
-{
-  *sum = (Sum){.n = a->n};
-  for (PetscInt i = 0; i < a->n; i++)
-    sum->gnode[i] = a->gnode[i];
-  for (PetscInt i = 0; i < b->n; i++) {
-    PetscInt k = 0;
-
-    while (k < sum->n && sum->gnode[k] != b->gnode[i])
-      k++;
-    if (k == sum->n)
-      sum->gnode[sum->n++] = b->gnode[i];
-    sum->of_b[i] = k;
-  }
-}
-
-/* Adds a point of the rule: a place x of A's facet, and its area. */
-static void add_point(const Side *a, const Side *b, const PetscReal x[3], PetscReal area,
-                      PetscReal k, Sum *sum)
-{
-  PetscReal phi[2][SB_CELL_NODES];
-  PetscReal s[2 * SB_CELL_NODES] = {0};
-
-  if (!basis_at(a, x, phi[0]) || !basis_at(b, x, phi[1]))
-    return;
-  for (PetscInt i = 0; i < a->n; i++)
-    s[i] += phi[0][i];
-  for (PetscInt i = 0; i < b->n; i++)
-    s[sum->of_b[i]] -= phi[1][i];
-  for (PetscInt i = 0; i < sum->n; i++) {
-    sum->mean[i] += k * area * s[i];
-    for (PetscInt j = 0; j < sum->n; j++)
-      sum->S[i][j] += k * area * s[i] * s[j];
-  }
-  sum->area += area;
-}
-
-/* Sums over the part of A's facet that lies under one of B, no farther from it than `distance`. */
-static void sum_patch(const Side *a, const Side *b, PetscReal distance, PetscReal k, Sum *sum)
-{
-  const PetscReal *const of_a[3] = {a->x[0], a->x[1], a->x[2]};
-  const PetscReal *const of_b[3] = {b->x[0], b->x[1], b->x[2]};
-  PetscReal corner[SB_OVER][3];
-  const int n = SbTriangleOver(of_a, a->normal, of_b, corner);
-
-  begin_sum(a, b, sum);
-  for (int t = 1; t + 1 < n; t++) {
-    PetscReal side[2][3], normal[3];
-
-    SbSubtract(corner[t], corner[0], side[0]);
-    SbSubtract(corner[t + 1], corner[0], side[1]);
-    SbCross(side[1], side[0], normal);
-
-    /* B's triangle is seen from behind: its part in A's plane */
-    const PetscReal area = SbDot3(normal, a->normal) / 2;
-
-    if (!(area > SLIVER * a->area))
-      continue;
-    for (int q = 0; q < SbRuleFacet.n; q++) {
-      const PetscReal *L = SbRuleFacet.L[q];
-      PetscReal x[3], to[3];
-
-      for (int i = 0; i < 3; i++)
-        x[i] = L[0] * corner[0][i] + L[1] * corner[t][i] + L[2] * corner[t + 1][i];
-      SbSubtract(x, a->x[0], to);
-
-      const PetscReal gap = SbDot3(to, a->normal);
-
-      for (int i = 0; i < 3; i++)
-        x[i] -= gap * a->normal[i];
-      if (gap < -INSIDE * PetscMin(a->height, b->height) || gap > BESIDE * distance)
-        continue;
-      if (PetscAbsReal(gap) <= distance) {
-        add_point(a, b, x, area * SbRuleFacet.weight[q], k, sum);
-        continue;
-      }
-      sum->missed += area * SbRuleFacet.weight[q];
-      sum->farthest = PetscMax(sum->farthest, PetscAbsReal(gap));
-    }
-  }
-}
-
 /* Keeps a patch if one of its nodes is owned here. */
-static PetscErrorCode keep(SbSpace space, Tie *tie, const Side *a, const Side *b, const Sum *sum)
+static PetscErrorCode keep(SbSpace space, Tie *tie, const SbFacing *a, const SbFacing *b,
+                           const SbFacingSum *sum)
 {
   Patch *patch;
   PetscInt node[2 * SB_CELL_NODES], gnode[2 * SB_CELL_NODES];
@@ -345,7 +156,8 @@ static PetscErrorCode keep(SbSpace space, Tie *tie, const Side *a, const Side *b
 }
 
 /* The stiffness between two facets, Pa/m. */
-static PetscErrorCode stiffness_between(SbEffect e, const Side *a, const Side *b, PetscReal *k)
+static PetscErrorCode stiffness_between(SbEffect e, const SbFacing *a, const SbFacing *b,
+                                        PetscReal *k)
 {
   const Tie *tie = (const Tie *)e->data;
   const PetscReal soft = PetscMin(a->young, b->young);
@@ -362,7 +174,8 @@ static PetscErrorCode stiffness_between(SbEffect e, const Side *a, const Side *b
 }
 
 /* The distance between two surfaces, from the corners of the first, m. */
-static PetscReal distance_between(PetscInt n, const Side a[], const SbBoxTree *tree, const Side b[])
+static PetscReal distance_between(PetscInt n, const SbFacing a[], const SbBoxTree *tree,
+                                  const SbFacing b[])
 {
   PetscReal least = PETSC_MAX_REAL;
 
@@ -385,8 +198,8 @@ static PetscReal distance_between(PetscInt n, const Side a[], const SbBoxTree *t
 }
 
 /* All patches of two surfaces; a pair of facets that both of them have is one patch. */
-static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const Side a[],
-                                   const SbBoxTree *tree, const Side b[], Found *found)
+static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const SbFacing a[],
+                                   const SbBoxTree *tree, const SbFacing b[], Found *found)
 {
   Tie *tie = (Tie *)e->data;
 
@@ -400,20 +213,20 @@ static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const
     SbBoxClear(box);
     for (int c = 0; c < 3; c++)
       SbBoxAdd(box, a[i].x[c]);
-    for (SbBoxNearestBegin(tree, box, PetscSqr(BESIDE * distance), &nearest);
+    for (SbBoxNearestBegin(tree, box, PetscSqr(SB_FACING_BESIDE * distance), &nearest);
          SbBoxNearestNext(&nearest, &j);) {
       PetscReal k;
-      Sum sum;
+      SbFacingSum sum;
 
       if (SbDot3(a[i].normal, b[j].normal) > FACING)
         continue;
       if (a[i].both && b[j].both && a[i].number >= b[j].number)
         continue;
       PetscCall(stiffness_between(e, &a[i], &b[j], &k));
-      sum_patch(&a[i], &b[j], distance, k, &sum);
+      SbFacingSumUp(&a[i], &b[j], distance, k, &sum);
       found->missed += sum.missed;
       found->farthest = PetscMax(found->farthest, sum.farthest);
-      if (sum.area <= SLIVER * a[i].area)
+      if (sum.area <= SB_FACING_SLIVER * a[i].area)
         continue;
       found->held += sum.area;
       PetscCall(keep(space, tie, &a[i], &b[j], &sum));
@@ -423,8 +236,8 @@ static PetscErrorCode find_patches(SbEffect e, SbSpace space, PetscInt na, const
 }
 
 /* An error if nothing is tied, a warning if more could be, and the note of the set-up. */
-static PetscErrorCode report(SbEffect e, SbSpace space, PetscInt na, const Side a[],
-                             const SbBoxTree *tree, const Side b[], const Found *found)
+static PetscErrorCode report(SbEffect e, SbSpace space, PetscInt na, const SbFacing a[],
+                             const SbBoxTree *tree, const SbFacing b[], const Found *found)
 {
   const Tie *tie = (const Tie *)e->data;
 
@@ -454,11 +267,11 @@ static PetscErrorCode couplings_tie(SbEffect e, SbSpace space)
   PetscInt na, nb;
   PetscInt most = 0;
   SbBoxTree tree;
-  Side *a, *b;
+  SbFacing *a, *b;
 
   PetscFunctionBeginUser;
-  PetscCall(gather(space, &e->on, &na, &a));
-  PetscCall(gather(space, &e->to, &nb, &b));
+  PetscCall(SbFacingGather(space, &e->on, &na, &a));
+  PetscCall(SbFacingGather(space, &e->to, &nb, &b));
   PetscCall(mark_both(na, a, nb, b));
 
   /* the patches, by a tree over the facets of B */

@@ -8,26 +8,14 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
-  static const SbEffectType *const effects[] = {&SbEffectGravity,
-                                                &SbEffectBodyForce,
-                                                &SbEffectTraction,
-                                                &SbEffectPressure,
-                                                &SbEffectCavity,
-                                                &SbEffectFoundation,
-                                                &SbEffectMembrane,
-                                                &SbEffectMass,
-                                                &SbEffectFrame,
-                                                &SbEffectWater,
-                                                &SbEffectTie,
-                                                &SbEffectJoint,
-                                                &SbEffectSpring,
-                                                &SbEffectCable,
-                                                &SbEffectPointForce,
-                                                &SbEffectFixed,
-                                                &SbEffectPrescribedDisplacement,
-                                                &SbEffectTorque,
-                                                &SbEffectDamping,
-                                                &SbEffectContact};
+  static const SbEffectType *const effects[] = {
+    &SbEffectGravity,    &SbEffectBodyForce, &SbEffectTraction,
+    &SbEffectPressure,   &SbEffectCavity,    &SbEffectFoundation,
+    &SbEffectMembrane,   &SbEffectMass,      &SbEffectFrame,
+    &SbEffectWater,      &SbEffectTie,       &SbEffectPeriodic,
+    &SbEffectJoint,      &SbEffectSpring,    &SbEffectCable,
+    &SbEffectPointForce, &SbEffectFixed,     &SbEffectPrescribedDisplacement,
+    &SbEffectTorque,     &SbEffectDamping,   &SbEffectContact};
   static const struct {
     const char *klass;
     const SbOption *rows;
