@@ -11,17 +11,23 @@
   As in a tie (tie.c), by a stiffness k per area on patches of facets, whose meshes need not match
   (facing.c): with S_ab = integral k s_a s_b dA and m_a = integral s_a dA of a patch,
 
-    f_a = -sum_b S_ab u_b + (k d + q) m_a,   d = H_iD L_D.
+    f_a = -sum_b S_ab u_b + (k d + q) m_a + g_a,   d = H_iD L_D.
 
   A component is given, or free: then its d is the mean of j on one patch of the side, the reference
   patch, whose nodes each patch is coupled with. E = 1/2 integral k |j - d|^2 has no other stiffness
   in the way of that H_iD, so that the mean stress of the component vanishes.
 
-  q is the mean traction. In a static run it is the multiplier of the mean of j - d, so that the
-  mean strain is exact, and an even stress is, too: a load step is solved again with
-  q - k mean(j - d) in its place (method of multipliers) until that is below TOLERANCE of the
-  strain. What is left to k is the part of the tractions that varies along a side. In a dynamic run
-  q = 0: the sides yield as in a tie.
+  q is a mean traction, g_a further forces. In a static run these are multipliers, so that the mean
+  strain is exact: a load step is solved again with the forces of the springs added to g (method of
+  multipliers) until the jumps are below TOLERANCE of the strain. It begins with q that of the last
+  step and g = 0. Which jumps go to zero:
+
+    facets match, nodes at vertices (P1, P2)   all
+    facets match (CR, DG)                      their mean on each facet
+    else                                       their mean on the side: more would lock both traces
+
+  What is left to k is the part of the tractions that varies in between. In a dynamic run q = g = 0:
+  the sides yield as in a tie.
 
   The mean first Piola-Kirchhoff stress is P_iD = (force_i on the upper side of D) / (area of that
   side of the box); its work is V integral P : dH by the trapezoidal rule over steps.
@@ -32,20 +38,29 @@
 #include "facing.h"
 #include "sbgeometry.h"
 
-#define FACTOR 100.    /* stiffness over that of a cell, as of ties */
-#define FLAT 1e-6      /* of the box's diagonal: facets nearer to its sides are on them */
-#define NORMAL 0.9999  /* cosine of their normals with the axis, at least */
-#define MATCH 0.01     /* of a side's area: how much of it may have nothing opposite */
-#define SAME 1e-9      /* relative rounding of areas of patches */
-#define ROUNDING 1e-9  /* basis functions below it are those of nodes off the facet */
-#define TOLERANCE 1e-7 /* of the mean strain, relative */
-#define REPEATED 40    /* solves of a load step, at most: 3 to 4 are usual, 15 near nu = 0.5 */
+#define FACTOR 100.              /* stiffness over that of a cell, as of ties */
+#define FLAT 1e-6                /* of the box's diagonal: facets nearer to its sides are on them */
+#define NORMAL 0.9999            /* cosine of their normals with the axis, at least */
+#define MATCH 0.01               /* of a side's area: how much of it may have nothing opposite */
+#define SAME 1e-9                /* relative rounding of areas of patches */
+#define ROUNDING 1e-9            /* basis functions below it are those of nodes off the facet */
+#define TOLERANCE 1e-7           /* of the mean strain: jumps of the sides over their distance */
+#define REPEATED 40              /* solves of a load step, at most: 4 are usual, 20 at nu = 0.499 */
 #define MOST (4 * SB_CELL_NODES) /* nodes of a patch, with those of the reference patch */
+
+/* Which jumps become zero. */
+typedef enum {
+  ALL,
+  FACETS,
+  MEAN
+} Jumps;
 
 typedef struct {
   PetscInt coupling, n; /* its number here, and of its nodes */
   PetscReal *S;         /* [2][n][n] of components that are given, and free, N/m */
   PetscReal *mean;      /* [2][n] likewise, m^2 */
+  PetscReal *g;         /* [n][3] N */
+  PetscReal pull[3];    /* of g, on the upper side, N */
   PetscReal k, area;    /* Pa/m, m^2 */
   int axis;
 } Patch;
@@ -53,13 +68,14 @@ typedef struct {
 /* One of the sides, with its opposite one. */
 typedef struct {
   PetscBool tied;
+  Jumps exact;
   PetscReal length, area, held, stiffness; /* m; of the box, and that is tied, m^2; mean k, Pa/m */
 } Side;
 
 /* Sums over all patches. */
 typedef struct {
   PetscReal jump[9]; /* integral (j - d) of given components, j of free ones, m^3 */
-  PetscReal pull[9]; /* integral k (j - d), N */
+  PetscReal pull[9]; /* force on the upper sides but that of q, N */
 } Sums;
 
 typedef struct {
@@ -71,7 +87,7 @@ typedef struct {
   PetscInt n, size;
   Patch *patch;               /* [n] */
   PetscReal *work;            /* [9 most^2] of the tangent */
-  PetscReal q[9], kept[9];    /* mean tractions, and at the end of the last step, Pa */
+  PetscReal q[9];             /* Pa */
   PetscReal H[9], P[9], done; /* of the last step: strain, stress, Pa, work, J */
   PetscInt solves;
   PetscBool warned;
@@ -157,7 +173,7 @@ static PetscErrorCode options_periodic(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "stiffness", &p->stiffness));
   e->linear = e->steady = PETSC_FALSE;
   e->stiff = e->holds = PETSC_TRUE;
-  e->nstate = 28;
+  e->nstate = 19;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -255,7 +271,8 @@ static PetscErrorCode keep(SbSpace space, Periodic *p, int axis, PetscReal k,
   PetscCall(SbReserve(p->n + 1, sizeof(*p->patch), &p->size, &p->patch));
   patch = &p->patch[p->n++];
   *patch = (Patch){.coupling = coupling, .n = n, .k = k, .area = sum->area, .axis = axis};
-  PetscCall(PetscMalloc2(2 * n * n, &patch->S, 2 * n, &patch->mean));
+  PetscCall(PetscMalloc3(2 * n * n, &patch->S, 2 * n, &patch->mean, 3 * n, &patch->g));
+  PetscCall(PetscArrayzero(patch->g, 3 * n));
   for (PetscInt i = 0; i < n; i++) {
     patch->mean[i] = s[0][i];
     patch->mean[n + i] = s[0][i] - sum->area * s[1][i];
@@ -286,6 +303,16 @@ static PetscErrorCode stiffness_between(SbEffect e, const SbFacing *a, const SbF
              "-effect_%s_stiffness (Pa/m)",
              e->name, e->name);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether its cell has nodes at the vertices. */
+static PetscBool at_vertices(const SbFacing *facet)
+{
+  PetscBool all = PETSC_TRUE;
+
+  for (int k = 0; k < 16 && facet->n < SB_CELL_NODES; k++)
+    all = (PetscBool)(all && facet->basis[k / 4][k % 4] == (k / 4 == k % 4));
+  return all;
 }
 
 /* A place of the facet that is held, by its cell's nodes. */
@@ -357,6 +384,10 @@ static PetscErrorCode tie_sides(SbEffect e, SbSpace space, int axis, const Petsc
           continue;
         }
         p->young = PetscMax(p->young, PetscMax(a->young, b->young));
+        if (sum.area < (1 - FLAT) * PetscMax(a->area, b->area))
+          side->exact = MEAN;
+        else if (side->exact == ALL && !(at_vertices(a) && at_vertices(b)))
+          side->exact = FACETS;
         if (is_before(a, b, sum.area, best, reference.area)) {
           reference = sum;
           for (PetscInt c = 0; c < sum.n; c++)
@@ -479,7 +510,7 @@ static PetscErrorCode force_periodic(SbEffect e, SbSpace space, const SbStage *s
         p->free[c] ? 0 : patch->k * H[c] * p->side[patch->axis].length + p->q[c];
 
       for (PetscInt a = 0; a < n; a++) {
-        f[3 * node[a] + i] += even * patch->mean[a];
+        f[3 * node[a] + i] += even * patch->mean[a] + patch->g[3 * a + i];
         for (PetscInt b = 0; b < n; b++)
           f[3 * node[a] + i] -= S[n * a + b] * stage->u[3 * node[b] + i];
       }
@@ -556,7 +587,7 @@ static PetscErrorCode sum_patches(SbEffect e, SbSpace space, const SbStage *stag
       if (!p->free[c])
         jump = off = jump - H[c] * p->side[patch->axis].length * patch->area;
       sums->jump[c] += jump;
-      sums->pull[c] += patch->k * off;
+      sums->pull[c] += patch->pull[i] - patch->k * off;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -578,7 +609,7 @@ static PetscErrorCode state_of(SbEffect e, PetscReal t, const Sums *sums, PetscR
       continue;
     PetscCall(SbEffectValueAt(e, p->gradient[c], t, &H[c]));
     H[c] += sums->jump[c] / (side->held * side->length);
-    P[c] = ((p->free[c] ? 0 : p->q[c] * side->held) - sums->pull[c]) / side->area;
+    P[c] = ((p->free[c] ? 0 : p->q[c] * side->held) + sums->pull[c]) / side->area;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -608,52 +639,110 @@ static PetscErrorCode look_for_supports(Periodic *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of static runs: the mean tractions. */
+/* The largest jump over the distance of its side, of those that go to zero; and adds to g what the
+   springs bear, if `add`. */
+static void add_multipliers(PetscBool add, SbSpace space, Periodic *p, const SbStage *stage,
+                            const PetscReal H[9], const Sums *sums, PetscReal *largest)
+{
+  for (Patch *patch = p->patch; patch < p->patch + p->n; patch++) {
+    const PetscInt *node = nodes_of(space, patch->coupling);
+    const Side *side = &p->side[patch->axis];
+    const PetscInt n = patch->n;
+
+    for (int i = 0; i < 3; i++) {
+      const int c = 3 * i + patch->axis;
+      const PetscReal d = p->free[c] ? 0 : H[c] * side->length;
+      const PetscReal *S = patch->S + p->free[c] * n * n;
+      const PetscReal *mean = patch->mean + p->free[c] * n;
+      const PetscReal even =
+        p->free[c] ? 0 : side->stiffness * sums->jump[c] / side->held; /* of MEAN, Pa */
+      PetscReal off = -d * patch->area;
+      PetscReal most = PetscAbsReal(even) / side->stiffness;
+
+      for (PetscInt a = 0; a < n; a++)
+        off += mean[a] * stage->u[3 * node[a] + i];
+      if (side->exact == FACETS)
+        most = PetscAbsReal(off) / patch->area;
+      patch->pull[i] -= !add ? 0 : side->exact == MEAN ? even * patch->area : patch->k * off;
+      for (PetscInt a = 0; a < n; a++) {
+        PetscReal f = 0;
+
+        if (side->exact == MEAN)
+          f = even * mean[a];
+        if (side->exact == FACETS)
+          f = patch->k * off / patch->area * mean[a];
+        if (side->exact == ALL) {
+          f = -patch->k * d * mean[a];
+          for (PetscInt b = 0; b < n; b++)
+            f += S[n * a + b] * stage->u[3 * node[b] + i];
+          most = PetscMax(most, 3 * PetscAbsReal(f) / (patch->k * patch->area));
+        }
+        patch->g[3 * a + i] -= add ? f : 0;
+      }
+      *largest = PetscMax(*largest, most / side->length);
+    }
+  }
+}
+
+/* The multipliers that a load step begins with. */
+static PetscErrorCode begin_step(Periodic *p)
+{
+  PetscFunctionBeginUser;
+  p->solves = 0;
+  for (int c = 0; c < 9; c++)
+    p->q[c] = p->side[c % 3].tied ? p->P[c] * p->side[c % 3].area / p->side[c % 3].held : 0;
+  for (Patch *patch = p->patch; patch < p->patch + p->n; patch++) {
+    PetscCall(PetscArrayzero(patch->g, 3 * patch->n));
+    PetscCall(PetscArrayzero(patch->pull, 3));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of static runs: multipliers. */
 static PetscErrorCode settle_periodic(SbEffect e, SbSpace space, const SbStage *stage,
                                       PetscBool *changed)
 {
   Periodic *p = (Periodic *)e->data;
   PetscReal strain = 0;
+  PetscReal stress = 0;
   PetscReal off = 0;
-  PetscReal H[9], P[9];
+  PetscReal given[9], H[9], P[9];
   Sums sums;
 
   PetscFunctionBeginUser;
   if (!stage) {
-    p->solves = 0;
-    PetscCall(PetscArraycpy(p->q, p->kept, 9));
+    PetscCall(begin_step(p));
     if (!p->looked)
       PetscCall(look_for_supports(p, space));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!SbEffectActs(e, stage->t))
+  if (!SbEffectActs(e, stage->t) || p->solves == REPEATED)
     PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(gradient_at(e, stage->t, given));
   PetscCall(sum_all(e, space, stage, &sums));
   PetscCall(state_of(e, stage->t, &sums, H, P));
   for (int c = 0; c < 9; c++) {
-    const Side *side = &p->side[c % 3];
-
-    strain = PetscMax(strain, PetscAbsReal(H[c]));
-    if (p->young > 0)
-      strain = PetscMax(strain, PetscAbsReal(P[c]) / p->young);
-    if (side->tied && !p->free[c])
-      off = PetscMax(off, PetscAbsReal(sums.jump[c]) / (side->held * side->length));
+    strain = PetscMax(strain, PetscAbsReal(p->free[c] ? H[c] : given[c]));
+    stress = PetscMax(stress, PetscAbsReal(P[c]));
   }
+  if (strain == 0 && p->young > 0) /* growth in a cell that may not grow */
+    strain = stress / p->young;
+  add_multipliers(PETSC_FALSE, space, p, stage, given, &sums, &off);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &off, 1, MPIU_REAL, MPI_MAX, space->comm));
   if (off <= TOLERANCE * strain)
     PetscFunctionReturn(PETSC_SUCCESS);
-  if (++p->solves == REPEATED) {
-    if (!p->warned)
-      PetscCall(SbWarning(space->comm,
-                          "effect %s: at load factor %g the mean gradient is off by %.2g after "
-                          "%d solves; give a larger -effect_%s_stiffness",
-                          e->name, (double)stage->t, (double)off, REPEATED, e->name));
-    p->warned = PETSC_TRUE;
+  if (++p->solves < REPEATED) {
+    add_multipliers(PETSC_TRUE, space, p, stage, given, &sums, &off);
+    *changed = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (int c = 0; c < 9; c++)
-    if (p->side[c % 3].tied && !p->free[c])
-      p->q[c] -= p->side[c % 3].stiffness * sums.jump[c] / p->side[c % 3].held;
-  *changed = PETSC_TRUE;
+  if (!p->warned)
+    PetscCall(SbWarning(space->comm,
+                        "effect %s: at load factor %g opposite sides are off by %.2g of their "
+                        "distance after %d solves; give more -static_steps, a smaller -snes_rtol, "
+                        "or a larger -effect_%s_stiffness",
+                        e->name, (double)stage->t, (double)off, REPEATED, e->name));
+  p->warned = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -664,7 +753,6 @@ static PetscErrorCode accept_periodic(SbEffect e, SbSpace space, const SbStage *
   Sums sums;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArraycpy(p->kept, p->q, 9));
   PetscCall(sum_all(e, space, stage, &sums));
   PetscCall(state_of(e, stage->t, &sums, H, P));
   for (int c = 0; c < 9; c++) {
@@ -686,11 +774,10 @@ static PetscErrorCode save_periodic(SbEffect e, SbSpace space, PetscInt *n, Pets
 
   PetscFunctionBeginUser;
   *n = !space->rank;
-  PetscCall(PetscMalloc1(28, records));
-  PetscCall(PetscArraycpy(*records, p->kept, 9));
-  PetscCall(PetscArraycpy(*records + 9, p->H, 9));
-  PetscCall(PetscArraycpy(*records + 18, p->P, 9));
-  (*records)[27] = p->done;
+  PetscCall(PetscMalloc1(19, records));
+  PetscCall(PetscArraycpy(*records, p->H, 9));
+  PetscCall(PetscArraycpy(*records + 9, p->P, 9));
+  (*records)[18] = p->done;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -705,11 +792,11 @@ static PetscErrorCode load_periodic(SbEffect e, SbSpace space, PetscReal t, cons
   (void)u;
   if (n < 1)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArraycpy(p->kept, records, 9));
-  PetscCall(PetscArraycpy(p->q, records, 9));
-  PetscCall(PetscArraycpy(p->H, records + 9, 9));
-  PetscCall(PetscArraycpy(p->P, records + 18, 9));
-  p->done = records[27];
+  PetscCall(PetscArraycpy(p->H, records, 9));
+  PetscCall(PetscArraycpy(p->P, records + 9, 9));
+  p->done = records[18];
+  if (!e->dynamic)
+    PetscCall(begin_step(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -775,7 +862,7 @@ static PetscErrorCode destroy_periodic(SbEffect e)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < p->n; i++)
-    PetscCall(PetscFree2(p->patch[i].S, p->patch[i].mean));
+    PetscCall(PetscFree3(p->patch[i].S, p->patch[i].mean, p->patch[i].g));
   PetscCall(PetscFree(p->patch));
   PetscCall(PetscFree(p->work));
   PetscFunctionReturn(PETSC_SUCCESS);
