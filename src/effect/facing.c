@@ -40,8 +40,12 @@ static void set_side(SbSpace space, const SbFacet *facet, SbFacing *side)
   side->curved = (PetscBool)((mesh->cell_set[cell] & SB_CURVED) != 0);
   for (int k = 0; k < 18 && side->curved; k++)
     side->off[k] = mesh->edge_off[18 * cell + k];
-  side->young =
-    element->rigid ? 0 : SbMaterialYoungModulus(space->material[mesh->cell_material[cell]]);
+  if (!element->rigid) {
+    const SbMaterial material = space->material[mesh->cell_material[cell]];
+
+    side->young = SbMaterialYoungModulus(material);
+    side->wave = SbMaterialWaveModulus(material);
+  }
   side->n = element->nodes_per[1] ? SB_CELL_NODES : 4;
   for (PetscInt a = 0; a < side->n; a++)
     side->gnode[a] = space->gnode[SbSpaceCellNode(space, cell, a)];

@@ -17,7 +17,7 @@ typedef struct {
   PetscReal corner[4][3]; /* those of the cell, m */
   PetscReal off[18];      /* curved: its edges off their middles, m */
   PetscReal basis[4][4];  /* without nodes at edges: weights of the nodes in the corners */
-  PetscReal young;        /* Pa; 0: rigid */
+  PetscReal young, wave;  /* E, lambda + 2 mu, Pa; 0: rigid */
   PetscInt n;             /* nodes */
   PetscInt gnode[SB_CELL_NODES];
   PetscInt number; /* 4 cell_orig + face */

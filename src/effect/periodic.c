@@ -15,7 +15,8 @@
 
   A component is given, or free: then its d is the mean of j on one patch of the side, the reference
   patch, whose nodes each patch is coupled with. E = 1/2 integral k |j - d|^2 has no other stiffness
-  in the way of that H_iD, so that the mean stress of the component vanishes.
+  in the way of that H_iD, so that the mean stress of the component vanishes: what all other patches
+  bear, the reference patch bears the opposite of.
 
   q is a mean traction, g_a further forces. In a static run these are multipliers, so that the mean
   strain is exact: a load step is solved again with the forces of the springs added to g (method of
@@ -45,7 +46,7 @@
 #define SAME 1e-9                /* relative rounding of areas of patches */
 #define ROUNDING 1e-9            /* basis functions below it are those of nodes off the facet */
 #define TOLERANCE 1e-7           /* of the mean strain: jumps of the sides over their distance */
-#define REPEATED 40              /* solves of a load step, at most: 4 are usual, 20 at nu = 0.499 */
+#define REPEATED 40              /* solves of a load step, at most: 3 to 6 are usual */
 #define MOST (4 * SB_CELL_NODES) /* nodes of a patch, with those of the reference patch */
 
 /* Which jumps become zero. */
@@ -75,14 +76,14 @@ typedef struct {
 /* Sums over all patches. */
 typedef struct {
   PetscReal jump[9]; /* integral (j - d) of given components, j of free ones, m^3 */
-  PetscReal pull[9]; /* force on the upper sides but that of q, N */
+  PetscReal pull[9]; /* force on the upper sides but that of q, of given components, N */
 } Sums;
 
 typedef struct {
   SbFormula gradient[9];
   int axes; /* bits 0..2 */
   PetscBool free[9];
-  PetscReal stiffness, young; /* Pa/m, 0: by default; largest of the body, Pa */
+  PetscReal stiffness, wave; /* Pa/m, 0: by default; largest lambda + 2 mu, Pa */
   Side side[3];
   PetscInt n, size;
   Patch *patch;               /* [n] */
@@ -114,7 +115,7 @@ static const SbOption rows[] = {
    "components of the gradient that are not given, and have no mean stress: xx, xy, ..."},
   {"stiffness", SB_OPTION_REAL, 1, "Pa/m", "0", "[0, inf)",
    "stress over the distance by which opposite places come off; 0: a hundred times that of a cell, "
-   "E / h"},
+   "(lambda + 2 mu) / h"},
 };
 
 /* Components that contradict each other. */
@@ -287,17 +288,15 @@ static PetscErrorCode keep(SbSpace space, Periodic *p, int axis, PetscReal k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The stiffness between two facets, Pa/m. */
+/* The stiffness between two facets, of the stiffer cell, Pa/m: the solves that the multipliers take
+   grow with the ratio of that of the cells to it. */
 static PetscErrorCode stiffness_between(SbEffect e, const SbFacing *a, const SbFacing *b,
                                         PetscReal *k)
 {
-  Periodic *p = (Periodic *)e->data;
-  const PetscReal soft = PetscMin(a->young, b->young);
+  const Periodic *p = (const Periodic *)e->data;
 
   PetscFunctionBeginUser;
-  *k = p->stiffness;
-  if (*k == 0)
-    *k = FACTOR * (soft > 0 ? soft : PetscMax(a->young, b->young)) / a->size;
+  *k = p->stiffness > 0 ? p->stiffness : FACTOR * PetscMax(a->wave, b->wave) / a->size;
   PetscCheck(*k > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "effect %s ties sides of rigid bodies, which have no stiffness to compare with: give "
              "-effect_%s_stiffness (Pa/m)",
@@ -383,7 +382,7 @@ static PetscErrorCode tie_sides(SbEffect e, SbSpace space, int axis, const Petsc
           PetscCall(keep(space, p, axis, k, &sum, any ? &reference : NULL));
           continue;
         }
-        p->young = PetscMax(p->young, PetscMax(a->young, b->young));
+        p->wave = PetscMax(p->wave, PetscMax(a->wave, b->wave));
         if (sum.area < (1 - FLAT) * PetscMax(a->area, b->area))
           side->exact = MEAN;
         else if (side->exact == ALL && !(at_vertices(a) && at_vertices(b)))
@@ -443,7 +442,7 @@ static PetscErrorCode couplings_periodic(SbEffect e, SbSpace space)
     PetscCall(PetscFree(of[1]));
   }
   PetscCall(PetscFree(facet));
-  p->hold_stiffness = p->young * SbBoxDiagonal(box);
+  p->hold_stiffness = p->wave * SbBoxDiagonal(box);
   for (PetscInt i = 0; i < p->n; i++)
     most = PetscMax(most, p->patch[i].n);
   most = PetscMax(most, p->nhold);
@@ -578,16 +577,13 @@ static PetscErrorCode sum_patches(SbEffect e, SbSpace space, const SbStage *stag
     for (int i = 0; i < 3; i++) {
       const int c = 3 * i + patch->axis;
       PetscReal jump = 0;
-      PetscReal off = 0;
 
-      for (PetscInt a = 0; a < patch->n; a++) {
+      for (PetscInt a = 0; a < patch->n; a++)
         jump += patch->mean[a] * stage->u[3 * node[a] + i];
-        off += patch->mean[patch->n + a] * stage->u[3 * node[a] + i];
-      }
       if (!p->free[c])
-        jump = off = jump - H[c] * p->side[patch->axis].length * patch->area;
+        jump -= H[c] * p->side[patch->axis].length * patch->area;
       sums->jump[c] += jump;
-      sums->pull[c] += patch->pull[i] - patch->k * off;
+      sums->pull[c] += patch->pull[i] - patch->k * jump;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -609,7 +605,8 @@ static PetscErrorCode state_of(SbEffect e, PetscReal t, const Sums *sums, PetscR
       continue;
     PetscCall(SbEffectValueAt(e, p->gradient[c], t, &H[c]));
     H[c] += sums->jump[c] / (side->held * side->length);
-    P[c] = ((p->free[c] ? 0 : p->q[c] * side->held) + sums->pull[c]) / side->area;
+    if (!p->free[c])
+      P[c] = (p->q[c] * side->held + sums->pull[c]) / side->area;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -725,8 +722,8 @@ static PetscErrorCode settle_periodic(SbEffect e, SbSpace space, const SbStage *
     strain = PetscMax(strain, PetscAbsReal(p->free[c] ? H[c] : given[c]));
     stress = PetscMax(stress, PetscAbsReal(P[c]));
   }
-  if (strain == 0 && p->young > 0) /* growth in a cell that may not grow */
-    strain = stress / p->young;
+  if (strain == 0 && p->wave > 0) /* growth in a cell that may not grow */
+    strain = stress / p->wave;
   add_multipliers(PETSC_FALSE, space, p, stage, given, &sums, &off);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &off, 1, MPIU_REAL, MPI_MAX, space->comm));
   if (off <= TOLERANCE * strain)

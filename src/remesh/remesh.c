@@ -115,6 +115,11 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
                "-remesh_ out",
                m->body[b].name);
   for (PetscInt e = 0; e < m->neffect; e++)
+    PetscCheck(strcmp(m->effect[e]->type, "periodic") || !named, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "effect %s: opposite sides of a cell do not get the same new meshes: leave the "
+               "options -remesh_ out, or the effect",
+               m->effect[e]->name);
+  for (PetscInt e = 0; e < m->neffect; e++)
     PetscCheck(!m->effect[e]->ops.settle || !named, PETSC_COMM_SELF, PETSC_ERR_USER,
                "effect %s: what has torn is known by the cells of the mesh: scenes with "
                "-effect_%s_strength are not re-meshed: leave the options -remesh_ out, or the "
