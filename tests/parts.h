@@ -89,8 +89,8 @@ static const Part parts[] = {
    NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "tie", "-effects glue -effect_glue_type tie -effect_glue_on tip -effect_glue_to skin",
    PART_BLOCK, NULL, PETSC_FALSE}, /* implicit only */
-  {"effect", "periodic", "-effects cell -effect_cell_type periodic -effect_cell_on skin", NULL, NULL,
-   PETSC_FALSE}, /* implicit only */
+  {"effect", "periodic", "-effects cell -effect_cell_type periodic -effect_cell_on skin", NULL,
+   NULL, PETSC_FALSE}, /* implicit only */
   {"effect", "joint",
    "-effects hip -effect_hip_type joint -effect_hip_on bar -effect_hip_radius 0.1 -effect_hip_at "
    "0.4,0.05,0.05 -effect_hip_kind ball",

@@ -47,14 +47,14 @@ pulled = numpy.array([[100, 2 * MU * 0.002, 0], [2 * MU * 0.002, 0, 0], [0, 0, 0
 for element in ELEMENTS:
     for ranks in (1, 3):
         what = f"{element}, {ranks} ranks"
-        run("even", CELL.format(3, "linear", element) + given(SMALL), ranks)
+        run("even", CELL.format(2, "linear", element) + given(SMALL), ranks)
         end = last("even")
         same(tensor(end, "stress"), hooke, 1e-7, f"{what}: stress")
         same(tensor(end, "gradient"), SMALL, 1e-7, f"{what}: gradient")
         near(end["cell_work"] / end["strain"], 1, 1e-9, f"{what}: work over strain energy")
         near(abs(end["cell_hold_x"]) + abs(end["cell_hold_z"]), 0, 1e-10, f"{what}: force that holds the cell, N")
         check(end["newton"] <= 5, f"{what}: {end['newton']} iterations")
-        run("free", CELL.format(3, "linear", element) + given(PULL) + "-effect_cell_free yy,zz,yz ", ranks)
+        run("free", CELL.format(2, "linear", element) + given(PULL) + "-effect_cell_free yy,zz,yz ", ranks)
         end = last("free")
         same(tensor(end, "stress"), pulled, 2e-7, f"{what}, free across: stress")
         near(end["cell_gradient_yy"], -0.003, 1e-9, f"{what}, free across: contraction")
@@ -136,14 +136,14 @@ for name in ("cell_stress_xx", "cell_stress_xz", "cell_work", "cell_gradient_zz"
 # a standing shear wave over the cell: kinetic energy by cos^2 of 2 pi c t / L
 SPEED = (MU / 1000) ** 0.5
 PERIOD = 0.1 / SPEED
-WAVE = (CELL.format("6,2,2", "linear", "p2").replace("-time static ", "-time newmark ") + f"-body_a_velocity 0;0.01*sin(62.8318530717959*x);0 -ts_dt {PERIOD / 80} -ts_max_time {PERIOD / 2} ")
+WAVE = (CELL.format("12,4,4", "linear", "p1").replace("-time static ", "-time newmark ") + f"-body_a_velocity 0;0.01*sin(62.8318530717959*x);0 -ts_dt {PERIOD / 80} -ts_max_time {PERIOD / 2} ")
 run("wave", WAVE, 2)
 wave = history("wave")
 total = wave["kinetic"] + wave["strain"] + wave["cell_energy"]
 near(abs(total / total[0] - 1).max(), 0, 1e-6, "standing wave: energy")
-near(wave["kinetic"][20] / total[0], 0, 2e-3, "standing wave: kinetic energy after a quarter of its period, over all")
-near(wave["kinetic"][-1] / total[0], 1, 2e-3, "after half of it")
-run("wave", WAVE.replace("-effects cell", "-effects damping"), 2)
+near(wave["kinetic"][20] / total[0], 0, 5e-3, "standing wave: kinetic energy after a quarter of its period, over all")
+near(wave["kinetic"][-1] / total[0], 1, 0.01, "after half of it")
+run("wave", WAVE.replace("-effects cell -effect_cell_type periodic ", ""), 2)
 check(history("wave")["kinetic"][20] > 0.01 * total[0], "a body that is free at its sides has the same wave")
 
 # weight without a support
