@@ -157,7 +157,7 @@ TWO = ("-bodies a,b " + "".join(f"-body_{b}_material linear -body_{b}_young 1e4 
        + "-body_a_mesh box:0.1,0.1,0.1:1 -body_b_mesh box:0.1,0.1,0.05:1 -body_b_translate 0.1,0,0 -effects cell -effect_cell_type periodic -time static ")
 ERRORS = ((ONE + "-body_a_rotate 0,0,1,10 ", "no facet of these sets lies in the plane x ="), (TWO, "do not match"),
           (TWO.replace("box:0.1,0.1,0.05", "box:0.1,0.1,0.1").replace("0.1,0,0", "0.1,0.02,0"), "do not match"),
-          (ONE + "-effect_cell_on nowhere ", "-effect_cell_on"), (ONE + "-effect_cell_on a.xmin,a.xmax ", "no facet of these sets lies in the plane y ="),
+          (ONE + "-effect_cell_on nowhere ", "nowhere"), (ONE + "-effect_cell_on a.xmin,a.xmax ", "no facet of these sets lies in the plane y ="),
           (ONE + "-effect_cell_free xw ", '"xw" is no component'), (ONE + "-effect_cell_free xy,yx ", "both free"), (ONE + "-effect_cell_free xx " + given(SMALL), "leave one out"),
           (ONE + "-effect_cell_axes xy " + given(SMALL), "does not tie"), (ONE + "-effect_cell_axes x " + given(numpy.diag([0.01, 0, 0])), "nothing holds the body a"),
           (ONE + "-time euler_explicit ", "euler_explicit"), (ONE.replace("-time static", "-ts_max_time 0.01 -remesh_times 0.005"), "-remesh_ out"), (ONE + "-effect_cell_gradient x;0;0;0;0;0;0;0;0 ", "not x, y or z"), (ONE + "-effect_cell_stiffness -1 ", "-effect_cell_stiffness"))
