@@ -164,6 +164,7 @@ typedef struct {
   } stage;
   PetscReal barrier_weight; /* of barrier contact's forces, those at X, in the residual */
   PetscBool single;         /* one linear solve per step instead of Newton's method */
+  PetscBool soft;           /* with a tangent that may be softer than the forces */
   PetscBool fast;           /* -contact_quality fast: a limited number of iterations; */
   Vec left;         /* then what its direction had beyond the solution, m; owned; else NULL; and */
   PetscBool *alone; /* [nbody] then what touches nothing in the last iteration; owned; else NULL */

@@ -343,11 +343,13 @@ PetscErrorCode SbRunSetUp(SbRun run)
      (docs/reference/theory.md) */
   for (PetscInt k = 0; k < m->nmaterial; k++)
     warped = (PetscBool)(warped || m->material[k]->tangent == SB_TANGENT_WARPED);
-  if (solve->velocity_predictor && !m->linear && solve->single && warped)
+  solve->soft = (PetscBool)(m->dynamic && !explicit && !m->linear && solve->single && warped);
+  if (solve->soft && (solve->velocity_predictor || solve->preset == SB_TIME_NEWMARK))
     PetscCall(SbWarning(
       s->comm,
-      "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
-      "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
+      "-snes_type ksponly with %s and a warped tangent may gain energy without bound: give "
+      "-body_<name>_tangent exact_spd, or leave -snes_type ksponly out",
+      solve->velocity_predictor ? "-time_predictor velocity" : "-time newmark"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
