@@ -5,6 +5,8 @@
 
     bar    2 x 0.1 x 0.1 m, clamped, traction across its end
     plate  0.6 x 0.3 x 0.05 m, likewise: flat cells
+    twist  0.8 x 0.1 x 0.1 m, its end turned by 45 degrees, as much per length as 90 degrees of twice
+           the length
     cook   Cook's membrane, plane strain, 8 cells across
     bend   an arc of 45 degrees and radius 100 m, 1 x 1 m, E = 10 MPa, nu 0, 600 N across its plane
            at the end (Bathe and Bolourchi 1979): large rotations
@@ -102,6 +104,31 @@ static PetscErrorCode check_boxes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Torsion is harder than bending with two cells across, and hardest with cells twice as long as
+   wide. */
+static PetscErrorCode check_twist(void)
+{
+  const PetscReal bar[3] = {0.8, 0.1, 0.1};
+  const int along[3] = {1, 0, 0};
+  const PetscReal lengths[LENGTHS] = {1., 2., 4., 8.};
+  const PetscReal few[LENGTHS] = {2.};
+
+  PetscFunctionBeginUser;
+  for (PetscInt n = 2; n <= 4; n += 2) {
+    const PetscReal most[2] = {0.07, n == 2 ? 0.47 : 0.1};
+
+    for (int e = 0; e < (n == 2 ? 2 : 1); e++)
+      PetscCall(check_box(
+        "twist", bar, along, e ? few : lengths, n,
+        "-body_a_material stable_neohookean -body_a_young 1e6 -body_a_poisson 0.3 -effects "
+        "hold,turn -effect_hold_type fixed -effect_hold_on xmin -effect_turn_type "
+        "prescribed_displacement -effect_turn_on xmax -effect_turn_angle 45 -effect_turn_axis "
+        "1,0,0 -effect_turn_axis_point 0,0.05,0.05",
+        e ? "dg" : "cr", most));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static void cook_map(const VerifyPlace *place, PetscReal x[3])
 {
   x[1] = 44. * x[0] + x[1] * (44. - 28. * x[0]);
@@ -184,6 +211,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_boxes());
+  PetscCall(check_twist());
   PetscCall(check_mapped(
     "cook", cook_map, 4, cook,
     "-body_a_material linear -body_a_young 250 -body_a_poisson 0.4999 -sets left,right "
