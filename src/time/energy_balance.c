@@ -137,7 +137,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     if (run->solve.fast)
       advice = ", or -contact_quality exact, which solves them";
     else if (run->solve.soft)
-      advice = ", or -body_<name>_tangent exact_spd: one solve with a warped tangent may gain energy";
+      advice =
+        ", or -body_<name>_tangent exact_spd: one solve with a warped tangent may gain energy";
     else if (run->solve.preset == SB_TIME_EULER_IMPLICIT)
       advice = "";
     run->monitors.warned_gain = PETSC_TRUE;

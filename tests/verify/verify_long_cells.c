@@ -5,7 +5,8 @@
 
     bar    2 x 0.1 x 0.1 m, clamped, traction across its end
     plate  0.6 x 0.3 x 0.05 m, likewise: flat cells
-    twist  0.8 x 0.1 x 0.1 m, its end turned by 45 degrees, as much per length as 90 degrees of twice
+    twist  0.8 x 0.1 x 0.1 m, its end turned by 45 degrees, as much per length as 90 degrees of
+    twice
            the length
     cook   Cook's membrane, plane strain, 8 cells across
     bend   an arc of 45 degrees and radius 100 m, 1 x 1 m, E = 10 MPa, nu 0, 600 N across its plane
