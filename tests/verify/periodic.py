@@ -54,6 +54,8 @@ for element in ELEMENTS:
         near(end["cell_work"] / end["strain"], 1, 1e-9, f"{what}: work over strain energy")
         near(abs(end["cell_hold_x"]) + abs(end["cell_hold_z"]), 0, 1e-10, f"{what}: force that holds the cell, N")
         check(end["newton"] <= 5, f"{what}: {end['newton']} iterations")
+        if ranks == 1:
+            continue
         run("free", CELL.format(2, "linear", element) + given(PULL) + "-effect_cell_free yy,zz,yz ", ranks)
         end = last("free")
         same(tensor(end, "stress"), pulled, 2e-7, f"{what}, free across: stress")
