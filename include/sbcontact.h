@@ -82,6 +82,8 @@ typedef struct {
      m/s */
   PetscErrorCode (*begin_step)(SbContact c, SbSpace space, PetscReal t, PetscReal dt,
                                PetscReal speed, PetscReal u0[]);
+  /* * the same attempt goes on from its last solution; without it begin_step() begins again */
+  PetscErrorCode (*solve_again)(SbContact c, SbSpace space);
   /* * with restitution, after begin_step() of all contacts: finds the impacts of the step from u0
      and v0 */
   PetscErrorCode (*find_impacts)(SbContact c, SbSpace space, PetscReal dt, const PetscReal u0[],
@@ -254,7 +256,7 @@ PetscReal SbContactSetObstacleWay(const SbContactSet *contacts, PetscReal size);
 void SbContactGive(SbContact c, SbSpace space, PetscReal energy, PetscReal counted);
 PetscErrorCode SbContactSetResume(const SbContactSet *contacts);
 PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
-                                     PetscReal speed, Vec U0, Vec V0);
+                                     PetscReal speed, PetscBool again, Vec U0, Vec V0);
 
 /*
   The active set, where contacts->nactive_set > 0; collective.

@@ -47,7 +47,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   /* tangent and contact blocks at rest, where the barrier is not softened */
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
-  PetscCall(SbContactSetBeginStep(&p->scene.model->contacts, 0., h, 0., zero, NULL));
+  PetscCall(SbContactSetBeginStep(&p->scene.model->contacts, 0., h, 0., PETSC_FALSE, zero, NULL));
   PetscCall(SbSpaceCreateVec(s, &p->F));
   PetscCall(
     SbContactSetHessian(&p->scene.model->contacts, zero, SB_HESSIAN_PROJECTED, &p->blocks, p->F));

@@ -47,7 +47,7 @@ PetscErrorCode SbContactSetDestroy(SbContactSet *contacts)
 }
 
 PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscReal dt,
-                                     PetscReal speed, Vec U0, Vec V0)
+                                     PetscReal speed, PetscBool again, Vec U0, Vec V0)
 {
   const SbSpace s = contacts->space;
   const PetscReal *v;
@@ -58,7 +58,10 @@ PetscErrorCode SbContactSetBeginStep(SbContactSet *contacts, PetscReal t, PetscR
   PetscCall(SbSpaceGetLocalWrite(s, U0, &u));
   PetscCall(SbSpaceUpdateGhosts(s, u));
   for (PetscInt k = 0; k < contacts->n; k++)
-    PHASE_CALL(contacts->contact[k], begin_step, s, t, dt, speed, u);
+    if (again && contacts->contact[k]->ops->solve_again)
+      PHASE_CALL(contacts->contact[k], solve_again, s);
+    else
+      PHASE_CALL(contacts->contact[k], begin_step, s, t, dt, speed, u);
 
   /* the responses of this attempt */
   contacts->nexact = 0;

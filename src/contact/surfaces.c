@@ -720,6 +720,13 @@ static PetscErrorCode keep_forces(Surfaces *b, const PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static void forget_lag(Surfaces *b)
+{
+  b->friction.nlag = b->friction.nstuck = 0;
+  b->friction.lag = 0.;
+  b->friction.least = PETSC_INFINITY;
+}
+
 static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscReal t, PetscReal dt,
                                           PetscReal speed, PetscReal u0[])
 {
@@ -798,11 +805,20 @@ static PetscErrorCode begin_step_surfaces(SbContact contact, SbSpace s, PetscRea
                (double)(SLIP_ROUNDING * m->size / dt), (double)(m->size / dt));
     b->friction.slip = PetscMax(slip, SLIP_ROUNDING * m->size); /* of halved steps */
   }
-  b->friction.nlag = b->friction.nstuck = 0;
-  b->friction.lag = 0.;
-  b->friction.least = PETSC_INFINITY;
+  forget_lag(b);
   PetscCall(SbSurfacesFindFriction(b, PETSC_FALSE));
   SbSurfacesSwapFriction(b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Friction and multipliers stay those of the last solution. */
+static PetscErrorCode solve_again_surfaces(SbContact contact, SbSpace s)
+{
+  Surfaces *b = (Surfaces *)contact;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  forget_lag(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1081,6 +1097,7 @@ static const SbContactOps surface_ops = {
   .warn_overlaps = SbContactWarnOverlaps_Surfaces,
   .part = part_surfaces,
   .begin_step = begin_step_surfaces,
+  .solve_again = solve_again_surfaces,
   .find_impacts = SbContactFindImpacts_Surfaces,
   .gradient = SbContactGradient_Surfaces,
   .hessian = SbContactHessian_Surfaces,

@@ -135,7 +135,7 @@ PetscErrorCode SbRunBeginSolve(SbRun run, const SbAttempt *attempt, PetscBool wa
 
     PetscCall(SbModelStepSpeed(m, step->t, step->dt, step->U0, run->state.V, &speed));
     PetscCall(
-      SbContactSetBeginStep(&m->contacts, step->t, step->dt, speed, step->U0, run->state.V));
+      SbContactSetBeginStep(&m->contacts, step->t, step->dt, speed, warm, step->U0, run->state.V));
     PetscCall(SbRunWarnLongWay(run, step));
 
     /* a run that goes on from a checkpoint knew no contact yet when it found its reactions */
