@@ -240,7 +240,8 @@ PetscErrorCode SbContactSetDistances(const SbContactSet *contacts, PetscInt k, P
   Resume    - after effects have loaded their state from a checkpoint: assembles the constraints.
   BeginStep - an attempt at a step from t to t + dt begins with U0 and V0 (NULL in a static run),
               unchanged until the step ends. speed: SbModelStepSpeed(), the scale of tolerances,
-              m/s.
+              m/s. again: the same attempt goes on from its last solution, where potentials keep
+              their friction and multipliers.
 */
 PetscErrorCode SbContactSetStart(const SbContactSet *contacts, PetscReal t, PetscReal dt, Vec U);
 PetscErrorCode SbContactSetPart(const SbContactSet *contacts, PetscInt k, PetscReal t, Vec U,
