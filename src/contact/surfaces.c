@@ -720,6 +720,7 @@ static PetscErrorCode keep_forces(Surfaces *b, const PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Friction has not been updated in this solve. */
 static void forget_lag(Surfaces *b)
 {
   b->friction.nlag = b->friction.nstuck = 0;
