@@ -284,10 +284,11 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
   Advance  - obstacles are at the fraction `progress` of their path in the step.
   MaxStep  - largest collision-free fraction of the motion from X to X - Y over all ranks, by
              continuous collision detection, and the number of active pairs.
-  BodySteps - the same by bodies: Y of each body becomes the fraction of it that is free of
-             collisions with the motions of all; bodies that touch each other keep a common one.
-             MaxStep of the new Y may be below 1: a body that is held up is in another one's way.
-             alone[nbody]: what touches nothing, and is not held up.
+  BodySteps - the same by bodies: Z is, for each body, the fraction of Y that is free of collisions
+             with the motions of all; bodies that touch each other or are coupled keep a common
+             one. part: the least of them, as of MaxStep; farther: others are larger. MaxStep of Z
+             may be below 1: a body that is held up is in another one's way. alone[nbody]: what
+             touches nothing, and is not held up; NULL: not needed.
   Gradient - F += scale times the gradient of the energy at U, N; free_only: not where prescribed.
              energy: J, or NULL.
   Hessian  - its blocks, and R as the operation `hessian` says, zero at prescribed unknowns.
@@ -297,7 +298,8 @@ PetscErrorCode SbContactSetProjectVelocity(const SbContactSet *contacts, PetscRe
 void SbContactSetAdvance(const SbContactSet *contacts, PetscReal progress);
 PetscErrorCode SbContactSetMaxStep(const SbContactSet *contacts, Vec X, Vec Y, PetscReal *part,
                                    PetscInt *nactive);
-PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y, PetscBool alone[]);
+PetscErrorCode SbContactSetBodySteps(const SbContactSet *contacts, Vec X, Vec Y, Vec Z,
+                                     PetscBool alone[], PetscReal *part, PetscBool *farther);
 PetscErrorCode SbContactSetGradient(const SbContactSet *contacts, Vec U, PetscReal scale,
                                     PetscBool free_only, PetscReal *energy, Vec F);
 PetscErrorCode SbContactSetHessian(const SbContactSet *contacts, Vec U, SbContactHessian kind,

@@ -23,8 +23,9 @@ typedef struct {
 
     max_step         - part: largest s in [0, 1] without a collision; nactive: number of pairs
                        within a barrier, all ranks (may be NULL)
-    body_steps       - makes Y shorter, body by body, as far as each is held up by collisions;
-                       bodies that touch each other keep a common length
+    body_steps       - NULL: all keep a common length. part: as max_step. Z: Y, shortened body by
+                       body as far as each is held up by collisions; bodies that touch or are
+                       coupled keep a common length. farther: some go farther than that part
     advance          - obstacles move to this fraction of their motion in the step
     inverted         - strain energy at X, J, and number of inverted cells, all ranks
     hessian          - assembles the Hessian of the barriers at X, or its substitute; nblock: number
@@ -37,7 +38,7 @@ typedef struct {
 */
 typedef struct {
   PetscErrorCode (*max_step)(void *ctx, Vec X, Vec Y, PetscReal *part, PetscInt *nactive);
-  PetscErrorCode (*body_steps)(void *ctx, Vec X, Vec Y);
+  PetscErrorCode (*body_steps)(void *ctx, Vec X, Vec Y, Vec Z, PetscReal *part, PetscBool *farther);
   PetscErrorCode (*advance)(void *ctx, PetscReal fraction);
   PetscErrorCode (*inverted)(void *ctx, Vec X, PetscReal *energy, PetscInt *n);
   PetscErrorCode (*hessian)(void *ctx, Vec X, Vec F, SbContactHessian kind, Vec rhs,

@@ -823,6 +823,29 @@ static PetscErrorCode solve_again_surfaces(SbContact contact, SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Joins the bodies between which there is an energy: of an active pair, of lagged friction, of a
+   spring. */
+static void join_bodies(const Surfaces *b, SbBodySteps *bodies)
+{
+  const PetscInt *part = b->surface->part;
+
+  for (PetscInt i = 0; i < b->active.n; i++)
+    SbBodyStepsJoin(bodies, SbContactPairPart(b->surface, &b->active.pair[i].pair, 0),
+                    SbContactPairPart(b->surface, &b->active.pair[i].pair, 1));
+  for (PetscInt i = 0; i < b->friction.pairs.n; i++) {
+    const SbContactPair *pair = &b->friction.pairs.pair[i].on.pair;
+
+    SbBodyStepsJoin(bodies, SbContactPairPart(b->surface, pair, 0),
+                    SbContactPairPart(b->surface, pair, 1));
+  }
+  for (PetscInt i = 0; i < b->springs.n; i++) {
+    const SbPenetration *at = &b->springs.spring[i].at;
+
+    for (PetscInt k = 1; k < at->n; k++)
+      SbBodyStepsJoin(bodies, part[at->v[0]], part[at->v[k]]);
+  }
+}
+
 static PetscErrorCode max_step_surfaces(SbContact contact, SbSpace s, const PetscReal u0[],
                                         const PetscReal u1[], SbBodySteps *bodies, PetscReal *part,
                                         PetscInt *nactive)
@@ -836,9 +859,8 @@ static PetscErrorCode max_step_surfaces(SbContact contact, SbSpace s, const Pets
   PetscCall(SbSurfacesPlace(b, u1, 1., b->motion.other));
   PetscCall(SbContactPairsMaxStep(b->pairs, b->motion.x, b->motion.other,
                                   bodies ? bodies->part : NULL, part));
-  for (PetscInt i = 0; bodies && i < b->active.n; i++)
-    SbBodyStepsJoin(bodies, SbContactPairPart(b->surface, &b->active.pair[i].pair, 0),
-                    SbContactPairPart(b->surface, &b->active.pair[i].pair, 1));
+  if (bodies)
+    join_bodies(b, bodies);
   b->record.shortest = PetscMin(b->record.shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

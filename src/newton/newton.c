@@ -215,22 +215,45 @@ static PetscErrorCode update_friction(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A limited number of iterations: in each, bodies go on one by one, as far as collisions let
-   them. */
-static PetscErrorCode shorten_by_bodies(SNES snes, PetscReal *slope)
+/* The longest safe fraction s of the step. What is held up by a collision holds up only what it
+   touches: other bodies share no energy with it, so that Y shortened body by body descends, too. */
+static PetscErrorCode find_longest(SNES snes, PetscReal *slope, PetscReal *s)
 {
-  const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
+  Newton *n = (Newton *)snes->data;
+  const SbNewtonProblem *p = n->problem;
   const Vec Y = snes->vec_sol_update;
+  const Vec Z = n->rhs; /* work vector */
+  PetscBool farther;
+  PetscReal along;
 
   PetscFunctionBeginUser;
-  PetscCall(VecCopy(Y, p->left));
-  PetscCall((*p->barrier->body_steps)(p->ctx, snes->vec_sol, Y));
-  PetscCall(VecDot(snes->vec_func, Y, slope));
-  *slope = -*slope;
+  n->held = 1.;
+  if (p->iterations)
+    PetscCall(VecCopy(Y, p->left));
+  if (!p->barrier || !p->barrier->body_steps) {
+    PetscCall(SbNewtonLongestStep(snes, s));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall((*p->barrier->body_steps)(p->ctx, snes->vec_sol, Y, Z, s, &farther));
+  if (!farther)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDot(snes->vec_func, Z, &along));
+  if (-along > *s * *slope)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(snes,
+                      "iteration %" PetscInt_FMT ": %g of the step for bodies that are held "
+                      "up; slope %g -> %g J\n",
+                      snes->iter, (double)*s, (double)*slope, -(double)along));
+  PetscCall(VecCopy(Z, Y));
+  *slope = -along;
+  n->held = *s;
+  *s = 1.;
+  PetscCall(SbNewtonLongestStep(snes, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the last of them the solve ends where it is, at an X free of intersections. */
+/* A limited number of iterations: after the last of them the solve ends where it is, at an X free
+   of intersections. */
 static PetscErrorCode end_early(SNES snes, PetscReal s)
 {
   const SbNewtonProblem *p = ((Newton *)snes->data)->problem;
@@ -251,7 +274,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const SbNewtonProblem *p = n->problem;
   const Vec X = snes->vec_sol;
   const Vec Y = snes->vec_sol_update;
-  PetscReal slope, s;
+  PetscReal slope, s, part;
   PetscBool interrupted = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -269,16 +292,16 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, largest safe step, line search */
     PetscCall(SbNewtonFindDirection(snes, &slope));
     s = 1.;
-    if (!snes->reason && p->iterations)
-      PetscCall(shorten_by_bodies(snes, &slope));
     if (!snes->reason)
-      PetscCall(SbNewtonLongestStep(snes, &s));
+      PetscCall(find_longest(snes, &slope, &s));
     if (!snes->reason && !p->barrier && s < SHORTEST)
       snes->reason = SNES_DIVERGED_LINE_SEARCH;
     if (!snes->reason)
       PetscCall(SbNewtonSearch(snes, slope, &s));
     if (snes->reason)
       break;
+    part = s;
+    s *= n->held;
 
     /* a full step: the next tangent is exact */
     n->full = (PetscBool)(s >= 1.);
@@ -297,7 +320,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (p->barrier)
       PetscCall(update_friction(snes));
     if (p->iterations)
-      PetscCall(end_early(snes, s));
+      PetscCall(end_early(snes, part));
   }
   if (p->linearise)
     PetscCall((*p->linearise)(p->ctx, NULL, NULL, 0.));

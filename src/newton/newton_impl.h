@@ -32,6 +32,7 @@ typedef struct {
   Iterate best;       /* barriers: the longest sufficient trial */
   PetscReal change;   /* change of E over the last step, J */
   PetscBool rounding; /* the last step changed nothing beyond rounding */
+  PetscReal held;     /* Y was shortened body by body: least fraction that is left; 1: it was not */
 
   /* provisional steps, which may raise E */
   struct {

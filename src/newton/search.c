@@ -166,7 +166,8 @@ static void judge(Search *q)
 
   /* at the solution, where residuals are rounding as well */
   stays = (PetscBool)(!q->enough || (n->problem->quadratic && to->norm > STAYS * before));
-  n->rounding = (PetscBool)(q->s == 1. && stays && descent && within && -q->slope <= nothing);
+  n->rounding =
+    (PetscBool)(q->s == 1. && n->held == 1. && stays && descent && within && -q->slope <= nothing);
   if (descent && within)
     q->enough = (PetscBool)(q->enough || -q->slope <= nothing);
 }
@@ -205,7 +206,7 @@ static PetscErrorCode next_bracketed(Search *q, PetscReal *next)
     *next = 0.5 * (q->low + q->high);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (q->s < 1.)
+  if (q->s < 1. || q->n->held < 1.)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* beyond a whole step, as far as there is no collision */
@@ -270,6 +271,7 @@ static PetscErrorCode improve_direction(Search *q, PetscBool *again)
   PetscCall(SbNewtonSolveAccurately(snes, &q->slope, again));
   if (!*again)
     PetscFunctionReturn(PETSC_SUCCESS);
+  q->n->held = 1.;
   PetscCall(SbNewtonLongestStep(snes, &q->s));
   PetscCall(find_slopes(snes->vec_sol_update, &q->n->from));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -295,6 +297,7 @@ static PetscErrorCode undo_provisional(Search *q)
   q->change = n->provisional.first;
   q->undone = n->provisional.rise;
   n->provisional.n = 0;
+  n->held = 1.;
   q->s = n->provisional.part; /* collision detection may have limited the one from there */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -353,7 +356,7 @@ PetscErrorCode SbNewtonSearch(SNES snes, PetscReal slope, PetscReal *s)
 
   PetscFunctionBeginUser;
   q.circulatory = (PetscBool)(p->nonsymmetric && p->dt == 0. && !p->barrier);
-  q.monotone = (PetscBool)(p->barrier && (n->nblock > 0 || q.s < 1.));
+  q.monotone = (PetscBool)(p->barrier && (n->nblock > 0 || q.s < 1. || n->held < 1.));
 
   /* where it begins */
   n->from.x = snes->vec_sol;

@@ -160,12 +160,16 @@ static PetscErrorCode max_step(void *ctx, Vec X, Vec Y, PetscReal *part, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode body_steps(void *ctx, Vec X, Vec Y)
+static PetscErrorCode body_steps(void *ctx, Vec X, Vec Y, Vec Z, PetscReal *part,
+                                 PetscBool *farther)
 {
   const SbRun run = ((SbPotential)ctx)->run;
+  PetscReal admissible;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactSetBodySteps(&run->model->contacts, X, Y, run->solve.alone));
+  PetscCall(SbContactSetBodySteps(&run->model->contacts, X, Y, Z, run->solve.alone, part, farther));
+  PetscCall(longest(ctx, X, Y, &admissible));
+  *part = PetscMin(*part, admissible);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -37,8 +37,9 @@ PetscErrorCode SbRunWarnLongWay(SbRun run, const SbSolvedStep *step)
   PetscInt worst = -1;
   PetscReal fastest; /* component, m/s */
   PetscReal *way, *free;
-  PetscBool *alone;
-  Vec Y;
+  PetscReal part;
+  PetscBool farther;
+  Vec Y, Z;
 
   PetscFunctionBeginUser;
   if (run->monitors.warned_way || !m->dynamic || !m->contacts.npotential)
@@ -48,12 +49,13 @@ PetscErrorCode SbRunWarnLongWay(SbRun run, const SbSolvedStep *step)
     PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the way with the velocity at the start, and the part of it that is free */
-  PetscCall(PetscMalloc3(m->nbody, &way, m->nbody, &free, m->nbody, &alone));
+  PetscCall(PetscMalloc2(m->nbody, &way, m->nbody, &free));
   PetscCall(VecDuplicate(run->state.V, &Y));
+  PetscCall(VecDuplicate(run->state.V, &Z));
   PetscCall(VecAXPBY(Y, -step->dt, 0., run->state.V));
   PetscCall(longest_by_body(m, Y, way));
-  PetscCall(SbContactSetBodySteps(&m->contacts, step->U0, Y, alone));
-  PetscCall(longest_by_body(m, Y, free));
+  PetscCall(SbContactSetBodySteps(&m->contacts, step->U0, Y, Z, NULL, &part, &farther));
+  PetscCall(longest_by_body(m, Z, free));
 
   /* the body that would go the farthest */
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -78,6 +80,7 @@ PetscErrorCode SbRunWarnLongWay(SbRun run, const SbSolvedStep *step)
       (double)size, (double)(step->dt / farthest)));
   }
   PetscCall(VecDestroy(&Y));
-  PetscCall(PetscFree3(way, free, alone));
+  PetscCall(VecDestroy(&Z));
+  PetscCall(PetscFree2(way, free));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
