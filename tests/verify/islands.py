@@ -2,7 +2,7 @@
 
 Twenty turned blocks fall onto a floor from different heights, far apart, so that one or the other hits it in nearly every step. A step of all of
 them needs hardly more iterations than the block that needs the most: 1.05 times as many in total, with one length of Newton's steps for all bodies
-1.29 times. Energy and the floor's force are the sums of the blocks alone, on 1 and 3 ranks the same. Two blocks on a stiff spring share an energy, and keep a common length.
+1.29 times. Energy and the floor's force are the sums of the blocks alone, on 1 and 3 ranks the same.
 """
 import numpy
 
@@ -16,10 +16,10 @@ MEET = " -effect_meet_type contact -effect_meet_friction 0.3 "
 HEIGHTS = [0.07 + 0.012 * (7 * i % 20) for i in range(20)]
 
 
-def fall(folder, which, ranks=1, more=""):
+def fall(folder, which, ranks=1):
     names = [f"b{i}" for i in which]
     effects = "-effects gravity,floor" + (",meet" + MEET if len(names) > 1 else " ")
-    start(folder, COMMON + f"-bodies {','.join(names)} " + "".join(CUBE.format(f"b{i}", 0.2 * i, HEIGHTS[i]) for i in which) + effects + FLOOR + more, ranks)
+    start(folder, COMMON + f"-bodies {','.join(names)} " + "".join(CUBE.format(f"b{i}", 0.2 * i, HEIGHTS[i]) for i in which) + effects + FLOOR, ranks)
     return history(folder)
 
 
@@ -32,9 +32,5 @@ for ranks in (1, 3):
     for name in ("kinetic", "strain", "floor_force_z"):
         parts = numpy.sum([h[name] for h in alone], axis=0)
         near(numpy.abs(rain[name] - parts).max() / parts.max(), 0, 1e-2, f"{ranks} ranks: {name}, difference from the sum of the blocks alone")
-    check(rain["floor_gap"][1:].min() > 0, f"{ranks} ranks: the floor is crossed")
-
-for stiffness in (1e3, 1e5, 1e7):
-    tied = fall("tied", (0, 17), more=f"-effect_s_type spring -effect_s_points b0:0.025,0.025,0.095;b17:3.425,0.025,0.29 -effect_s_stiffness {stiffness} ")
-    print(stiffness, tied["newton"].sum(), tied["newton"].max())
+    check(rain["floor_gap"].min() >= 0, f"{ranks} ranks: the floor is crossed")
 finish()
