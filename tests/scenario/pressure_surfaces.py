@@ -62,7 +62,9 @@ for i, (options, ranks, words, volume) in enumerate((
     ("-effect_p_on foot -effect_p_value 5e3", 2, ("open", "12 edges", "(0, 0.5, 0)", "supports"), None),
 )):
     note, errors, rows = run(str(i), ranks, options)
-    check(all(w in note for w in words) and not errors, f"{options} on {ranks}: {note} {errors}")
+    # a pressure on the foot, which is held, is warned of
+    said = "held nodes alone" in errors if "foot" in options else not errors
+    check(all(w in note for w in words) and said, f"{options} on {ranks}: {note} {errors}")
     check(("p_volume" in rows[0]) == (volume is not None), f"{options}: columns {list(rows[0])}")
     if volume:
         first, last = float(rows[0]["p_volume"]), float(rows[-1]["p_volume"])
