@@ -1,7 +1,7 @@
 /*
   repeated.c - effects that act on the same surfaces and fight each other, or count twice: two ties
-  of the same surfaces, a tie and contact of what it ties, two cavities with one wall. Contacts
-  among themselves are examined by src/contact/repeated.c.
+  of the same surfaces, a tie and contact of what it ties, two cavities with one wall, two periodic
+  cells of one body. Contacts among themselves are examined by src/contact/repeated.c.
 */
 #include "model_impl.h"
 
@@ -84,6 +84,28 @@ static PetscErrorCode check_cavities(SbModel m, SbEffect one, SbEffect two)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two periodic cells: each holds a place of its body, which would keep the other one from
+   straining it. */
+static PetscErrorCode check_cells(SbModel m, SbEffect one, SbEffect two)
+{
+  PetscInt *n, *n2;
+
+  PetscFunctionBeginUser;
+  if (one->from >= two->until || two->from >= one->until)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(m->nbody, &n, m->nbody, &n2));
+  PetscCall(SbEffectShared(m->space, &one->on, &one->on, n));
+  PetscCall(SbEffectShared(m->space, &two->on, &two->on, n2));
+  for (PetscInt b = 0; b < m->nbody; b++)
+    PetscCheck(!n[b] || !n2[b], m->comm, PETSC_ERR_USER_INPUT,
+               "effects %s and %s are both periodic, and of the body %s: give one of them all axes "
+               "and the whole gradient (-effect_%s_axes, -effect_%s_gradient), and leave the other "
+               "one out",
+               one->name, two->name, m->body[b].name, one->name, one->name);
+  PetscCall(PetscFree2(n, n2));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelCheckRepeated(SbModel m)
 {
   PetscFunctionBeginUser;
@@ -97,6 +119,8 @@ PetscErrorCode SbModelCheckRepeated(SbModel m)
         PetscCall(check_ties(m, one, two));
       if (l > k && is(one, "cavity") && is(two, "cavity"))
         PetscCall(check_cavities(m, one, two));
+      if (l > k && is(one, "periodic") && is(two, "periodic"))
+        PetscCall(check_cells(m, one, two));
       if (is(one, "tie") && two->contact && !SbContactHasObstacle(two->contact))
         PetscCall(check_contact(m, one, two));
     }

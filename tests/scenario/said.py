@@ -70,8 +70,7 @@ for n in (1, 3):
     load("traction -effect_push_on", "zmin -effect_push_total 1,0,0", HELD, ranks=n)
 load("pressure -effect_push_value 5 -effect_push_on", "zmin", HELD)
 load("point_force -effect_push_vector 0;0;1 -effect_push_on", "zmin", HELD)
-load("spring -effect_push_stiffness 1 -effect_push_length 0.1 -effect_push_points", "0.05,0.05,0;ground:0,0,-0.2", HELD)
-load("spring -effect_push_stiffness 1 -effect_push_length 0.1 -effect_push_points", "0.05,0.05,0.1;ground:0,0,-0.2", ())
+load("spring -effect_push_stiffness 1 -effect_push_length 0.1 -effect_push_points", "0.05,0.05,0;ground:0,0,-0.2", ())  # measures
 load("traction -effect_push_on", "xmin -effect_push_total 0,0,-1", ())
 load("foundation -effect_push_stiffness 1e3 -effect_push_on", "zmin", ())
 

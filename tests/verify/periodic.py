@@ -162,7 +162,8 @@ ERRORS = ((ONE + "-body_a_rotate 0,0,1,10 ", "no facet of these sets lies in the
           (ONE + "-effect_cell_on nowhere ", "nowhere"), (ONE + "-effect_cell_on a.xmin,a.xmax ", "no facet of these sets lies in the plane y ="),
           (ONE + "-effect_cell_free xw ", '"xw" is no component'), (ONE + "-effect_cell_free xy,yx ", "both free"), (ONE + "-effect_cell_free xx " + given(SMALL), "leave one out"),
           (ONE + "-effect_cell_axes xy " + given(SMALL), "does not tie"), (ONE + "-effect_cell_axes x " + given(numpy.diag([0.01, 0, 0])), "nothing holds the body a"),
-          (ONE + "-time euler_explicit ", "euler_explicit"), (ONE.replace("-time static", "-ts_max_time 0.01 -remesh_times 0.005"), "-remesh_ out"), (ONE + "-effect_cell_gradient x;0;0;0;0;0;0;0;0 ", "not x, y or z"), (ONE + "-effect_cell_stiffness -1 ", "-effect_cell_stiffness"))
+          (ONE + "-time euler_explicit ", "euler_explicit"), (ONE.replace("-time static", "-ts_max_time 0.01 -remesh_times 0.005"), "-remesh_ out"), (ONE + "-effect_cell_gradient x;0;0;0;0;0;0;0;0 ", "not x, y or z"), (ONE + "-effect_cell_stiffness -1 ", "-effect_cell_stiffness"),
+          (ONE + "-effects cell,across -effect_cell_axes x -effect_across_type periodic -effect_across_axes y ", "cell and across are both periodic"))
 for options, words in ERRORS:
     text = run("error", options, code=1)
     check(words in text, f"{words}: {text}")
