@@ -209,6 +209,7 @@ static const struct {
   {"quiet", "progress"},
   {"output_dir", ""},
   {"output_overwrite", ""},
+  {"show", ""},
 };
 
 /* Families, and prefixes of their log events; NULL: none. */
