@@ -113,9 +113,8 @@ const SbToolCommand SbToolCommands[] = {
    "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2,
    write_mesh},
   {"surface", "FILE OUT",
-   "writes the surface of the tets, seen from outside, to .stl, .obj or .ply; of one region, body "
-   "or "
-   "surface by -group",
+   "writes the surface of the tets, seen from outside, to .stl, .obj or .ply; of one region, "
+   "body or surface by -group",
    2, surface},
   {"repair", "FILE OUT",
    "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did",

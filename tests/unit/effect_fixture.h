@@ -297,3 +297,25 @@ static inline PetscErrorCode check_effect_refused(Fixture *x, const char *name, 
   PetscCall(SbEffectDestroy(&e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* y[owned nodes][3] = A w. Collective. */
+static inline PetscErrorCode fixture_apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[])
+{
+  Vec W, Y;
+  PetscReal *array;
+  const PetscReal *result;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(x->space, &W));
+  PetscCall(SbSpaceCreateVec(x->space, &Y));
+  PetscCall(VecGetArray(W, &array));
+  PetscCall(PetscArraycpy(array, w, 3 * x->space->nnode_owned));
+  PetscCall(VecRestoreArray(W, &array));
+  PetscCall(MatMult(A, W, Y));
+  PetscCall(VecGetArrayRead(Y, &result));
+  PetscCall(PetscArraycpy(y, result, 3 * x->space->nnode_owned));
+  PetscCall(VecRestoreArrayRead(Y, &result));
+  PetscCall(VecDestroy(&W));
+  PetscCall(VecDestroy(&Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -160,28 +160,6 @@ static PetscErrorCode tangent(Fixture *x, SbEffect e, PetscReal shift_k, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y[owned] = A w. */
-static PetscErrorCode apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[])
-{
-  Vec W, Y;
-  PetscReal *array;
-  const PetscReal *result;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(x->space, &W));
-  PetscCall(SbSpaceCreateVec(x->space, &Y));
-  PetscCall(VecGetArray(W, &array));
-  PetscCall(PetscArraycpy(array, w, 3 * x->space->nnode_owned));
-  PetscCall(VecRestoreArray(W, &array));
-  PetscCall(MatMult(A, W, Y));
-  PetscCall(VecGetArrayRead(Y, &result));
-  PetscCall(PetscArraycpy(y, result, 3 * x->space->nnode_owned));
-  PetscCall(VecRestoreArrayRead(Y, &result));
-  PetscCall(VecDestroy(&W));
-  PetscCall(VecDestroy(&Y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so
   the ratio of two steps is 100 up to rounding. Without the tangent it is 10.
@@ -199,7 +177,7 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
   PetscCall(effect_force(x, e, 2));
   PetscCall(PetscArraycpy(f, x->f, 3 * n));
   PetscCall(tangent(x, e, 1, A));
-  PetscCall(apply(x, A, w, Aw));
+  PetscCall(fixture_apply(x, A, w, Aw));
 
   // The part that is applied outside the matrix.
   if (e->ops.nonsymmetric) {
@@ -263,9 +241,9 @@ static PetscErrorCode check_tangent(Fixture *x)
   direction(x, 1, PETSC_FALSE, v);
   direction(x, 2, PETSC_FALSE, w);
   PetscCall(tangent(x, open, 1, A));
-  PetscCall(apply(x, A, w, y));
+  PetscCall(fixture_apply(x, A, w, y));
   PetscCall(dot(x, v, y, &a));
-  PetscCall(apply(x, A, v, y));
+  PetscCall(fixture_apply(x, A, v, y));
   PetscCall(dot(x, w, y, &b));
   SB_CHECK_NEAR(a, b, 1e-13 * P, "v A w = w A v");
   SB_CHECK(x->space->faces || PetscAbsReal(a) > 1e-3 * P, "v A w = %g shows nothing", a);

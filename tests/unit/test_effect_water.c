@@ -46,28 +46,6 @@ static PetscErrorCode column(Fixture *x, SbEffect e, int which, PetscReal *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y[owned] = A w. */
-static PetscErrorCode apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[])
-{
-  Vec W, Y;
-  PetscReal *array;
-  const PetscReal *result;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(x->space, &W));
-  PetscCall(SbSpaceCreateVec(x->space, &Y));
-  PetscCall(VecGetArray(W, &array));
-  PetscCall(PetscArraycpy(array, w, 3 * x->space->nnode_owned));
-  PetscCall(VecRestoreArray(W, &array));
-  PetscCall(MatMult(A, W, Y));
-  PetscCall(VecGetArrayRead(Y, &result));
-  PetscCall(PetscArraycpy(y, result, 3 * x->space->nnode_owned));
-  PetscCall(VecRestoreArrayRead(Y, &result));
-  PetscCall(VecDestroy(&W));
-  PetscCall(VecDestroy(&Y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A: the effect's part of the tangent at this stage. */
 static PetscErrorCode tangent(Fixture *x, SbEffect e, const SbStage *stage, Mat A)
 {
@@ -93,7 +71,7 @@ static PetscErrorCode taylor(Fixture *x, SbEffect e, Mat A, const SbStage *stage
   direction(x, 1, w);
   PetscCall(PetscArraycpy(start, moved, n));
   PetscCall(tangent(x, e, stage, A));
-  PetscCall(apply(x, A, w, Aw));
+  PetscCall(fixture_apply(x, A, w, Aw));
   PetscCall(PetscArrayzero(f, n));
   PetscCall((*e->ops.force)(e, x->space, stage, f));
   for (int k = 0; k < 2; k++) {
@@ -167,9 +145,9 @@ static PetscErrorCode check_buoyancy(Fixture *x, Fixture *serial, PetscBool quad
     SB_CHECK(quotient > (quadratic ? 50 : 95) && quotient < 105, "Taylor remainder: quotient %g",
              quotient);
     direction(x, 2, u);
-    PetscCall(apply(x, A, w, y));
+    PetscCall(fixture_apply(x, A, w, y));
     PetscCall(dot(x, u, y, &a));
-    PetscCall(apply(x, A, u, y));
+    PetscCall(fixture_apply(x, A, u, y));
     PetscCall(dot(x, w, y, &b));
     SB_CHECK_NEAR(a, b, 1e-11 * RHO_G, "v A w = w A v");
     PetscCall(MatDestroy(&A));
